@@ -1,0 +1,88 @@
+"""Coefficients and intensities as numbers, RGB, or one value for each wavelength (8.11, 8.12)."""
+
+from collections.abc import Sequence
+from numbers import Real
+
+import drjit as dr
+import numpy as np
+
+from heuristic.errors import InputError
+
+Coefficient = "float | Sequence[float] | Dr.Jit array"
+
+
+def checked(name, value):
+    """Return ``value`` as a float, a tuple of floats, or the Dr.Jit array that it is.
+
+    Numbers and sequences must be finite and not negative. Dr.Jit arrays pass unread, because
+    looking at them would evaluate them.
+
+    Raises
+    ------
+    InputError
+        For a negative, infinite or NaN value, or one that is no number.
+    """
+    if dr.is_array_v(value) and dr.is_jit_v(value):
+        return value
+    if isinstance(value, Real):
+        components = (float(value),)
+    elif isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value):
+        components = tuple(float(component) for component in np.ravel(value))
+    else:
+        raise InputError(
+            f"{name} = {value!r} is no colour: give a number, RGB, or one value for each wavelength."
+        )
+    for component in components:
+        if not (np.isfinite(component) and component >= 0):
+            raise InputError(f"{name} = {value!r} is not allowed: give finite values of 0 or more.")
+    return components[0] if len(components) == 1 else components
+
+
+def is_zero(value):
+    """Tell whether a checked value is zero by construction, so that its term need not be traced."""
+    if isinstance(value, tuple):
+        return not any(value)
+    return isinstance(value, float) and value == 0
+
+
+def wavelength_count(value):
+    """Return the number of components of a checked value, 1 for numbers and Dr.Jit floats."""
+    if isinstance(value, tuple):
+        return len(value)
+    if dr.is_array_v(value) and dr.depth_v(value) > 1:
+        return len(value)
+    return 1
+
+
+def common_wavelength_count(values):
+    """Return the number of components that all of ``values`` share; single ones fit any.
+
+    ``values`` maps names to checked values.
+
+    Raises
+    ------
+    InputError
+        When two values have different numbers of components, neither being 1.
+    """
+    counts = {name: wavelength_count(value) for name, value in values.items()}
+    several = {name: count for name, count in counts.items() if count > 1}
+    if len(set(several.values())) > 1:
+        listing = ", ".join(f"{name} has {count}" for name, count in several.items())
+        raise InputError(
+            f"Mixed numbers of wavelengths: {listing}. Give each colour one value, or all the same"
+            " number of values."
+        )
+    return max(counts.values(), default=1)
+
+
+def as_array(value, vector_type):
+    """Turn a checked value into what the kernel multiplies with.
+
+    Numbers and Dr.Jit arrays stay as they are; a tuple of three or fewer becomes a fixed array of
+    the backend and precision of ``vector_type``, a longer one a dynamic array.
+    """
+    if not isinstance(value, tuple):
+        return value
+    size = len(value) if len(value) <= 4 else -1
+    shape = (size, -1) if dr.is_jit_v(vector_type) else (size,)
+    return dr.replace_shape_t(vector_type, shape)(value)

@@ -1,0 +1,36 @@
+"""Every error that fotismos raises on purpose.
+
+::
+
+    FotismosError
+    ├── InputError         a scene, value or option that cannot be used     exit code 2
+    ├── InstallationError  something that must be on the machine is not     exit code 2
+    └── NonFiniteError     a NaN or an infinity in an image                 exit code 1
+
+A message names the value, what is allowed and what to do next. The command line prints it without
+a traceback and leaves with the class's `exit_code`.
+"""
+
+
+class FotismosError(Exception):
+    """Base of the errors that fotismos raises on purpose; catch it to catch them all."""
+
+    exit_code = 1
+
+
+class InputError(FotismosError):
+    """A scene, a value or an option that cannot be used as it was given."""
+
+    exit_code = 2
+
+
+class InstallationError(FotismosError):
+    """Something that must be on the machine is missing, or is there in an unusable version."""
+
+    exit_code = 2
+
+
+class NonFiniteError(FotismosError):
+    """A NaN or an infinity in an image; the message says in which, and where."""
+
+    exit_code = 1

@@ -1,0 +1,209 @@
+"""Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3).
+
+Each light answers one question, ``illuminate(position)``: from which direction ``L``, and with what
+intensity, does its light arrive at the given positions? Occlusion is not its business.
+"""
+
+from dataclasses import dataclass
+from math import cos, inf, isfinite, radians
+from numbers import Real
+
+import drjit as dr
+
+from heuristic import colours, terms, vectors
+from heuristic.errors import InputError
+
+UNATTENUATED = (1, 0, 0)
+INVERSE_SQUARE = (0, 0, 1)
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel rays of constant intensity: the limit of a point light at infinity.
+
+    Parameters
+    ----------
+    direction
+        Direction in which the light travels; any length but zero.
+    intensity
+        ``I_p``, display-linear: a number, RGB, one value for each wavelength, or a Dr.Jit array.
+
+    Raises
+    ------
+    InputError
+        For a zero or non-finite direction, or a negative or non-finite intensity.
+    """
+
+    direction: object
+    intensity: colours.Coefficient
+
+    def __post_init__(self):
+        _set(self, direction=_direction(self.direction), intensity=_intensity(self.intensity))
+
+    def illuminate(self, position):
+        """Return ``L = -direction / |direction|`` and ``I_p``."""
+        vector_type = type(position)
+        toward = -vectors.normalise(vector_type(self.direction))
+        return toward, colours.as_array(self.intensity, vector_type)
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """A point that shines alike in all directions (6.1).
+
+    Parameters
+    ----------
+    position
+        ``P_L``, in world space.
+    intensity
+        ``I_0`` (chapter 8: ``I_p0``), display-linear.
+    attenuation
+        ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0. ``(1, 0, 0)`` is no attenuation,
+        ``(0, 0, 1)`` the inverse square of 8.6.
+    clamped
+        Use the other form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``.
+
+    Raises
+    ------
+    InputError
+        For a non-finite position, a negative or non-finite intensity, or coefficients that are
+        negative, non-finite or all zero.
+    """
+
+    position: object
+    intensity: colours.Coefficient
+    attenuation: tuple = UNATTENUATED
+    clamped: bool = False
+
+    def __post_init__(self):
+        _set(
+            self,
+            position=_point(self.position),
+            intensity=_intensity(self.intensity),
+            attenuation=_attenuation(self.attenuation),
+        )
+
+    def illuminate(self, position):
+        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6) at ``position``."""
+        vector_type = type(position)
+        toward, distance = vectors.light_vector(vector_type(self.position), position)
+        intensity = colours.as_array(self.intensity, vector_type)
+        return toward, _attenuated(intensity, distance, self.attenuation, self.clamped)
+
+
+@dataclass(frozen=True)
+class SpotLight:
+    """A point that shines into a cone about an axis (6.2-6.4).
+
+    Parameters
+    ----------
+    position, intensity, attenuation, clamped
+        As of :class:`PointLight`.
+    direction
+        ``v_L``, the axis, in the direction of travel; any length but zero.
+    cutoff
+        ``omega_L``, the angle between the axis and the edge of the cone, in degrees, within (0, 180).
+    exponent
+        ``m`` of 6.4, 0 or more; 0 is an even cone.
+
+    Raises
+    ------
+    InputError
+        As :class:`PointLight`, and for a zero direction, a cutoff outside (0, 180) or a negative
+        exponent.
+    """
+
+    position: object
+    direction: object
+    intensity: colours.Coefficient
+    cutoff: float
+    exponent: float = 0
+    attenuation: tuple = UNATTENUATED
+    clamped: bool = False
+
+    def __post_init__(self):
+        if isinstance(self.cutoff, Real) and not 0 < self.cutoff < 180:
+            raise InputError(
+                f"cutoff = {self.cutoff!r} is not allowed: give an angle between 0 and 180 degrees,"
+                " both excluded."
+            )
+        if isinstance(self.exponent, Real) and not 0 <= self.exponent < inf:
+            raise InputError(
+                f"exponent = {self.exponent!r} is not allowed: give a finite value of 0 or more."
+            )
+        _set(
+            self,
+            position=_point(self.position),
+            direction=_direction(self.direction),
+            intensity=_intensity(self.intensity),
+            attenuation=_attenuation(self.attenuation),
+        )
+
+    def illuminate(self, position):
+        """Return ``L`` (6.26) and the intensity of 6.4 (6.3 where ``m = 0``) at ``position``."""
+        vector_type = type(position)
+        toward, distance = vectors.light_vector(vector_type(self.position), position)
+        cos_axis = -dr.dot(vectors.normalise(vector_type(self.direction)), toward)
+        cone = terms.spot_cone(cos_axis, self._cos_cutoff())
+        if not (isinstance(self.exponent, Real) and self.exponent == 0):
+            cone *= terms.spot_falloff(cos_axis, self.exponent)
+        intensity = colours.as_array(self.intensity, vector_type)
+        return toward, _attenuated(intensity * cone, distance, self.attenuation, self.clamped)
+
+    def _cos_cutoff(self):
+        if isinstance(self.cutoff, Real):
+            return cos(radians(self.cutoff))
+        return dr.cos(dr.deg2rad(self.cutoff))
+
+
+def _attenuated(intensity, distance, coefficients, clamped):
+    if coefficients == UNATTENUATED:
+        return intensity
+    law = terms.clamped_attenuation if clamped else terms.attenuation
+    return intensity * law(distance, *coefficients)
+
+
+def _set(light, **values):
+    for name, value in values.items():
+        object.__setattr__(light, name, value)
+
+
+def _triple(name, value):
+    """Return three finite floats, or the Dr.Jit array that was given."""
+    if dr.is_array_v(value) and dr.is_jit_v(value):
+        return value
+    try:
+        triple = tuple(float(component) for component in value)
+    except (TypeError, ValueError):
+        triple = ()
+    if len(triple) != 3 or not all(map(isfinite, triple)):
+        raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
+    return triple
+
+
+def _point(value):
+    return _triple("position", value)
+
+
+def _direction(value):
+    direction = _triple("direction", value)
+    if isinstance(direction, tuple) and not any(direction):
+        raise InputError("direction = (0, 0, 0) points nowhere: give a vector of any other length.")
+    return direction
+
+
+def _intensity(value):
+    return colours.checked("intensity", value)
+
+
+def _attenuation(value):
+    coefficients = tuple(value)
+    if len(coefficients) != 3:
+        raise InputError(f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2.")
+    if not all(isinstance(coefficient, Real) for coefficient in coefficients):
+        return coefficients
+    if not all(isfinite(c) and c >= 0 for c in coefficients) or not any(coefficients):
+        raise InputError(
+            f"attenuation = {value!r} is not allowed: k0, k1, k2 are finite, 0 or more, and not all 0."
+        )
+    return coefficients

@@ -1,0 +1,43 @@
+"""Mitsuba plugins around the illumination model.
+
+==========================  ==========  ==========================================================
+Plugin                      Kind        What it is
+==========================  ==========  ==========================================================
+``phong``                   BSDF        diffuse and specular terms behind Mitsuba's BSDF interface
+``heuristic``               integrator  calls the kernel :func:`heuristic.shade` at what a ray hits
+``heuristic_point``         emitter     point light with the chapters' attenuation
+``heuristic_spot``          emitter     spot light with cone, exponent and attenuation
+``heuristic_directional``   emitter     parallel light
+``heuristic_glow``          emitter     emission and ambient light of a shape, for Mitsuba's own
+                                        integrators; it lights nothing else
+==========================  ==========  ==========================================================
+"""
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from heuristic.plugins import glow, integrator, lights, phong
+
+_registered = set()
+
+
+def register():
+    """Make the plugins known to Mitsuba, for the current variant. Calling it again does nothing.
+
+    Raises
+    ------
+    InputError
+        When no variant is set, or the current one is not supported: polarised, or not on LLVM or
+        scalar arrays.
+    """
+    variant = mi.variant()
+    if variant is None or "polarized" in variant:
+        raise InputError(
+            f"The plugins cannot be registered for the variant {variant!r}: call mitsuba.set_variant"
+            " with llvm_ad_rgb or llvm_ad_spectral first."
+        )
+    if variant in _registered:
+        return
+    for module in (phong, glow, lights, integrator):
+        module.define()
+    _registered.add(variant)

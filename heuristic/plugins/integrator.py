@@ -1,0 +1,127 @@
+"""The integrator plugin ``heuristic``: the kernel at the first surface that a camera ray meets.
+
+==================  ==================  ===========================================================
+Parameter           Type (default)      Meaning
+==================  ==================  ===========================================================
+``ambient``         spectrum (0)        ``I_a`` of 8.2
+``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
+                                        nothing
+==================  ==================  ===========================================================
+
+It works on scenes whose BSDFs are ``phong`` and whose lights are ``heuristic_*`` plugins; an
+environment emitter is background only. Films, samplers, cameras, filters and AOVs are Mitsuba's. The
+first thing drawn from the sampler is the camera ray, as in ``direct`` and ``path``, so that equal
+seeds give equal rays. Python::
+
+    {'type': 'heuristic', 'ambient': 1.0}
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from heuristic.materials import Material
+from heuristic.plugins.spectra import emitted, may_be_nonzero
+from heuristic.shading import shade
+
+
+def define():
+    """Create the class for the current variant and register it."""
+
+    class HeuristicIntegrator(mi.SamplingIntegrator):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.ambient = emitted(props, "ambient", 0.0)
+
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            si = scene.ray_intersect(ray, active)
+            hit = active & si.is_valid()
+            material, twosided = SceneMaterials(scene).at(si, hit)
+            normal = mi.Vector3f(si.sh_frame.n)
+            if twosided is not False:
+                normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
+            lights = [emitter.light(si, hit) for emitter in _lights(scene)]
+            ambient = self.ambient.eval(si, hit) if may_be_nonzero(self.ambient) else 0
+            colour = mi.Spectrum(shade(si.p, normal, -ray.d, material, lights, ambient))
+            colour = dr.select(hit & (twosided | (si.wi.z > 0)), colour, 0)
+            environment = scene.environment()
+            if environment is not None and not self.hide_emitters:
+                colour += dr.select(active & ~hit, environment.eval(si, active & ~hit), 0)
+                hit = active
+            return colour, hit, []
+
+        def traverse(self, callback):
+            callback.put("ambient", self.ambient, mi.ParamFlags.Differentiable)
+
+        def to_string(self):
+            return f"HeuristicIntegrator[ambient = {self.ambient}]"
+
+    mi.register_integrator("heuristic", HeuristicIntegrator)
+
+
+class SceneMaterials:
+    """The ``phong`` BSDFs of a scene, and which shape has which.
+
+    Raises
+    ------
+    InputError
+        For a shape whose BSDF is no ``phong``.
+    """
+
+    def __init__(self, scene):
+        numbers = {}
+        places = {}
+        for shape in scene.shapes():
+            bsdf = shape.bsdf()
+            if not hasattr(bsdf, "material"):
+                raise InputError(
+                    f"shape {shape.id()!r}: its BSDF {bsdf.class_name()} is no phong. The integrator"
+                    " heuristic renders the heuristic half of a pair; reference.pair makes one."
+                )
+            places[_registry_index(shape)] = numbers.setdefault(bsdf, len(numbers))
+        self.bsdfs = list(numbers)
+        self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
+
+    def at(self, si, active):
+        """Return the material at a surface interaction and whether it is two-sided."""
+        if len(self.bsdfs) == 1:
+            return self.bsdfs[0].material(si, active), self.bsdfs[0].twosided
+        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+        index = dr.gather(
+            mi.UInt32, mi.UInt32(self.table), dr.reinterpret_array(mi.UInt32, si.shape), active
+        )
+
+        def reader(bsdf):
+            def read(si, active):
+                material = bsdf.material(si, active)
+                values = [mi.Spectrum(getattr(material, name)) for name in present]
+                return (*values, mi.Float(material.n), mi.Bool(bsdf.twosided))
+
+            return read
+
+        readers = [reader(bsdf) for bsdf in self.bsdfs]
+        *values, n, twosided = dr.switch(index, readers, si, active)
+        if not any(bsdf.twosided for bsdf in self.bsdfs):
+            twosided = False
+        return Material(**dict(zip(present, values, strict=True)), n=n), twosided
+
+
+def _registry_index(shape):
+    """Return the number under which Dr.Jit knows a shape, as found in ``si.shape``."""
+    return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+
+
+def _lights(scene):
+    """Return the emitters that light the scene, refusing those that the model does not know."""
+    lights = []
+    for emitter in scene.emitters():
+        if hasattr(emitter, "light"):
+            lights.append(emitter)
+        elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
+            raise InputError(
+                f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form. The"
+                " integrator heuristic renders the heuristic half of a pair; reference.pair makes one."
+            )
+    return lights

@@ -1,0 +1,168 @@
+"""The BSDF plugin ``phong``: the chapters' material under Mitsuba's own integrators.
+
+==================  ================  =============================================================
+Parameter           Type (default)    Meaning
+==================  ================  =============================================================
+``k_i``, ``k_a``    spectrum (0)      emission and ambient coefficient; read by the integrator
+                                      ``heuristic`` alone, as they are no matter of reflection
+``k_d``, ``k_s``    spectrum or       diffuse and specular coefficient
+                    texture (0)
+``n``               float (1)         Phong's exponent
+``twosided``        boolean (false)   shade the side that faces the viewer, whichever it is
+==================  ================  =============================================================
+
+All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
+
+    {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
+
+The reflected radiance for irradiance ``E`` at normal incidence is that of 8.10 for ``I_p = E / pi``
+(:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
+has no cosine of its own; as the chapters have it, it neither conserves energy nor is reciprocal.
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic import terms
+from heuristic.convention import RADIANCE_PER_IRRADIANCE
+from heuristic.errors import InputError
+from heuristic.materials import Material
+from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
+
+
+def define():
+    """Create the class for the current variant and register it."""
+
+    class PhongBSDF(mi.BSDF):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.k_i = emitted(props, "k_i", 0.0)
+            self.k_a, self.k_d, self.k_s = (coefficient(props, k) for k in ("k_a", "k_d", "k_s"))
+            n = props.get("n", 1.0)
+            if not 0 <= n < float("inf"):
+                raise InputError(
+                    f"phong: n = {n} is not allowed: give a finite value of 0 or more."
+                )
+            self.n = mi.Float(n)
+            self.twosided = props.get("twosided", False)
+            sides = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.BackSide if self.twosided else 0)
+            self.m_components = [
+                mi.BSDFFlags.GlossyReflection | sides,
+                mi.BSDFFlags.DiffuseReflection | sides,
+            ]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+            self.parameters_changed()
+
+        def material(self, si, active=True):
+            """Return the coefficients at a surface interaction, with absent terms as plain zeros."""
+            coefficients = {
+                name: getattr(self, name).eval(si, active) for name in self.present if name != "n"
+            }
+            return Material(**coefficients, n=self.n)
+
+        def eval(self, ctx, si, wo, active=True):
+            wi, wo = self._facing(si.wi, wo)
+            above = active & (wi.z > 0) & (wo.z > 0)
+            value = mi.Spectrum(0)
+            if "k_d" in self.present and ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1):
+                k_d = self.k_d.eval(si, above)
+                value += terms.diffuse(RADIANCE_PER_IRRADIANCE, k_d, wo.z)
+            if "k_s" in self.present and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
+                k_s = self.k_s.eval(si, above)
+                cosine = dr.dot(mi.reflect(wi), wo)
+                value += terms.specular(RADIANCE_PER_IRRADIANCE, k_s, cosine, self.n)
+            return dr.select(above, value, 0)
+
+        def pdf(self, ctx, si, wo, active=True):
+            wi, wo = self._facing(si.wi, wo)
+            above = active & (wi.z > 0) & (wo.z > 0)
+            probability = self._specular_probability(ctx, si, above)
+            diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
+            specular = self._lobe_pdf(dr.dot(mi.reflect(wi), wo))
+            return dr.select(above, dr.lerp(diffuse, specular, probability), 0)
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            (wi,) = self._facing(si.wi)
+            active = active & (wi.z > 0)
+            probability = self._specular_probability(ctx, si, active)
+            is_specular = sample1 < probability
+            wo = dr.select(
+                is_specular,
+                self._sample_lobe(mi.reflect(wi), sample2),
+                mi.warp.square_to_cosine_hemisphere(sample2),
+            )
+            if self.twosided:
+                wo = dr.mulsign(wo, si.wi.z)
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = wo
+            bs.eta = 1.0
+            bs.sampled_component = dr.select(is_specular, mi.UInt32(0), mi.UInt32(1))
+            bs.sampled_type = dr.select(
+                is_specular,
+                mi.UInt32(+mi.BSDFFlags.GlossyReflection),
+                mi.UInt32(+mi.BSDFFlags.DiffuseReflection),
+            )
+            value, bs.pdf = self.eval_pdf(ctx, si, wo, active)
+            active &= bs.pdf > 0
+            return bs, dr.select(active, value / bs.pdf, 0)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def eval_diffuse_reflectance(self, si, active=True):
+            return self.k_d.eval(si, active)
+
+        def traverse(self, callback):
+            for name in ("k_i", "k_a", "k_d", "k_s", "n"):
+                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys=()):
+            """Note which coefficients can be other than zero, and make the exponent opaque.
+
+            An opaque exponent can change without a new compilation, as fits and sweeps need.
+            """
+            self.present = {
+                name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
+            }
+            dr.make_opaque(self.n)
+
+        def to_string(self):
+            parts = ", ".join(
+                f"{name} = {getattr(self, name)}" for name in ("k_i", "k_a", "k_d", "k_s", "n")
+            )
+            return f"PhongBSDF[{parts}, twosided = {self.twosided}]"
+
+        def _facing(self, wi, *directions):
+            """Turn directions to the viewer's side where both sides are shaded."""
+            if not self.twosided:
+                return wi, *directions
+            return tuple(dr.mulsign(direction, wi.z) for direction in (wi, *directions))
+
+        def _specular_probability(self, ctx, si, active):
+            """Share of samples for the lobe: its part of the albedo at normal incidence.
+
+            The diffuse part reflects ``k_d``, the lobe ``2 k_s / (n + 2)``.
+            """
+            if not ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1) or "k_d" not in self.present:
+                return mi.Float(1)
+            if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
+                return mi.Float(0)
+            diffuse = dr.mean(self.k_d.eval(si, active))
+            specular = dr.mean(self.k_s.eval(si, active)) * 2 / (self.n + 2)
+            total = diffuse + specular
+            return dr.select(total > 0, specular / total, 0.5)
+
+        def _sample_lobe(self, axis, sample2):
+            """Draw a direction with density ``(n + 1) / (2 pi) cos^n`` about ``axis``."""
+            cosine = dr.power(sample2.y, dr.rcp(self.n + 1))
+            sine = dr.safe_sqrt(1 - dr.square(cosine))
+            sin_phi, cos_phi = dr.sincos(dr.two_pi * sample2.x)
+            local = mi.Vector3f(cos_phi * sine, sin_phi * sine, cosine)
+            return mi.Frame3f(axis).to_world(local)
+
+        def _lobe_pdf(self, cosine):
+            return (self.n + 1) * dr.inv_two_pi * terms.power(cosine, self.n)
+
+    mi.register_bsdf("phong", PhongBSDF)

@@ -1,0 +1,44 @@
+"""Reading the spectra of plugin parameters, alike in all variants."""
+
+from numbers import Real
+
+import drjit as dr
+import mitsuba as mi
+
+
+def coefficient(props, name):
+    """Read a reflection coefficient, 0 where it is not given.
+
+    Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same RGB;
+    above 1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
+    """
+    value = _plain(props, name, 0.0)
+    if value is not None and max(value) > 1:
+        return props.get_unbounded_texture(name)
+    return props.get_texture(name, 0.0)
+
+
+def emitted(props, name, default):
+    """Read an emitted spectrum: like the intensity of Mitsuba's emitters, white where it is a number.
+
+    Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum out of nothing.
+    """
+    value = _plain(props, name, default)
+    if value is not None and max(value) == 0:
+        return props.get_unbounded_texture(name, 0.0)
+    return props.get_emissive_texture(name, default)
+
+
+def _plain(props, name, default):
+    """Return a number's or colour's components, None for textures and tabulated spectra."""
+    value = props[name] if name in props else default
+    if isinstance(value, Real):
+        return (float(value),)
+    if isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
+        return tuple(float(component) for component in value)
+    return None
+
+
+def may_be_nonzero(texture):
+    """Tell whether a texture can be other than zero anywhere."""
+    return texture.is_spatially_varying() or dr.max(texture.max()) > 0

@@ -1,0 +1,99 @@
+"""The shading kernel: the whole illumination model at many points at once (8.10)."""
+
+import drjit as dr
+
+from heuristic import colours, terms, vectors
+
+
+def shade(position, normal, view, material, lights, ambient=0):
+    """Equations 8.10, 6.11, 6.12: the sum of all terms over all lights.
+
+    ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
+    wavelength (8.11, 8.12, 6.13-6.15). Lights at or below the horizon (``N.L <= 0``) give neither
+    diffuse nor specular light. Only terms that can be other than zero are traced: a coefficient of
+    0, or an empty list of lights, leaves no instruction behind.
+
+    Parameters
+    ----------
+    position, normal, view
+        Dr.Jit arrays of three components, of any float type: ``P``, ``N`` and ``V``, in one space.
+        Normals and views of any length are normalised; a zero vector receives no light.
+    material : Material
+        The coefficients.
+    lights : sequence of PointLight, DirectionalLight or SpotLight
+        Numbers in lights and material are compiled into the kernel; opaque Dr.Jit values are not.
+    ambient
+        ``I_a``: a number, RGB, one value for each wavelength, or a Dr.Jit array.
+
+    Returns
+    -------
+    Dr.Jit array
+        The display-linear value: a float where all coefficients are single numbers, otherwise a
+        colour with one component for each wavelength.
+
+    Raises
+    ------
+    InputError
+        For a negative or non-finite ``ambient``, or mixed numbers of wavelengths.
+    """
+    ambient = colours.checked("ambient", ambient)
+    _check_wavelengths(material, lights, ambient)
+    vector_type = type(position)
+    k_i, k_a, k_d, k_s, ambient = (
+        colours.as_array(value, vector_type)
+        for value in (material.k_i, material.k_a, material.k_d, material.k_s, ambient)
+    )
+
+    present = []
+    if not colours.is_zero(material.k_i):
+        present.append(terms.emission(k_i))
+    if not (colours.is_zero(material.k_a) or colours.is_zero(ambient)):
+        present.append(terms.ambient(ambient, k_a))
+    if lights:
+        diffuse, specular = _sum_lights(
+            position, vectors.normalise(normal), vectors.normalise(view), material, lights
+        )
+        present += [
+            coefficient * term
+            for coefficient, term in ((k_d, diffuse), (k_s, specular))
+            if term is not None
+        ]
+    return _total(present, dr.leaf_t(vector_type))
+
+
+def _sum_lights(position, normal, view, material, lights):
+    """Sum the light terms of 8.10 with ``k_d`` and ``k_s`` taken out of the sum.
+
+    Returns the diffuse and the specular sum, each None where its coefficient is zero.
+    """
+    has_diffuse = not colours.is_zero(material.k_d)
+    has_specular = not colours.is_zero(material.k_s)
+    diffuse = specular = None
+    for light in lights if has_diffuse or has_specular else ():
+        toward, intensity = light.illuminate(position)
+        cos_incidence = dr.dot(normal, toward)
+        if has_diffuse:
+            diffuse = _add(diffuse, terms.diffuse(intensity, 1, cos_incidence))
+        if has_specular:
+            mirror = vectors.mirror_vector(normal, toward, cos_incidence)
+            above = dr.select(cos_incidence > 0, dr.dot(mirror, view), 0)
+            specular = _add(specular, terms.specular(intensity, 1, above, material.n))
+    return diffuse, specular
+
+
+def _add(total, term):
+    return term if total is None else total + term
+
+
+def _total(present, float_type):
+    """Add up terms of any kind into one value of at least the kernel's float type."""
+    total = float_type(0)
+    for term in present:
+        total = total + term
+    return total
+
+
+def _check_wavelengths(material, lights, ambient):
+    values = {name: getattr(material, name) for name in ("k_i", "k_a", "k_d", "k_s")}
+    values |= {f"lights[{i}].intensity": light.intensity for i, light in enumerate(lights)}
+    colours.common_wavelength_count(values | {"ambient": ambient})
