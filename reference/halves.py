@@ -1,0 +1,243 @@
+"""The two halves of a pair, derived from one scene.
+
+A scene may be physical (a user's own), heuristic (a textbook figure), or a mixture: the heuristic
+half replaces what is physical, the physical half replaces what is heuristic, and what is already of
+the right kind stays. Geometry, cameras and films are those of the scene in both.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from heuristic.plugins import register
+from reference import bsdfs, emitters, values
+from reference.gbuffer import visible_surface
+from reference.pairing import Convention, Miss, phong_specular_albedo
+from reference.scene import Graph, properties
+
+BSDF, EMITTER, FILM, INTEGRATOR, SENSOR, SHAPE = (
+    getattr(mi.ObjectType, kind)
+    for kind in ("BSDF", "Emitter", "Film", "Integrator", "Sensor", "Shape")
+)
+
+SAMPLER = "multijitter"
+"""The stock sampler of least noise for its time on the scenes measured; see the benchmarks."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two scenes that show the same thing, and how each was derived.
+
+    Attributes
+    ----------
+    name
+        The scene's name.
+    heuristic, physical
+        Graphs of the two halves; :meth:`Graph.instantiate` makes the Mitsuba scenes.
+    hide_emitters
+        Whether camera rays see lights and environment; alike in both halves.
+    max_depth
+        The scene's own limit on path length, -1 for none.
+    convention, bsdfs, emitters, misses, warnings
+        What was replaced by what.
+    """
+
+    name: str
+    heuristic: Graph
+    physical: Graph
+    hide_emitters: bool
+    max_depth: int
+    convention: Convention
+    bsdfs: tuple
+    emitters: tuple
+    misses: tuple[Miss, ...]
+    warnings: tuple[str, ...]
+
+
+def pair(source, convention=Convention.MATCHED, resolution=None):
+    """Derive both halves of a scene, for the current variant.
+
+    Parameters
+    ----------
+    source : reference.scene.Source
+        The scene.
+    convention : Convention
+        How roughplastic and phong are paired.
+    resolution : (width, height), optional
+        In place of the film's own.
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or holds something that cannot be paired.
+    """
+    register()
+    graph = source.parse()
+    _prepare(graph, resolution)
+    settings = _integrator_settings(graph)
+    geometry = cache(graph.copy().instantiate)
+
+    heuristic = graph.copy()
+    given_physical = bsdfs.to_heuristic(heuristic, convention)
+    lights, radiance = emitters.to_heuristic(heuristic, geometry, settings.hide_emitters)
+    ambient = settings.ambient if settings.ambient is not None else radiance
+    _set_integrator(heuristic, ambient, settings.hide_emitters)
+
+    physical = graph.copy()
+    lights += emitters.glowing_to_physical(physical)
+    given_heuristic = bsdfs.to_physical(physical, convention)
+    lights += emitters.to_physical(physical, lambda: visible_surface(geometry()))
+    if settings.ambient is not None:
+        lights.append(_add_environment(physical, graph, settings.ambient, convention))
+
+    records = (*given_physical, *given_heuristic)
+    return Pair(
+        name=source.name,
+        heuristic=heuristic,
+        physical=physical,
+        hide_emitters=settings.hide_emitters,
+        max_depth=settings.max_depth,
+        convention=convention,
+        bsdfs=records,
+        emitters=tuple(lights),
+        misses=tuple(miss for record in records for miss in record.misses),
+        warnings=tuple(_energy_warnings(heuristic)),
+    )
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What the scene's own integrator asks for."""
+
+    ambient: object
+    hide_emitters: bool
+    max_depth: int
+
+
+def _prepare(graph, resolution):
+    """Check the graph, and fill in what both halves need: ids, BSDFs, film and sampler."""
+    bsdfs.give_default(graph)
+    bsdfs.check(graph)
+    emitters.check(graph)
+    for shape in graph.nodes(SHAPE):
+        if not graph.props(shape).id():
+            graph.props(shape).set_id(f"shape-{shape}")
+    sensors = graph.nodes(SENSOR)
+    if not sensors:
+        raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
+    for sensor in sensors:
+        _prepare_film(graph, sensor, resolution)
+        for key, _ in graph.children(sensor, mi.ObjectType.Sampler):
+            graph.detach(sensor, key)
+        sampler = graph.add(mi.ObjectType.Sampler, properties(SAMPLER))
+        graph.attach(sensor, "sampler", sampler)
+
+
+def _prepare_film(graph, sensor, resolution):
+    """Set the film to linear RGB floats, and to the resolution that was asked for."""
+    films = graph.children(sensor, FILM)
+    if not films:
+        films = [("film", graph.add(FILM, properties("hdrfilm")))]
+        graph.attach(sensor, *films[0])
+    ((_, film),) = films
+    if graph.plugin(film) != "hdrfilm":
+        raise InputError(
+            f"{graph.name}: {graph.label(film)}: the film {graph.plugin(film)!r} cannot be compared"
+            " yet. Use hdrfilm."
+        )
+    props = graph.props(film)
+    props["pixel_format"], props["component_format"] = "rgb", "float32"
+    if resolution is not None:
+        props["width"], props["height"] = resolution
+
+
+def _integrator_settings(graph):
+    """Read the scene's integrator, and take it out: each half gets its own."""
+    settings = _Settings(None, False, -1)
+    for index in graph.nodes(INTEGRATOR):
+        props = graph.props(index)
+        hidden = props["hide_emitters"] if "hide_emitters" in props else None
+        if graph.plugin(index) == "heuristic":
+            ambient = props["ambient"] if "ambient" in props else None
+            # The chapters' background is black, though their ambient light fills the room.
+            settings = _Settings(ambient, ambient is not None if hidden is None else hidden, -1)
+        else:
+            depth = props["max_depth"] if "max_depth" in props else -1
+            settings = _Settings(None, bool(hidden), depth)
+        graph.remove(index)
+    return settings
+
+
+def _set_integrator(graph, ambient, hide_emitters):
+    props = properties("heuristic", hide_emitters=hide_emitters)
+    if ambient is not None:
+        props["ambient"] = ambient
+    graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
+
+
+def _add_environment(physical, graph, ambient, convention):
+    """Add the constant environment that stands for ``I_a``.
+
+    A physical surface has one diffuse reflectance, where the model has ``k_a`` beside ``k_d``. The
+    ``matched`` radiance is ``I_a k_a / k_d``, by least squares where materials differ; the
+    ``literal`` one is ``I_a``.
+    """
+    ratio, exact = (1.0,) * 3, True
+    if convention is Convention.MATCHED:
+        ratio, exact = _ambient_ratio(graph)
+    plain = isinstance(ambient, (float, int, *values.COLOURS))
+    if plain and ratio != (1.0,) * 3:
+        components = (float(ambient),) * 3 if isinstance(ambient, (float, int)) else tuple(ambient)
+        ambient = values.scaled(components, ratio)
+    light = physical.add(EMITTER, properties("constant", radiance=ambient))
+    physical.attach(0, "environment", light)
+    note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"
+    mean = sum(ratio) / len(ratio)
+    return emitters.PairedEmitter("ambient", "ambient", "constant", mean, exact, note)
+
+
+def _ambient_ratio(graph):
+    """Return ``k_a / k_d`` for each channel by least squares, and whether it fits all materials."""
+    pairs = []
+    for index in graph.nodes(BSDF):
+        if graph.plugin(index) == "phong":
+            k_a, k_d = (values.colour(graph, index, key, 0.0) for key in ("k_a", "k_d"))
+            # Without a diffuse part the reflectance is k_a itself.
+            pairs.append((k_a, k_d if any(k_d) or any(_specular(graph, index)) else k_a))
+    ratio = []
+    for channel in range(3):
+        weight = sum(k_d[channel] ** 2 for _, k_d in pairs)
+        product = sum(k_a[channel] * k_d[channel] for k_a, k_d in pairs)
+        ratio.append(product / weight if weight > 0 else 1.0)
+    exact = all(
+        abs(k_a[channel] - ratio[channel] * k_d[channel]) <= 1e-6 * max(k_a[channel], 1e-6)
+        for k_a, k_d in pairs
+        for channel in range(3)
+    ) and not any(any(_specular(graph, index)) for index in _phongs(graph))
+    return tuple(ratio), exact
+
+
+def _specular(graph, index):
+    return values.colour(graph, index, "k_s", 0.0)
+
+
+def _phongs(graph):
+    return [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
+
+
+def _energy_warnings(graph):
+    """Name the materials that reflect more light than they receive at normal incidence."""
+    for index in _phongs(graph):
+        try:
+            k_d, k_s = (values.colour(graph, index, key, 0.0) for key in ("k_d", "k_s"))
+        except InputError:
+            continue  # a texture; its values are not known here
+        n = values.number(graph, index, "n", 1.0)
+        reflected = max(d + s for d, s in zip(k_d, phong_specular_albedo(k_s, n), strict=True))
+        if reflected > 1 + 1e-6:
+            yield (
+                f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives at"
+                " normal incidence (k_d + 2 k_s / (n + 2)): no physical material does."
+            )

@@ -1,0 +1,198 @@
+"""Pairing: which heuristic value stands for which physical one. Each factor is stated here once.
+
+Lights and diffuse surfaces pair exactly (:mod:`heuristic.convention`: irradiance ``E = pi I_p``):
+
+=============================================  =====================================================
+Physical (Mitsuba)                             Heuristic
+=============================================  =====================================================
+``diffuse``, reflectance ``rho``               ``k_d = k_a = rho``, ``k_s = 0``
+``point``, intensity ``I``                     ``I_p0 = I / pi``, ``f_att = 1 / d^2``
+``directional``, irradiance ``E``              ``I_p = E / pi``, ``f_att = 1``
+small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
+                                               cone 90 degrees, ``f_att = 1 / d^2``
+closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
+``constant``, radiance ``L``                   ``I_a = L``
+emission of radiance ``L``                     ``k_i = L``
+=============================================  =====================================================
+
+A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
+mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded
+diffuse surface: a constant environment sends it the irradiance ``pi L``, of which it returns
+``rho L``.
+
+``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import exp, log, sqrt
+
+import numpy as np
+from scipy.optimize import minimize_scalar, root_scalar
+
+from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from reference import albedo
+from reference.albedo import Albedo, RoughPlastic
+
+INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
+"""``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
+
+CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
+
+LITERAL_IOR = 1.5
+LARGEST_IOR = 10.0
+"""No dielectric comes near it; a larger specular albedo than it gives is recorded as missed."""
+
+MATCHING_TOLERANCE = 1e-5
+"""Relative; a match that is farther off is recorded as a miss."""
+
+
+class Convention(Enum):
+    """How roughplastic and phong are paired.
+
+    ``LITERAL``
+        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))``, IOR 1.5. The
+        other way the name ``specular_reflectance`` gives ``k_s``.
+    ``MATCHED``
+        By albedo at normal incidence (light along the normal, light leaving in all directions):
+        ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
+        part's is ``2 k_s / (n + 2)``, and ``alpha`` as above. Phong's lobe sends the radiance
+        ``k_s cos^n / pi`` for unit irradiance, hence the albedo ``(k_s / pi) 2 pi int cos^n cos sin
+        d(theta) = 2 k_s / (n + 2)``.
+    """
+
+    LITERAL = "literal"
+    MATCHED = "matched"
+
+
+@dataclass(frozen=True)
+class Phong:
+    """Coefficients and exponent of a phong material; three components a coefficient."""
+
+    k_d: tuple[float, float, float]
+    k_s: tuple[float, float, float]
+    n: float
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A quantity that no parameter of the other model reaches, with how near it came."""
+
+    what: str
+    wanted: float
+    reached: float
+
+
+def alpha_of(n):
+    """Return the roughness ``alpha = sqrt(2 / (n + 2))`` that stands for Phong's exponent."""
+    return sqrt(2 / (n + 2))
+
+
+def exponent_of(alpha):
+    """Return the exponent ``n = 2 / alpha^2 - 2`` that stands for a roughness; 0 from 1 upwards."""
+    return max(2 / alpha**2 - 2, 0.0)
+
+
+def phong_specular_albedo(k_s, n):
+    """Return ``2 k_s / (n + 2)``, the lobe's albedo at normal incidence."""
+    return 2 * np.asarray(k_s) / (n + 2)
+
+
+def to_roughplastic(phong, convention):
+    """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses."""
+    alpha = alpha_of(phong.n)
+    if convention is Convention.LITERAL:
+        rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
+        return RoughPlastic(rho, alpha, LITERAL_IOR), misses
+
+    strength = max(phong.k_s)
+    tint = tuple(k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
+    wanted = Albedo(np.array(phong.k_d), phong_specular_albedo(phong.k_s, phong.n))
+    int_ior = _ior_for(white, max(wanted.specular))
+    passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    if any(wanted.diffuse > passed):
+        int_ior = _nearest_ior(white, wanted, int_ior)
+        passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    rho = np.minimum(wanted.diffuse / passed, 1)  # the diffuse albedo is linear in rho
+    plastic = replace(white, int_ior=int_ior, diffuse_reflectance=tuple(map(float, rho)))
+    return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
+
+
+def to_phong(plastic, convention):
+    """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses."""
+    n = exponent_of(plastic.alpha)
+    if convention is Convention.LITERAL:
+        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n), []
+    reflected = albedo.of_roughplastic(plastic)
+    k_s = reflected.specular * (n + 2) / 2
+    return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
+
+
+def _ior_for(plastic, wanted):
+    """Return the IOR at which the specular albedo is ``wanted``, or the largest one allowed.
+
+    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior + 1))^2``:
+    its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
+    """
+
+    def reached(log_ior):
+        int_ior = exp(min(max(log_ior, 1e-4), log(LARGEST_IOR)))
+        return max(albedo.of_roughplastic(replace(plastic, int_ior=int_ior)).specular)
+
+    if wanted <= 0:
+        return LITERAL_IOR
+    if wanted >= reached(log(LARGEST_IOR)):
+        return LARGEST_IOR
+    root = min(sqrt(wanted), 0.8)
+    guess = log((1 + root) / (1 - root))
+    found = root_scalar(
+        lambda log_ior: log(reached(log_ior) / wanted),
+        x0=guess,
+        x1=1.1 * guess,
+        method="secant",
+        xtol=1e-7,
+    )
+    return exp(found.root)
+
+
+def _nearest_ior(plastic, wanted, highest):
+    """Return the IOR whose albedos come nearest to the wanted ones, both parts taken together.
+
+    A high index reflects more, and lets less through to the diffuse base and out again: no index
+    gives both parts. Nearest is the least sum of squares over the parts and channels.
+    """
+
+    def distance(log_ior):
+        reached = albedo.of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
+        diffuse = np.minimum(wanted.diffuse, reached.diffuse)
+        return np.sum((diffuse - wanted.diffuse) ** 2 + (reached.specular - wanted.specular) ** 2)
+
+    return exp(
+        minimize_scalar(
+            distance, bounds=(1e-4, log(highest)), method="bounded", options={"xatol": 1e-3}
+        ).x
+    )
+
+
+def _misses(wanted, reached):
+    """List the albedos that were not reached, each value once."""
+    misses = {}
+    for part in ("diffuse", "specular"):
+        for want, value in zip(getattr(wanted, part), getattr(reached, part), strict=True):
+            if abs(value - want) > MATCHING_TOLERANCE * max(want, 1e-3):
+                misses[part, want] = Miss(
+                    f"{part} albedo at normal incidence", float(want), float(value)
+                )
+    return list(misses.values())
+
+
+def _at_most_one(what, colour):
+    """Return a colour limited to 1, and what the limit took away."""
+    limited = tuple(min(component, 1.0) for component in colour)
+    misses = [
+        Miss(what, wanted, reached)
+        for wanted, reached in dict(zip(colour, limited, strict=True)).items()
+        if wanted > reached
+    ]
+    return limited, misses

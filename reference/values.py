@@ -1,0 +1,77 @@
+"""Reading and scaling the values of a scene's parameters, as the parser keeps them."""
+
+from numbers import Real
+
+import mitsuba as mi
+import numpy as np
+
+from heuristic.errors import InputError
+
+COLOURS = (mi.ScalarColor3f, mi.ScalarColor3d)
+
+
+def colour(graph, index, key, default):
+    """Return a parameter as three components.
+
+    Raises
+    ------
+    InputError
+        When it is a texture or a tabulated spectrum, or negative or not finite.
+    """
+    props = graph.props(index)
+    value = props[key] if key in props else default
+    if isinstance(value, Real):
+        components = (float(value),) * 3
+    elif isinstance(value, COLOURS):
+        components = tuple(float(component) for component in value)
+    elif hasattr(value, "is_uniform") and value.is_uniform():
+        components = (float(value.values[0]),) * 3
+    else:
+        raise InputError(
+            f"{graph.name}: {graph.label(index)}: {key} is a texture or a tabulated spectrum, which"
+            f" {props.plugin_name()} cannot be paired with yet. Give a number or RGB."
+        )
+    if not all(np.isfinite(components)) or min(components) < 0:
+        raise InputError(
+            f"{graph.name}: {graph.label(index)}: {key} = {_shown(components)} is not allowed: give"
+            " finite values of 0 or more."
+        )
+    return components
+
+
+def number(graph, index, key, default):
+    """Return a parameter as a finite number.
+
+    Raises
+    ------
+    InputError
+        When it is not one.
+    """
+    props = graph.props(index)
+    value = props[key] if key in props else default
+    if not isinstance(value, Real) or not np.isfinite(value):
+        raise InputError(
+            f"{graph.name}: {graph.label(index)}: {key} = {value!r} is not allowed: give a finite"
+            " number."
+        )
+    return float(value)
+
+
+def index_of_refraction(graph, index, key, default):
+    """Return an index of refraction, given as a number or as the name of a material."""
+    props = graph.props(index)
+    value = props[key] if key in props else default
+    if isinstance(value, str):
+        return float(mi.lookup_ior(value))
+    return number(graph, index, key, default)
+
+
+def scaled(components, factor):
+    """Return a colour times a factor, itself a number or one value for each channel."""
+    return tuple(float(value) for value in np.multiply(components, factor))
+
+
+def _shown(components):
+    if len(set(components)) == 1:
+        return f"{components[0]:g}"
+    return "(" + ", ".join(f"{component:g}" for component in components) + ")"
