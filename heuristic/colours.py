@@ -30,7 +30,8 @@ def checked(name, value):
         components = tuple(float(component) for component in np.ravel(value))
     else:
         raise InputError(
-            f"{name} = {value!r} is no colour: give a number, RGB, or one value for each wavelength."
+            f"{name} = {value!r} is no colour: give a number, RGB, or one value for each"
+            " wavelength."
         )
     for component in components:
         if not (np.isfinite(component) and component >= 0):

@@ -6,11 +6,12 @@ A light's own ``direction`` is the direction in which its light travels.
 
 *Intensity.* Heuristic intensities are display-linear. A white diffuse surface (``k_d = 1``) that
 faces a light of intensity ``I_p = 1`` has the value 1. A physical surface of reflectance 1 under
-irradiance ``E`` has the radiance ``E / pi``. The two agree when ``E = pi * I_p``, and this factor is
-the only bridge between the two sets of units.
+irradiance ``E`` has the radiance ``E / pi``. The two agree when ``E = pi * I_p``, and this factor
+is the only bridge between the two sets of units.
 
 *Facing.* A surface is shaded on the side that its normal points to; a material that is marked
-``twosided`` turns the normal towards the viewer. Mitsuba's ``diffuse`` and ``twosided`` do the same.
+``twosided`` turns the normal towards the viewer. Mitsuba's ``diffuse`` and ``twosided`` do the
+same.
 """
 
 from math import pi

@@ -102,7 +102,8 @@ class SpotLight:
     direction
         ``v_L``, the axis, in the direction of travel; any length but zero.
     cutoff
-        ``omega_L``, the angle between the axis and the edge of the cone, in degrees, within (0, 180).
+        ``omega_L``, the angle between the axis and the edge of the cone, in degrees, within (0,
+        180).
     exponent
         ``m`` of 6.4, 0 or more; 0 is an even cone.
 
@@ -204,6 +205,7 @@ def _attenuation(value):
         return coefficients
     if not all(isfinite(c) and c >= 0 for c in coefficients) or not any(coefficients):
         raise InputError(
-            f"attenuation = {value!r} is not allowed: k0, k1, k2 are finite, 0 or more, and not all 0."
+            f"attenuation = {value!r} is not allowed: k0, k1, k2 are finite, 0 or more, and not all"
+            " 0."
         )
     return coefficients

@@ -1,10 +1,10 @@
 """The illumination model, term by term: one function an equation.
 
 Equation numbers 8.x are of the chapter *Illumination* (sections 8.2.1-8.2.5), 6.x of the chapter
-*Lighting models*. Intensities and coefficients are display-linear (see :mod:`heuristic.convention`);
-they are numbers, Dr.Jit floats, or colours with one component for each wavelength (8.11, 8.12).
-Cosines are scalar products of unit vectors. The same functions serve the kernel
-(:mod:`heuristic.shading`) and the Mitsuba BSDF and emitters (:mod:`heuristic.plugins`).
+*Lighting models*. Intensities and coefficients are display-linear (see
+:mod:`heuristic.convention`); they are numbers, Dr.Jit floats, or colours with one component for
+each wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The same functions serve
+the kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
 """
 
 import drjit as dr

@@ -18,8 +18,8 @@ def normalise(vector):
 def light_vector(light_position, position):
     """Equation 6.26: ``L = (P_L - P) / |P_L - P|``, with the distance ``d = |P_L - P|``.
 
-    Returns ``(L, d)``. On the light itself (``d = 0``) the direction is undefined and ``L`` is zero,
-    so that such a point receives no light.
+    Returns ``(L, d)``. On the light itself (``d = 0``) the direction is undefined and ``L`` is
+    zero, so that such a point receives no light.
     """
     offset = light_position - position
     squared_distance = dr.squared_norm(offset)
@@ -35,7 +35,7 @@ def view_vector(viewer_position, position):
 def mirror_vector(normal, direction, cosine):
     """Equations 6.28-6.31: ``R = 2 (L.N) N - L``, the mirror image of ``L`` about ``N``.
 
-    It follows from three demands on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and ``N``
-    (6.30) and unit length. ``cosine`` is ``N.L``, which callers have at hand.
+    It follows from three demands on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and
+    ``N`` (6.30) and unit length. ``cosine`` is ``N.L``, which callers have at hand.
     """
     return dr.fma(2 * cosine, normal, -direction)

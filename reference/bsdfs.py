@@ -112,14 +112,12 @@ def _phong_properties(graph, index, convention):
         return None
     if plugin == "diffuse":
         given = graph.props(index)
-        reflectance = given["reflectance"] if "reflectance" in given else 0.5
+        reflectance = given.get("reflectance", 0.5)
         props = properties("phong", k_a=reflectance, k_d=reflectance)
         return props, PairedBSDF(graph.label(index), "diffuse", "phong", {"k_d": "reflectance"})
     phong, misses = _phong_of(_roughplastic(graph, index), convention)
     props = properties("phong", k_a=phong.k_d, k_d=phong.k_d, k_s=phong.k_s, n=phong.n)
-    record = PairedBSDF(
-        graph.label(index), "roughplastic", "phong", asdict(phong), tuple(misses)
-    )
+    record = PairedBSDF(graph.label(index), "roughplastic", "phong", asdict(phong), tuple(misses))
     return props, record
 
 
@@ -129,8 +127,9 @@ def _physical_properties(graph, index, convention):
     given = graph.props(index)
     k_s = values.colour(graph, index, "k_s", 0.0)
     if not any(k_s):
-        source = "k_d" if "k_d" in given and _lit(graph, index) else "k_a"
-        reflectance = given[source] if source in given else 0.0
+        is_lit = "k_d" in given and values.may_be_nonzero(given["k_d"])
+        source = "k_d" if is_lit else "k_a"
+        reflectance = given.get(source, 0.0)
         props = properties("diffuse", reflectance=reflectance)
         record = PairedBSDF(graph.label(index), "phong", "diffuse", {"reflectance": source})
     else:
@@ -141,16 +140,9 @@ def _physical_properties(graph, index, convention):
         record = PairedBSDF(
             graph.label(index), "phong", "roughplastic", asdict(plastic), tuple(misses)
         )
-    if "twosided" in given and given["twosided"]:
+    if given.get("twosided"):
         props["twosided"] = True
     return props, record
-
-
-def _lit(graph, index):
-    """Tell whether a phong has a diffuse part; textures count as one."""
-    value = graph.props(index)["k_d"]
-    is_plain = isinstance(value, (float, int, *values.COLOURS))
-    return not is_plain or any(values.colour(graph, index, "k_d", 0.0))
 
 
 def _roughplastic(graph, index):
@@ -162,8 +154,8 @@ def _roughplastic(graph, index):
         int_ior=values.index_of_refraction(graph, index, "int_ior", "polypropylene"),
         ext_ior=values.index_of_refraction(graph, index, "ext_ior", "air"),
         specular_reflectance=values.colour(graph, index, "specular_reflectance", 1.0),
-        distribution=props["distribution"] if "distribution" in props else "beckmann",
-        nonlinear=props["nonlinear"] if "nonlinear" in props else False,
+        distribution=props.get("distribution", "beckmann"),
+        nonlinear=props.get("nonlinear", False),
     )
 
 

@@ -70,7 +70,7 @@ def to_heuristic(graph, geometry, hide_emitters):
         elif plugin == "directional":
             record = _directional_to_heuristic(graph, index)
         elif plugin == "constant":
-            ambient = props["radiance"] if "radiance" in props else 1.0
+            ambient = props.get("radiance", 1.0)
             props["sampling_weight"] = 0.0  # seen by the camera, but not a light
             record = PairedEmitter(graph.label(index), plugin, "ambient", 1.0, True)
         else:
@@ -89,7 +89,7 @@ def glowing_to_physical(graph):
     for shape in graph.nodes(SHAPE):
         for _, bsdf in graph.children(shape, BSDF):
             radiance = _given(graph, bsdf, "k_i", 0.0)
-            if graph.plugin(bsdf) == "phong" and radiance != 0.0:
+            if graph.plugin(bsdf) == "phong" and values.may_be_nonzero(radiance):
                 light = graph.add(EMITTER, properties("area", radiance=radiance))
                 graph.attach(shape, "emitter", light)
                 records.append(PairedEmitter(graph.label(shape), "k_i", "area", 1.0, True))
@@ -99,7 +99,7 @@ def glowing_to_physical(graph):
 def to_physical(graph, surface):
     """Replace heuristic lights by physical ones; returns a :class:`PairedEmitter` each.
 
-    ``surface()`` returns the :class:`reference.gbuffer.VisibleSurface` that the mean irradiance is
+    ``surface()`` returns the :class:`reference.gbuffer.GBuffer` that the mean irradiance is
     taken over where the attenuation is not the inverse square.
     """
     convert = {
@@ -115,7 +115,7 @@ def to_physical(graph, surface):
 
 def _point_to_heuristic(graph, index):
     props = graph.props(index)
-    intensity = props["intensity"] if "intensity" in props else 1.0
+    intensity = props.get("intensity", 1.0)
     k0, k1, k2 = map(float, INVERSE_SQUARE)
     derived = properties(
         "heuristic_point",
@@ -134,7 +134,7 @@ def _point_to_heuristic(graph, index):
 
 def _directional_to_heuristic(graph, index):
     props = graph.props(index)
-    irradiance = props["irradiance"] if "irradiance" in props else 1.0
+    irradiance = props.get("irradiance", 1.0)
     if "to_world" in props:
         direction = np.array(props["to_world"].matrix)[:3, 2]
     else:
@@ -268,4 +268,4 @@ def _position(graph, index):
 
 def _given(graph, index, key, default):
     props = graph.props(index)
-    return props[key] if key in props else default
+    return props.get(key, default)

@@ -1,4 +1,4 @@
-"""What the camera sees of a scene's geometry, for pairing quantities that depend on it."""
+"""What the camera sees of a scene's geometry."""
 
 from dataclasses import dataclass
 
@@ -7,32 +7,44 @@ import mitsuba as mi
 import numpy as np
 
 GRID = 192
-"""Camera rays along each side: some 37,000 points, enough for means to three digits."""
+"""Rays along each side for means over what is seen: some 37,000, enough for three digits."""
 
 
 @dataclass(frozen=True)
-class VisibleSurface:
-    """Points that the camera sees: positions and unit normals, (M, 3) each, in world space."""
+class GBuffer:
+    """The first surface on a regular grid of camera rays, in world space.
+
+    Attributes
+    ----------
+    position, normal
+        (H, W, 3); the unit shading normal of the side that is seen. Zero where nothing is hit.
+    hit
+        (H, W), whether the ray meets a surface.
+    """
 
     position: np.ndarray
     normal: np.ndarray
+    hit: np.ndarray
 
     def mean_irradiance(self, light_position, falloff):
-        """Return the mean of ``(N.L)+ falloff(d)`` over the points, for a unit light."""
-        offset = np.asarray(light_position) - self.position
+        """Return the mean of ``(N.L)+ falloff(d)`` over the surface, for a unit light."""
+        offset = np.asarray(light_position) - self.position[self.hit]
         distance = np.linalg.norm(offset, axis=1)
         distance = np.where(distance > 0, distance, np.inf)
-        cosine = np.sum(self.normal * offset, axis=1) / distance
+        cosine = np.sum(self.normal[self.hit] * offset, axis=1) / distance
         return float(np.mean(np.maximum(cosine, 0) * falloff(distance))) if len(distance) else 0.0
 
 
-def visible_surface(scene, sensor=0):
-    """Intersect one camera ray for each cell of a grid, through the cells' centres."""
-    centres = (np.arange(GRID) + 0.5) / GRID
-    x, y = (axis.ravel() for axis in np.meshgrid(centres, centres))
-    position = mi.Point2f(mi.Float(x), mi.Float(y))
+def gbuffer(scene, width=GRID, height=GRID, sensor=0):
+    """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    position = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
     ray, _ = scene.sensors()[sensor].sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
-    hit = np.array(si.is_valid())
-    normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)  # of the side that is seen
-    return VisibleSurface(np.array(si.p).T[hit], np.array(normal).T[hit])
+    hit = si.is_valid()
+    normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
+    points, normals = (
+        np.array(dr.select(hit, vector, 0)).T.reshape(height, width, 3)
+        for vector in (mi.Vector3f(si.p), normal)
+    )
+    return GBuffer(points, normals, np.array(hit).reshape(height, width))

@@ -13,7 +13,7 @@ import mitsuba as mi
 from heuristic.errors import InputError
 from heuristic.plugins import register
 from reference import bsdfs, emitters, values
-from reference.gbuffer import visible_surface
+from reference.gbuffer import gbuffer
 from reference.pairing import Convention, Miss, phong_specular_albedo
 from reference.scene import Graph, properties
 
@@ -88,7 +88,7 @@ def pair(source, convention=Convention.MATCHED, resolution=None):
     physical = graph.copy()
     lights += emitters.glowing_to_physical(physical)
     given_heuristic = bsdfs.to_physical(physical, convention)
-    lights += emitters.to_physical(physical, lambda: visible_surface(geometry()))
+    lights += emitters.to_physical(physical, lambda: gbuffer(geometry()))
     if settings.ambient is not None:
         lights.append(_add_environment(physical, graph, settings.ambient, convention))
 
@@ -158,13 +158,13 @@ def _integrator_settings(graph):
     settings = _Settings(None, False, -1)
     for index in graph.nodes(INTEGRATOR):
         props = graph.props(index)
-        hidden = props["hide_emitters"] if "hide_emitters" in props else None
+        hidden = props.get("hide_emitters", None)
         if graph.plugin(index) == "heuristic":
-            ambient = props["ambient"] if "ambient" in props else None
+            ambient = props.get("ambient", None)
             # The chapters' background is black, though their ambient light fills the room.
             settings = _Settings(ambient, ambient is not None if hidden is None else hidden, -1)
         else:
-            depth = props["max_depth"] if "max_depth" in props else -1
+            depth = props.get("max_depth", -1)
             settings = _Settings(None, bool(hidden), depth)
         graph.remove(index)
     return settings
@@ -238,6 +238,6 @@ def _energy_warnings(graph):
         reflected = max(d + s for d, s in zip(k_d, phong_specular_albedo(k_s, n), strict=True))
         if reflected > 1 + 1e-6:
             yield (
-                f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives at"
-                " normal incidence (k_d + 2 k_s / (n + 2)): no physical material does."
+                f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives"
+                " at normal incidence (k_d + 2 k_s / (n + 2)): no physical material does."
             )

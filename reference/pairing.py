@@ -132,8 +132,8 @@ def to_phong(plastic, convention):
 def _ior_for(plastic, wanted):
     """Return the IOR at which the specular albedo is ``wanted``, or the largest one allowed.
 
-    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior + 1))^2``:
-    its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
+    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
+    1))^2``: its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
     """
 
     def reached(log_ior):

@@ -85,7 +85,9 @@ class Source:
         except RuntimeError as error:
             raise InputError(f"{self.name}: {error}") from error
         if state.root.type != mi.ObjectType.Scene:
-            raise InputError(f"{self.name}: this is no scene. Its outermost element must be a scene.")
+            raise InputError(
+                f"{self.name}: this is no scene. Its outermost element must be a scene."
+            )
         return Graph(self.name, config, state)
 
 
@@ -179,7 +181,7 @@ class Graph:
         """Give a node other properties; its id stays."""
         props.set_id(self.props(index).id())
         node = Parser.SceneNode(self.state.nodes[index])
-        node.props = props
+        node.type, node.props = self.kind(index), props
         self.state.nodes[index] = node
 
     def _reachable(self):

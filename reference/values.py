@@ -19,7 +19,7 @@ def colour(graph, index, key, default):
         When it is a texture or a tabulated spectrum, or negative or not finite.
     """
     props = graph.props(index)
-    value = props[key] if key in props else default
+    value = props.get(key, default)
     if isinstance(value, Real):
         components = (float(value),) * 3
     elif isinstance(value, COLOURS):
@@ -48,7 +48,7 @@ def number(graph, index, key, default):
         When it is not one.
     """
     props = graph.props(index)
-    value = props[key] if key in props else default
+    value = props.get(key, default)
     if not isinstance(value, Real) or not np.isfinite(value):
         raise InputError(
             f"{graph.name}: {graph.label(index)}: {key} = {value!r} is not allowed: give a finite"
@@ -59,11 +59,16 @@ def number(graph, index, key, default):
 
 def index_of_refraction(graph, index, key, default):
     """Return an index of refraction, given as a number or as the name of a material."""
-    props = graph.props(index)
-    value = props[key] if key in props else default
-    if isinstance(value, str):
-        return float(mi.lookup_ior(value))
-    return number(graph, index, key, default)
+    return float(mi.lookup_ior(graph.props(index), key, default))
+
+
+def may_be_nonzero(value):
+    """Tell whether a parameter can be other than zero; textures and spectra can."""
+    if isinstance(value, Real):
+        return value != 0
+    if isinstance(value, COLOURS):
+        return any(component != 0 for component in value)
+    return True
 
 
 def scaled(components, factor):

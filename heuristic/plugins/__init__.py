@@ -15,6 +15,7 @@ Plugin                      Kind        What it is
 
 import mitsuba as mi
 
+from heuristic import backend
 from heuristic.errors import InputError
 from heuristic.plugins import glow, integrator, lights, phong
 
@@ -27,17 +28,20 @@ def register():
     Raises
     ------
     InputError
-        When no variant is set, or the current one is not supported: polarised, or not on LLVM or
-        scalar arrays.
+        When no variant is set, or the current one is polarised.
+    InstallationError
+        When Dr.Jit found no LLVM that it can work with.
     """
     variant = mi.variant()
     if variant is None or "polarized" in variant:
         raise InputError(
-            f"The plugins cannot be registered for the variant {variant!r}: call mitsuba.set_variant"
-            " with llvm_ad_rgb or llvm_ad_spectral first."
+            f"The plugins cannot be registered for the variant {variant!r}: call"
+            " mitsuba.set_variant with llvm_ad_rgb or llvm_ad_spectral first."
         )
     if variant in _registered:
         return
+    if variant.startswith("llvm"):
+        backend.check()
     for module in (phong, glow, lights, integrator):
         module.define()
     _registered.add(variant)

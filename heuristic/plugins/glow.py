@@ -10,8 +10,8 @@ Parameter       Type (default)       Meaning
 ==============  ===================  ===============================================================
 
 Neither term is a matter of reflection, so no BSDF can hold them. Attached to a shape, this emitter
-shows ``k_i + I_a k_a`` where a camera ray meets the shape, and lights nothing: in the model, emission
-and ambient light do not travel.
+shows ``k_i + I_a k_a`` where a camera ray meets the shape, and lights nothing: in the model,
+emission and ambient light do not travel.
 """
 
 import drjit as dr

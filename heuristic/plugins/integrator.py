@@ -9,9 +9,9 @@ Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 
 It works on scenes whose BSDFs are ``phong`` and whose lights are ``heuristic_*`` plugins; an
-environment emitter is background only. Films, samplers, cameras, filters and AOVs are Mitsuba's. The
-first thing drawn from the sampler is the camera ray, as in ``direct`` and ``path``, so that equal
-seeds give equal rays. Python::
+environment emitter is background only. Films, samplers, cameras, filters and AOVs are Mitsuba's.
+The first thing drawn from the sampler is the camera ray, as in ``direct`` and ``path``, so that
+equal seeds give equal rays. Python::
 
     {'type': 'heuristic', 'ambient': 1.0}
 """
@@ -77,8 +77,9 @@ class SceneMaterials:
             bsdf = shape.bsdf()
             if not hasattr(bsdf, "material"):
                 raise InputError(
-                    f"shape {shape.id()!r}: its BSDF {bsdf.class_name()} is no phong. The integrator"
-                    " heuristic renders the heuristic half of a pair; reference.pair makes one."
+                    f"shape {shape.id()!r}: its BSDF {bsdf.class_name()} is no phong. The"
+                    " integrator heuristic renders the heuristic half of a pair, which"
+                    " reference.pair makes."
                 )
             places[_registry_index(shape)] = numbers.setdefault(bsdf, len(numbers))
         self.bsdfs = list(numbers)
@@ -122,6 +123,7 @@ def _lights(scene):
         elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
             raise InputError(
                 f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form. The"
-                " integrator heuristic renders the heuristic half of a pair; reference.pair makes one."
+                " integrator heuristic renders the heuristic half of a pair, which reference.pair"
+                " makes."
             )
     return lights

@@ -56,7 +56,7 @@ def define():
             self.parameters_changed()
 
         def material(self, si, active=True):
-            """Return the coefficients at a surface interaction, with absent terms as plain zeros."""
+            """Return the coefficients at a surface interaction; absent terms are plain zeros."""
             coefficients = {
                 name: getattr(self, name).eval(si, active) for name in self.present if name != "n"
             }

@@ -9,8 +9,8 @@ import mitsuba as mi
 def coefficient(props, name):
     """Read a reflection coefficient, 0 where it is not given.
 
-    Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same RGB;
-    above 1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
+    Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same
+    RGB; above 1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
     """
     value = _plain(props, name, 0.0)
     if value is not None and max(value) > 1:
@@ -19,7 +19,7 @@ def coefficient(props, name):
 
 
 def emitted(props, name, default):
-    """Read an emitted spectrum: like the intensity of Mitsuba's emitters, white where it is a number.
+    """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
 
     Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum out of nothing.
     """
@@ -31,7 +31,7 @@ def emitted(props, name, default):
 
 def _plain(props, name, default):
     """Return a number's or colour's components, None for textures and tabulated spectra."""
-    value = props[name] if name in props else default
+    value = props.get(name, default)
     if isinstance(value, Real):
         return (float(value),)
     if isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):

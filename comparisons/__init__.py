@@ -1,0 +1,1 @@
+"""Paired scenes, metrics, and what follows from them: plain records, nothing printed."""

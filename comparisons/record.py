@@ -1,0 +1,101 @@
+"""The record of a comparison: images, and the plain data that ``comparison.json`` holds."""
+
+import platform
+from dataclasses import asdict, dataclass
+from importlib import metadata
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic import __version__
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+
+
+@dataclass(frozen=True)
+class Images:
+    """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
+
+    ``maps`` holds the perceptual metrics by name and ``log2_luminance``.
+    """
+
+    heuristic: np.ndarray
+    reference: np.ndarray
+    reference_stderr: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    maps: dict[str, np.ndarray]
+    significant: np.ndarray
+    counted: np.ndarray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison returns: the data of ``comparison.json``, and the images."""
+
+    data: dict
+    images: Images
+
+
+def versions():
+    """Return the versions that a result depends on."""
+    found = {"fotismos": __version__, "python": platform.python_version()}
+    found |= {library: metadata.version(library) for library in LIBRARIES}
+    found["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
+    return found
+
+
+def pairing_data(pair):
+    """Return how a pair was derived, as plain data."""
+    return {
+        "convention": pair.convention.value,
+        "bsdfs": [
+            {
+                "name": record.name,
+                "given": record.given,
+                "derived": record.derived,
+                "parameters": _plain(record.parameters),
+            }
+            for record in pair.bsdfs
+        ],
+        "emitters": [asdict(record) for record in pair.emitters],
+        "misses": [asdict(miss) for miss in pair.misses],
+    }
+
+
+def plan_data(plan, spp, passes, sampler):
+    """Return a plan as plain data."""
+    return {
+        "effects": [asdict(effect) for effect in plan.effects],
+        "integrator": plan.integrator,
+        "max_depth": plan.max_depth,
+        "spp": spp,
+        "passes": passes,
+        "sampler": sampler,
+    }
+
+
+def times_data(times):
+    """Return the times of one half, in seconds."""
+    return {
+        "median_s": times.median,
+        "passes": times.passes,
+        "first_s": times.first,
+        "total_s": times.total,
+        "compile_s": times.compilation,
+    }
+
+
+def variant():
+    """Return the name of the current Mitsuba variant."""
+    return mi.variant()
+
+
+def _plain(value):
+    """Turn tuples of equal components into one number, for reading."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return value[0] if len(set(value)) == 1 else list(value)
+    return value

@@ -1,0 +1,262 @@
+"""Statistics over an image: summaries, the best exposure and the noise floor.
+
+"How far" has two readings, and both are reported: the distance as it is, and the distance after
+the one exposure factor on the test image that makes it smallest. The second is the *shape* of
+the departure; what lies between the two is *level*.
+
+A colour difference is never negative, so a noisy reference differs from the truth by ΔE > 0 even
+where the test image is exact; `noise_floor` says by how much. Which pixels differ by more than
+noise is told by `comparisons.significance`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from comparisons.metrics import (
+    DEFAULT_VIEWING,
+    Array,
+    Metric,
+    Viewing,
+    checked_pair,
+    log2_luminance_ratio,
+    rmse,
+)
+
+#: The best exposure is sought within this many stops on either side of none.
+EXPOSURE_STOPS = 6.0
+
+#: Pixels on which the best exposure is sought, and those that bracket it first.
+_SEARCH_PIXELS, _BRACKET_PIXELS = 16_384, 2_048
+
+
+@dataclass(frozen=True)
+class ExposedSummary:
+    """A metric over an image after the factor `exposure` on the test image."""
+
+    exposure: float
+    mean: float
+    p50: float
+    p95: float
+    max: float
+
+
+@dataclass(frozen=True)
+class MetricSummary:
+    """A metric over the counted pixels, in the metric's own unit.
+
+    `noise_floor` is the mean that the reference's own noise alone would give.
+    """
+
+    mean: float
+    p50: float
+    p95: float
+    max: float
+    noise_floor: float
+    after_exposure: ExposedSummary
+
+
+@dataclass(frozen=True)
+class ExposedRmse:
+    """The linear RMSE after the factor `exposure` on the test image."""
+
+    exposure: float
+    value: float
+
+
+@dataclass(frozen=True)
+class RmseSummary:
+    """The linear RMSE over the counted pixels; 1 is display white."""
+
+    value: float
+    noise_floor: float
+    after_exposure: ExposedRmse
+
+
+@dataclass(frozen=True)
+class RatioSummary:
+    """The signed luminance ratio over the counted pixels, in stops."""
+
+    mean: float
+    p05: float
+    p50: float
+    p95: float
+
+
+def summarise(
+    metric: Metric,
+    test: ArrayLike,
+    reference: ArrayLike,
+    mask: ArrayLike,
+    viewing: Viewing = DEFAULT_VIEWING,
+    noise: ArrayLike | float = 0.0,
+) -> tuple[MetricSummary, Array]:
+    """The numbers of `metric` over `mask`, and its map over the whole image.
+
+    test, reference
+        Linear images (H, W, 3).
+    mask
+        Boolean (H, W): the pixels that count. With none, every number is 0 and the factor 1.
+    noise
+        A noise image (H, W, 3) as for `noise_floor`, or the floor itself, a number ≥ 0.
+
+    The best exposure is used only if it lowers the mean over all counted pixels, so
+    ``after_exposure.mean <= mean`` always. Raises as `comparisons.metrics.delta_e_2000`.
+    """
+    test, reference = checked_pair(test, reference)
+    mask = np.asarray(mask, bool)
+    reference_coordinates = metric.coordinates(reference, viewing)
+    distance = metric.difference(reference_coordinates, metric.coordinates(test, viewing))
+    # From here on only counted pixels: (N, 3).
+    test, reference, counted = test[mask], reference[mask], reference_coordinates[mask]
+    numbers = _numbers(distance[mask])
+
+    factor = _best_exposure(metric, test, reference, counted, viewing)
+    after = numbers
+    if factor != 1.0:
+        after = _numbers(metric.difference(counted, metric.coordinates(factor * test, viewing)))
+        if after["mean"] > numbers["mean"]:
+            factor, after = 1.0, numbers
+
+    if np.ndim(noise):
+        floor = _noise_floor(metric, reference, counted, np.asarray(noise)[mask], viewing)
+    else:
+        floor = float(noise)
+    exposed = ExposedSummary(exposure=factor, **after)
+    return MetricSummary(**numbers, noise_floor=floor, after_exposure=exposed), distance
+
+
+def summarise_rmse(
+    test: ArrayLike, reference: ArrayLike, mask: ArrayLike, noise: ArrayLike | None = None
+) -> RmseSummary:
+    """The linear RMSE over `mask`, its noise floor √(mean noise²), and after best exposure."""
+    test, reference = checked_pair(test, reference)
+    mask = np.asarray(mask, bool)
+    test, reference = test[mask], reference[mask]
+    value = rmse(test, reference)
+    factor = _least_squares_factor(test, reference)
+    after = rmse(factor * test, reference)
+    if after > value:
+        factor, after = 1.0, value
+    floor = 0.0
+    if noise is not None:
+        floor = rmse(np.asarray(noise)[mask], np.zeros_like(reference))
+    return RmseSummary(value, floor, ExposedRmse(factor, after))
+
+
+def summarise_log2_luminance(
+    test: ArrayLike, reference: ArrayLike, mask: ArrayLike
+) -> tuple[RatioSummary, Array]:
+    """Mean and percentiles of `log2_luminance_ratio` over `mask`, and the map (H, W) in stops."""
+    ratio = log2_luminance_ratio(test, reference)
+    values = ratio[np.asarray(mask, bool)]
+    if not values.size:
+        return RatioSummary(0.0, 0.0, 0.0, 0.0), ratio
+    p05, p50, p95 = np.percentile(values, (5, 50, 95))
+    return RatioSummary(float(values.mean()), float(p05), float(p50), float(p95)), ratio
+
+
+def best_exposure(
+    metric: Metric,
+    test: ArrayLike,
+    reference: ArrayLike,
+    mask: ArrayLike,
+    viewing: Viewing = DEFAULT_VIEWING,
+) -> float:
+    """The factor on `test`, within ±6 stops, that makes the mean of `metric` over `mask` smallest.
+
+    The mean is taken over at most 16,384 counted pixels, drawn with a fixed seed. Whole stops
+    bracket the minimum, a bounded scalar search (Brent) finds it to 0.001 stop, and the factors
+    1 and least squares compete with it, so an image that is a multiple of the reference gives
+    that multiple exactly. 1 if no pixel counts or if either image has no positive value there.
+    Raises as `comparisons.metrics.delta_e_2000`.
+    """
+    test, reference = checked_pair(test, reference)
+    mask = np.asarray(mask, bool)
+    test, reference = test[mask], reference[mask]
+    return _best_exposure(metric, test, reference, metric.coordinates(reference, viewing), viewing)
+
+
+def best_exposure_rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike) -> float:
+    """The factor on `test` that makes the linear RMSE over `mask` smallest.
+
+    Least squares in closed form, ``Σ test·reference / Σ test²``; 1 where that is not positive.
+    Raises as `comparisons.metrics.delta_e_2000`.
+    """
+    test, reference = checked_pair(test, reference)
+    mask = np.asarray(mask, bool)
+    return _least_squares_factor(test[mask], reference[mask])
+
+
+def noise_floor(
+    metric: Metric,
+    reference: ArrayLike,
+    noise: ArrayLike,
+    mask: ArrayLike,
+    viewing: Viewing = DEFAULT_VIEWING,
+) -> float:
+    """The mean of `metric` over `mask` between the reference and itself with noise added.
+
+    ``mean difference(reference + noise, reference)``. `noise` (H, W, 3) is an image with the
+    distribution of the reference's standard error, such as the mean of its independent passes
+    taken with alternating signs. A result near this value cannot be told from none.
+    """
+    reference, noise = checked_pair(reference, noise)
+    mask = np.asarray(mask, bool)
+    reference, noise = reference[mask], noise[mask]
+    return _noise_floor(metric, reference, metric.coordinates(reference, viewing), noise, viewing)
+
+
+def _numbers(values: Array) -> dict[str, float]:
+    if not values.size:
+        return {"mean": 0.0, "p50": 0.0, "p95": 0.0, "max": 0.0}
+    p50, p95 = np.percentile(values, (50, 95))
+    return {
+        "mean": float(values.mean()),
+        "p50": float(p50),
+        "p95": float(p95),
+        "max": float(values.max()),
+    }
+
+
+def _noise_floor(
+    metric: Metric, reference: Array, coordinates: Array, noise: Array, viewing: Viewing
+) -> float:
+    if not noise.any():
+        return 0.0
+    noisy = metric.coordinates(reference + noise, viewing)
+    return float(metric.difference(coordinates, noisy).mean())
+
+
+def _least_squares_factor(test: Array, reference: Array) -> float:
+    energy, overlap = float(np.vdot(test, test)), float(np.vdot(test, reference))
+    return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
+
+
+def _best_exposure(
+    metric: Metric, test: Array, reference: Array, coordinates: Array, viewing: Viewing
+) -> float:
+    """`best_exposure` of counted pixels (N, 3), the reference's coordinates given."""
+    from scipy.optimize import minimize_scalar
+
+    if not ((test > 0.0).any() and (reference > 0.0).any()):
+        return 1.0
+    # A random draw, not every n-th pixel: a stride would fall in step with the columns.
+    count = min(len(test), _SEARCH_PIXELS)
+    drawn = np.random.default_rng(0).choice(len(test), count, replace=False)
+    test, reference, coordinates = test[drawn], reference[drawn], coordinates[drawn]
+
+    def mean_at(stops: float, count: int | None = None) -> float:
+        exposed = metric.coordinates(2.0**stops * test[:count], viewing)
+        return float(metric.difference(coordinates[:count], exposed).mean())
+
+    whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
+    start = whole_stops[np.argmin([mean_at(s, _BRACKET_PIXELS) for s in whole_stops])]
+    bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
+    found = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    least_squares = np.log2(_least_squares_factor(test, reference))
+    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), found.x]
+    return float(2.0 ** min(candidates, key=mean_at))

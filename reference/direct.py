@@ -1,0 +1,93 @@
+"""The integrator plugin ``direct_all``: direct light from every emitter at every sample.
+
+Mitsuba's ``direct`` picks one emitter at random for each sample, so that two point lights already
+make noise. This one asks each emitter in turn: point, spot and directional lights, which need no
+random number, are then exact at each camera ray, and only what has an extent is sampled, by emitter
+and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mitsuba's.
+
+==================  ==================  ===========================================================
+Parameter           Type (default)      Meaning
+==================  ==================  ===========================================================
+``hide_emitters``   boolean (false)     as of Mitsuba's ``direct``
+==================  ==================  ===========================================================
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+_registered = set()
+
+
+def register():
+    """Make the plugin known to Mitsuba, for the current variant. Calling it again does nothing."""
+    if mi.variant() not in _registered:
+        _define()
+        _registered.add(mi.variant())
+
+
+def _define():
+    class DirectAllIntegrator(mi.SamplingIntegrator):
+        """See the module's docstring."""
+
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            si = self._first_surface(scene, ray, active)
+            seen = active & (si.is_valid() | (not self.hide_emitters))
+            colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
+            if self.hide_emitters:
+                colour = dr.select(si.is_valid(), colour, 0)
+            hit = active & si.is_valid()
+            context = mi.BSDFContext()
+            bsdf = si.bsdf(ray)
+            extended = []
+            for emitter in scene.emitters():
+                if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
+                    colour += _from_emitter(scene, si, bsdf, context, emitter, mi.Point2f(0.5), hit)
+                else:
+                    extended.append(emitter)
+            for emitter in extended:
+                colour += _from_emitter(
+                    scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
+                )
+            if extended:
+                colour += _from_bsdf(scene, si, bsdf, context, sampler, hit)
+            environment = scene.environment() is not None and not self.hide_emitters
+            return colour, active if environment else hit, []
+
+        def _first_surface(self, scene, ray, active):
+            pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+            if self.hide_emitters:
+                skip = active & pi.is_valid() & (pi.shape.emitter() != None)  # noqa: E711 lane-wise
+                si = pi.compute_surface_interaction(ray, mi.RayFlags.Minimal, skip)
+                beyond = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
+                pi[skip] = beyond
+            return pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
+
+        def to_string(self):
+            return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
+
+    mi.register_integrator("direct_all", DirectAllIntegrator)
+
+
+def _from_emitter(scene, si, bsdf, context, emitter, sample, active):
+    """One sample of an emitter, weighted against sampling the BSDF where that can find it too."""
+    ds, weight = emitter.sample_direction(si, sample, active)
+    active = active & (ds.pdf > 0)
+    active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
+    wo = si.to_local(ds.d)
+    value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
+    share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
+    return dr.select(active, value * weight * share, 0)
+
+
+def _from_bsdf(scene, si, bsdf, context, sampler, active):
+    """One sample of the BSDF, for the emitter that it happens to meet."""
+    bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
+    active = active & (bs.pdf > 0)
+    hit = scene.ray_intersect(si.spawn_ray(si.to_world(bs.wo)), active)
+    emitter = hit.emitter(scene, active)
+    ds = mi.DirectionSample3f(scene, hit, si)
+    ds.emitter = emitter
+    emitter_pdf = emitter.pdf_direction(si, ds, active)
+    is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+    share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
+    return dr.select(active, weight * emitter.eval(hit, active) * share, 0)

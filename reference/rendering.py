@@ -1,0 +1,171 @@
+"""Rendering in independent passes, with mean, standard error and times.
+
+Both halves of a pair are rendered pass by pass with the same sampler and the same seed, so that the
+camera rays of a pass are the same in both and pixel filter and edges cancel in the difference.
+Passes differ in seed alone and are independent; samples within a pass are stratified and are not,
+so that every standard error here comes from the spread of passes.
+"""
+
+from dataclasses import dataclass
+from statistics import median
+from time import perf_counter
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic.errors import NonFiniteError
+from reference import direct
+
+
+@dataclass(frozen=True)
+class PassTimes:
+    """Times of the passes of one half, in seconds.
+
+    ``first`` is that of the first pass, which traces and compiles; ``compilation`` the part of it
+    that LLVM took. ``median`` is of the passes after the first (of the first where it is alone).
+    """
+
+    median: float
+    first: float
+    total: float
+    compilation: float
+    passes: int
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An image from ``passes`` independent passes; arrays are (H, W, 3), linear.
+
+    Attributes
+    ----------
+    mean
+        Mean of the passes.
+    standard_error
+        Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
+    noise
+        An image with the distribution of ``mean``'s error: the passes summed with alternating
+        signs, divided by their number.
+    """
+
+    mean: np.ndarray
+    standard_error: np.ndarray
+    noise: np.ndarray
+    passes: int
+
+
+class Accumulator:
+    """Running sums of passes, for an :class:`Estimate`.
+
+    Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering.
+    """
+
+    def __init__(self):
+        self.count = 0
+
+    def add(self, image):
+        """Add a pass: a tensor (H, W, 3)."""
+        image = mi.TensorXd(image)
+        if self.count == 0:
+            self._mean, self._squares, self._signed = (dr.zeros_like(image) for _ in range(3))
+        self.count += 1
+        step = image - self._mean
+        self._mean += step / dr.opaque(mi.Float64, self.count)
+        self._squares += step * (image - self._mean)
+        self._signed += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
+        dr.eval(self._mean, self._squares, self._signed)
+
+    def estimate(self):
+        """Return what the passes so far say; their number should be even and at least 2."""
+        mean, squares, signed = map(np.array, (self._mean, self._squares, self._signed))
+        variance = squares / max(self.count - 1, 1)
+        return Estimate(
+            mean=mean,
+            standard_error=np.sqrt(variance / self.count),
+            noise=signed / self.count,
+            passes=self.count,
+        )
+
+
+class Renderer:
+    """One half of a pair, ready to render passes.
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene.
+    integrator
+        A Mitsuba integrator; None takes the scene's own.
+    spp
+        Samples a pixel and pass. ``multijitter`` rounds it up to what it can lay out.
+    label
+        Name in error messages.
+    """
+
+    def __init__(self, scene, integrator, spp, label):
+        self.scene = scene
+        self.integrator = integrator or scene.integrator()
+        self.spp = spp
+        self.label = label
+        self.times = []
+        self.compilation = 0.0
+
+    def render(self, seed):
+        """Render one pass and return it as a tensor (H, W, 3), noting the time.
+
+        Raises
+        ------
+        NonFiniteError
+            Naming the first pixel that is NaN or infinite, and how many there are.
+        """
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            begin = perf_counter()
+            # An opaque seed lets all passes share one kernel.
+            image = mi.render(
+                self.scene,
+                integrator=self.integrator,
+                spp=self.spp,
+                seed=dr.opaque(mi.UInt32, seed),
+            )
+            dr.eval(image)
+            dr.sync_thread()
+            self.times.append(perf_counter() - begin)
+            kernels = dr.kernel_history([dr.KernelType.JIT])
+        self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
+        if image.shape[2] == 1:
+            image = dr.repeat(image, 3, axis=2)
+        _require_finite(image, self.label, seed)
+        return image
+
+    def pass_times(self):
+        """Return the :class:`PassTimes` of the passes so far."""
+        steady = self.times[1:] or self.times
+        return PassTimes(
+            median=median(steady),
+            first=self.times[0],
+            total=sum(self.times),
+            compilation=self.compilation,
+            passes=len(self.times),
+        )
+
+
+def physical_integrator(plan, hide_emitters):
+    """Make the integrator that a plan names."""
+    direct.register()
+    description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+    if plan.integrator == "path":
+        description["max_depth"] = plan.max_depth
+    return mi.load_dict(description)
+
+
+def _require_finite(image, label, seed):
+    if dr.all(dr.isfinite(image.array)):
+        return
+    bad = ~np.isfinite(np.array(image)).all(axis=2)
+    y, x = np.argwhere(bad)[0]
+    raise NonFiniteError(
+        f"{label}, pass with seed {seed}: {bad.sum()} pixels are NaN or infinite, the first at"
+        f" x = {x}, y = {y}. Look at the surface and the lights seen there: an infinite light or a"
+        " degenerate mesh is the usual cause."
+    )

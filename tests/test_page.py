@@ -1,0 +1,257 @@
+"""The record's schema, and the page: its numbers are the record's and it loads nothing."""
+
+import copy
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+import reports
+from comparisons.metrics import METRICS, Viewing
+from reports import images, page
+
+SCHEMA = json.loads(
+    (Path(page.__file__).parent / "comparison.schema.json").read_text(encoding="utf-8")
+)
+HOSTILE = "../\"><script>alert('x')</script><img src=http://example.org/x onerror=alert(1)>"
+
+
+def metric(mean):
+    after = {"exposure": 1.25 + mean / 100, "mean": 0.71 * mean, "p50": 0.5 * mean}
+    return {
+        "mean": mean,
+        "p50": 0.8 * mean,
+        "p95": 2.1 * mean,
+        "max": 3.3 * mean,
+        "noise_floor": 0.0123 * mean,
+        "after_exposure": after | {"p95": 1.9 * mean, "max": 3.1 * mean},
+    }
+
+
+@pytest.fixture
+def record():
+    side = {"median_s": 0.0042, "passes": 16, "first_s": 0.31, "total_s": 0.375, "compile_s": None}
+    return {
+        "scene": "fig-8-9",
+        "variant": "llvm_ad_rgb",
+        "seed": 7,
+        "resolution": [6, 4],
+        "plan": {
+            "effects": [
+                {"name": "diffuse", "called_for": True, "rule": "k_d > 0"},
+                {"name": "emission", "called_for": False, "rule": "no surface emits"},
+            ],
+            "integrator": "path",
+            "max_depth": -1,
+            "spp": 256,
+            "passes": 16,
+            "sampler": "multijitter",
+        },
+        "viewing": Viewing(exposure=0.5).record(),
+        "metrics": {
+            "dE2000": metric(4.327),
+            "dE_ITP": metric(12.91),
+            "dE_CAM16UCS": metric(3.638),
+            "rmse": {
+                "value": 0.04871,
+                "noise_floor": 0.000812,
+                "after_exposure": {"exposure": 1.31, "value": 0.0312},
+            },
+            "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
+            "significant": {"fraction": 0.632, "level": 0.01},
+        },
+        "pixels": {"counted": 20, "total": 24},
+        "pairing": {
+            "convention": "matched",
+            "bsdfs": [{"id": "ball", "physical": "roughplastic", "k_d": [0.4, 0.3, 0.2]}],
+            "emitters": [{"physical": "point", "intensity": 12.566}],
+            "misses": [{"what": "specular albedo", "wanted": 0.238, "reached": 0.0562}],
+        },
+        "time": {
+            "heuristic": side,
+            "reference": {**side, "total_s": 2.79},
+            "stages": {"page": 0.1},
+        },
+        "unrepresentable": ["dielectric: refraction"],
+        "warnings": ["material reflects more than it receives"],
+        "versions": {"mitsuba": "3.9.1"},
+        "command": "fotismos compare fig-8-9 --seed 7",
+    }
+
+
+@pytest.fixture
+def pictures():
+    rng = np.random.default_rng(0)
+    maps = {name: 20 * rng.random((4, 6)) for name in (*METRICS, "log2_luminance")}
+    return images.pictures(rng.random((4, 6, 3)), rng.random((4, 6, 3)), maps, maps["dE2000"] > 9)
+
+
+class Page(HTMLParser):
+    """Start tags with attributes, text, and the values of <data> elements with their text."""
+
+    def __init__(self, html):
+        super().__init__(convert_charrefs=True)
+        self.tags, self.text, self.values, self.open = [], "", [], None
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag == "data":
+            self.open = dict(attrs)["value"]
+
+    def handle_data(self, data):
+        self.text += data
+        if self.open is not None:
+            self.values.append((float(self.open), data))
+            self.open = None
+
+
+def numbers_in(node):
+    if isinstance(node, dict):
+        return [n for item in node.values() for n in numbers_in(item)]
+    if isinstance(node, list):
+        return [n for item in node for n in numbers_in(item)]
+    return [node] if isinstance(node, int | float) and not isinstance(node, bool) else []
+
+
+def test_the_schema_is_valid_and_accepts_a_record(record):
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.Draft202012Validator(SCHEMA).validate(record)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("metrics", "dE2000", "mean"), -1.0),
+        (("metrics", "dE2000", "mean"), None),
+        (("metrics", "significant", "fraction"), 1.5),
+        (("resolution",), [512]),
+        (("resolution",), [0, 4]),
+        (("plan", "max_depth"), -2),
+        (("time", "heuristic", "median_ms"), 4.2),
+        (("surprise",), 1),
+    ],
+)
+def test_the_schema_refuses(record, path, value):
+    node = record
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = value
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(SCHEMA).validate(record)
+
+
+def test_every_top_level_key_is_required(record):
+    for key in record:
+        partial = {k: v for k, v in record.items() if k != key}
+        assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(partial), key
+
+
+def test_the_numbers_on_the_page_are_the_records(record, pictures):
+    shown = Page(page.render([{"record": record, "images": pictures}]))
+    values = {value for value, _ in shown.values}
+    parts = [record[key] for key in ("metrics", "viewing", "pixels", "pairing", "time")]
+    # The level of the test is printed, as "1 %", without a machine-readable value.
+    missing = {n for n in numbers_in(parts) if n not in values} - {0.01}
+    assert not missing
+    assert ("4.33", 4.327) in {(text, value) for value, text in shown.values}
+    assert ("63.2 %", 0.632) in {(text, value) for value, text in shown.values}
+    assert ("2.79 s", 2.79) in {(text, value) for value, text in shown.values}
+    for text in ("Seed 7", "unlimited depth", "256 samples a pixel", "k_d > 0", "mitsuba 3.9.1"):
+        assert text in shown.text
+    for text in (*record["unrepresentable"], *record["warnings"], record["command"]):
+        assert text in shown.text
+
+
+def test_two_scenes_keep_their_order_and_their_anchors(record, pictures):
+    other = copy.deepcopy(record) | {"scene": "second"}
+    shown = Page(
+        page.render([{"record": record, "images": pictures}, {"record": other, "images": {}}])
+    )
+    ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
+    assert targets == ["scene-1", "scene-2"]
+    assert set(targets) < set(ids)
+
+
+def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
+    for key in ("scene", "command", "variant"):
+        record[key] = HOSTILE
+    record["warnings"] = record["unrepresentable"] = [HOSTILE]
+    record["versions"] = {HOSTILE: HOSTILE}
+    record["plan"]["effects"][0]["rule"] = HOSTILE
+    record["pairing"]["misses"][0][HOSTILE] = {HOSTILE: [HOSTILE]}
+    html = page.render(
+        [{"record": record, "images": pictures, "files": {HOSTILE: "javascript:" + HOSTILE}}],
+        title=HOSTILE,
+    )
+    shown = Page(html)
+    assert [tag for tag, _ in shown.tags].count("script") == 1
+    assert not {"link", "iframe", "object", "base"} & {tag for tag, _ in shown.tags}
+    for tag, attrs in shown.tags:
+        assert not [name for name in attrs if name.startswith("on")], tag
+        if "src" in attrs:
+            assert attrs["src"].startswith("data:image/png;base64,")
+        if "href" in attrs:
+            assert attrs["href"].startswith(("#scene-", "./"))
+    assert HOSTILE in shown.text
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert "url(" not in style
+    assert "@import" not in style
+    policies = [a["content"] for _, a in shown.tags if a.get("http-equiv")]
+    assert policies[0].startswith("default-src 'none'")
+
+
+def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
+    shown = Page(page.render([{"record": record, "images": pictures}]))
+    pictures_shown = [attrs for tag, attrs in shown.tags if tag == "img"]
+    assert len(pictures_shown) == 7
+    assert len({attrs["src"] for attrs in pictures_shown}) == 7
+    assert all(len(attrs["alt"]) > 15 for attrs in pictures_shown)
+    for metric_ in METRICS.values():
+        assert metric_.definition in shown.text
+        assert f"≥ {metric_.map_range[1]:g}" in shown.text
+    assert "not counted" in shown.text
+
+
+def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):
+    view = {"record": record, "images": pictures}
+    assert "about noise" not in Page(page.render([view])).text
+    record["metrics"]["dE2000"]["noise_floor"] = 4.2
+    assert "about noise" in Page(page.render([view])).text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (4.327, "4.33"),
+        (0.04871, "0.0487"),
+        (0.00025, "2.5 × 10⁻⁴"),
+        (-0.5, "−0.500"),
+        (1234.5, "1,234"),
+        (3.2e7, "3.2 × 10⁷"),
+        (9.999, "10.0"),
+        (None, "–"),
+    ],
+)
+def test_numbers_are_printed_to_three_digits(value, text):
+    assert page.number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0 s"), (2e-5, "20.0 µs"), (0.0042, "4.20 ms"), (75.0, "75.0 s"), (None, "–")],
+)
+def test_times_have_their_unit(value, text):
+    assert page.seconds(value) == text
+
+
+def test_the_package_holds_its_templates():
+    folder = Path(reports.__path__[0])
+    for name in ("page.html.j2", "scene.html.j2", "macros.html.j2", "page.css", "page.js"):
+        assert (folder / "templates" / name).is_file()
