@@ -148,7 +148,8 @@ def _prepare_film(graph, sensor, resolution):
             " yet. Use hdrfilm."
         )
     props = graph.props(film)
-    props["pixel_format"], props["component_format"] = "rgb", "float32"
+    props["pixel_format"] = "luminance" if mi.is_monochromatic else "rgb"
+    props["component_format"] = "float32"
     if resolution is not None:
         props["width"], props["height"] = resolution
 

@@ -1,0 +1,215 @@
+"""The command line.
+
+Exit codes: 0 done; 1 a check failed; 2 bad input or installation. A mistake of the user's gets one
+message on standard error, never a traceback. Mitsuba and colour-science are imported by the
+commands that need them, so that ``--help`` and usage errors answer at once.
+"""
+
+import shlex
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import click
+
+from heuristic.errors import FotismosError, InputError
+from heuristic.version import __version__
+
+START = perf_counter()
+VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+
+
+class Resolution(click.ParamType):
+    """``WIDTHxHEIGHT``, as two positive integers."""
+
+    name = "WxH"
+
+    def convert(self, value, param, ctx):
+        """Parse the text, or fail with what is allowed."""
+        if isinstance(value, tuple):
+            return value
+        width, separator, height = value.lower().partition("x")
+        if not (separator and width.isdecimal() and height.isdecimal()):
+            self.fail(f"{value!r} is no resolution; write it like 512x512.", param, ctx)
+        return int(width), int(height)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="fotismos")
+def cli():
+    """Textbook shading against physically based rendering, scene by scene."""
+
+
+def _rendering_options(command):
+    options = (
+        click.option("--variant", default="llvm_ad_rgb", type=click.Choice(VARIANTS),
+                     show_default=True, help="Mitsuba variant."),
+        click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
+                     help="Seed of the first pass."),
+        click.option("--spp", default=256, show_default=True, type=click.IntRange(min=2),
+                     help="Samples a pixel, over all passes."),
+        click.option("--resolution", type=Resolution(),
+                     help="Width and height in place of the film's own."),
+        click.option("--pairing", default="matched", show_default=True,
+                     type=click.Choice(["literal", "matched"]),
+                     help="How roughplastic and phong are paired."),
+    )  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def _output_option(default):
+    return click.option(
+        "-o",
+        "--output",
+        default=default,
+        show_default=True,
+        type=click.Path(path_type=Path),
+        help="Folder for the results.",
+    )
+
+
+@cli.command()
+@click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
+@_output_option("out")
+@_rendering_options
+def compare(scenes, output, **rendering):
+    r"""Say how far textbook shading is from physics, where, and whether that is more than noise.
+
+    SCENE is a built-in name (`fotismos scenes`) or a Mitsuba file (.xml). Writes OUTPUT/index.html
+    and, for each scene, comparison.json, comparison.exr and pictures.
+
+    \b
+    Examples:
+      fotismos compare fig-8-9
+      fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
+    """
+    _compare(scenes, output, rendering)
+
+
+@cli.command()
+@_output_option("out/report")
+@_rendering_options
+def report(output, **rendering):
+    """Compare all built-in scenes and write one report."""
+    _set_variant(rendering["variant"])
+    from comparisons.scenes import SCENES
+
+    _compare(tuple(SCENES), output, rendering)
+
+
+@cli.command()
+def scenes():
+    """List the built-in scenes."""
+    from comparisons.scenes import SCENES
+
+    width = max(map(len, SCENES))
+    for scene in SCENES.values():
+        click.echo(f"{scene.name:<{width}}  {scene.title}")
+
+
+@cli.command()
+def doctor():
+    """Check the installation: versions, LLVM, and a test rendering in each variant."""
+    from reports.doctor import examine
+
+    for line in examine(VARIANTS):
+        click.echo(line)
+
+
+def main():
+    """Run the command line; the exit code says how it went."""
+    try:
+        cli(standalone_mode=False)
+    except click.exceptions.Abort:
+        click.echo("fotismos: interrupted; finished scenes are kept.", err=True)
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except FotismosError as error:
+        click.echo(f"fotismos: error: {error}", err=True)
+        sys.exit(error.exit_code)
+
+
+def _compare(names, folder, rendering):
+    options = _options(rendering)
+    from comparisons.compare import compare as run
+    from reports import output, progress
+
+    folder = output.prepare(folder)
+    sources = _sources(names)
+    views = {}
+    with progress.shown() as bar:
+        for source in sources:
+            start_up = perf_counter() - START if not views else 0.0
+            result = run(source, options, bar.of(source.name), _command(source, rendering))
+            begin = perf_counter()
+            name = output.folder_name(source.name, views)
+            views[name] = output.write_scene(folder, name, result)
+            stages = result.data["time"]["stages"]
+            stages |= {"start-up": start_up, "files": perf_counter() - begin}
+    begin = perf_counter()
+    output.write_page(folder, list(views.values()))
+    share = (perf_counter() - begin) / len(views)
+    for name, view in views.items():
+        view["record"]["time"]["stages"]["page"] = share
+        output.rewrite_record(folder, name, view["record"])
+    for line in progress.summary(view["record"] for view in views.values()):
+        click.echo(line)
+    click.echo(f"\n{folder / 'index.html'}")
+
+
+def _options(rendering):
+    """Turn the command's options into those of a comparison, and set the variant."""
+    _set_variant(rendering["variant"])
+    from comparisons.compare import Options
+    from reference.pairing import Convention
+
+    return Options(
+        seed=rendering["seed"],
+        spp=rendering["spp"],
+        resolution=rendering["resolution"],
+        convention=Convention(rendering["pairing"]),
+    )
+
+
+def _set_variant(name):
+    from heuristic import backend
+
+    backend.check()
+    from reference.scene import set_variant
+
+    set_variant(name)
+
+
+def _sources(names):
+    """Find all scenes before anything is rendered, so that a typing mistake costs nothing."""
+    from comparisons.scenes import builtin
+    from reference.scene import Source
+
+    sources = []
+    for name in names:
+        path = Path(name)
+        if path.suffix == ".xml" or path.exists():
+            if not path.is_file():
+                raise InputError(
+                    f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
+                    " built-in scene; `fotismos scenes` lists them."
+                )
+            sources.append(Source(path.stem, path))
+        else:
+            sources.append(builtin(name).source())
+    return sources
+
+
+def _command(source, rendering):
+    """Return the command that repeats one comparison."""
+    scene = source.name if isinstance(source.content, dict) else str(source.content)
+    words = ["fotismos", "compare", scene]
+    for key, value in rendering.items():
+        if value is not None:
+            text = "x".join(map(str, value)) if key == "resolution" else str(value)
+            words += [f"--{key}", text]
+    return shlex.join(words)

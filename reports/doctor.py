@@ -1,0 +1,42 @@
+"""What ``fotismos doctor`` prints: what the installation consists of, and whether it renders."""
+
+import platform
+from importlib import metadata
+
+from heuristic import backend
+from heuristic.version import __version__
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
+
+
+def examine(variants):
+    """Yield lines on versions, LLVM and a test rendering for each variant.
+
+    Raises
+    ------
+    InstallationError
+        When Dr.Jit found no LLVM that it can work with.
+    """
+    yield f"fotismos        {__version__}"
+    yield f"python          {platform.python_version()} on {platform.platform()}"
+    for library in LIBRARIES:
+        yield f"{library:<15} {metadata.version(library)}"
+    info = backend.check()
+    version = ".".join(map(str, info.version))
+    yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
+    if info.note:
+        yield f"                {info.note}"
+    for variant in variants:
+        yield f"{variant:<15} {_render(variant)}"
+
+
+def _render(variant):
+    """Render a small figure in a variant, and say how that went."""
+    from reference.scene import set_variant
+
+    set_variant(variant)
+    from comparisons.compare import Options, compare
+    from comparisons.scenes import builtin
+
+    compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
+    return "renders"

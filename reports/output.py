@@ -1,0 +1,150 @@
+"""Writing the results of a run: whole or not at all, and never at the cost of an earlier result."""
+
+import json
+import os
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+
+from comparisons.metrics import METRICS
+from heuristic.errors import InputError
+from reports import exr, images, page
+
+LONGEST_IN_PAGE = 1600
+"""Pixels; longer pictures are reduced inside the page, never in the files."""
+
+
+def prepare(folder):
+    """Make the output folder, and see that it can be written to.
+
+    Raises
+    ------
+    InputError
+        When it cannot.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".fotismos-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(
+            f"output folder {folder}: {error.strerror or error}. Choose another one with -o."
+        ) from error
+    return folder
+
+
+def write_scene(folder, name, comparison):
+    """Write the files of one comparison to ``folder/name``, in place of an earlier result.
+
+    Returns
+    -------
+    dict
+        What the page needs of it: record, pictures and links.
+    """
+    data, shown = comparison.data, comparison.images
+    maps = {key: shown.maps[key] for key in (*METRICS, "log2_luminance")}
+    exposure = data["viewing"]["exposure"]
+
+    def pictures(longest=None):
+        return images.pictures(
+            shown.heuristic,
+            shown.reference,
+            maps,
+            shown.significant,
+            counted=shown.counted,
+            exposure=exposure,
+            longest=longest,
+        )
+
+    files = pictures()
+    with _replacing(folder / name) as place:
+        for key, png in files.items():
+            (place / f"{key}.png").write_bytes(png)
+        exr.write(place / "comparison.exr", _layers(shown), _header(data))
+        (place / "comparison.json").write_text(_json(data), encoding="utf-8")
+    largest = max(data["resolution"])
+    return {
+        "record": data,
+        "images": files if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
+        "files": {file: f"{name}/{file}" for file in ("comparison.json", "comparison.exr")},
+    }
+
+
+def write_page(folder, views):
+    """Write ``index.html`` for the scenes of a run."""
+    _write(folder / "index.html", page.render(views))
+
+
+def rewrite_record(folder, name, data):
+    """Write a scene's record again, once the times of the page are known."""
+    _write(folder / name / "comparison.json", _json(data))
+
+
+def folder_name(name, taken):
+    """Return a name for a scene's folder: plain characters, and not taken yet."""
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name).strip(".") or "scene"
+    chosen, number = plain, 1
+    while chosen in taken:
+        number += 1
+        chosen = f"{plain}-{number}"
+    return chosen
+
+
+def _json(data):
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _layers(shown):
+    return {
+        "heuristic": shown.heuristic,
+        "reference": shown.reference,
+        "reference_stderr": shown.reference_stderr,
+        "P": shown.position,
+        "N": shown.normal,
+        **{name: shown.maps[name] for name in METRICS},
+        "significant": shown.significant,
+    }
+
+
+def _header(data):
+    header = {
+        "scene": data["scene"],
+        "variant": data["variant"],
+        "seed": data["seed"],
+        "spp": data["plan"]["spp"],
+        "passes": data["plan"]["passes"],
+        "pairing": data["pairing"]["convention"],
+    }
+    header |= {f"version {name}": version for name, version in data["versions"].items()}
+    return {key: str(value) for key, value in header.items()}
+
+
+def _write(path, text):
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
+@contextmanager
+def _replacing(place):
+    """Give a new folder to write to, and put it in the place of the old one at the end.
+
+    The old folder steps aside and is deleted last: at every moment one of the two is whole.
+    """
+    new = place.with_name(f".{place.name}.{os.getpid()}.partial")
+    old = place.with_name(f".{place.name}.old")
+    if old.exists() and not place.exists():
+        old.rename(place)  # an interruption came between the two renamings below
+    shutil.rmtree(new, ignore_errors=True)
+    new.mkdir()
+    try:
+        yield new
+        shutil.rmtree(old, ignore_errors=True)
+        if place.exists():
+            place.rename(old)
+        new.rename(place)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    shutil.rmtree(old, ignore_errors=True)
