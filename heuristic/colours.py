@@ -26,7 +26,9 @@ def checked(name, value):
         return value
     if isinstance(value, Real):
         components = (float(value),)
-    elif isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value):
+    elif not isinstance(value, str) and (
+        isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value)
+    ):
         components = tuple(float(component) for component in np.ravel(value))
     else:
         raise InputError(

@@ -1,12 +1,13 @@
 """Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3).
 
-Each light answers one question, ``illuminate(position)``: from which direction ``L``, and with what
-intensity, does its light arrive at the given positions? Occlusion is not its business.
+Each light answers one question, ``illuminate(position)``: from which direction ``L``, with what
+intensity and over what distance does its light arrive? Occlusion is not its business.
 """
 
 from dataclasses import dataclass
 from math import cos, inf, isfinite, radians
 from numbers import Real
+from typing import NamedTuple
 
 import drjit as dr
 
@@ -15,6 +16,14 @@ from heuristic.errors import InputError
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)
+
+
+class Arrival(NamedTuple):
+    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays."""
+
+    toward: object
+    intensity: object
+    distance: object
 
 
 @dataclass(frozen=True)
@@ -41,10 +50,10 @@ class DirectionalLight:
         _set(self, direction=_direction(self.direction), intensity=_intensity(self.intensity))
 
     def illuminate(self, position):
-        """Return ``L = -direction / |direction|`` and ``I_p``."""
+        """Return ``L = -direction / |direction|`` and ``I_p``, as an :class:`Arrival`."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
-        return toward, colours.as_array(self.intensity, vector_type)
+        return Arrival(toward, colours.as_array(self.intensity, vector_type), inf)
 
 
 @dataclass(frozen=True)
@@ -84,11 +93,11 @@ class PointLight:
         )
 
     def illuminate(self, position):
-        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6) at ``position``."""
+        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), as an :class:`Arrival`."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         intensity = colours.as_array(self.intensity, vector_type)
-        return toward, _attenuated(intensity, distance, self.attenuation, self.clamped)
+        return _attenuated(toward, intensity, distance, self)
 
 
 @dataclass(frozen=True)
@@ -141,15 +150,15 @@ class SpotLight:
         )
 
     def illuminate(self, position):
-        """Return ``L`` (6.26) and the intensity of 6.4 (6.3 where ``m = 0``) at ``position``."""
+        """Return ``L`` (6.26) and the intensity of 6.4 (6.3 where ``m = 0``), as an Arrival."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         cos_axis = -dr.dot(vectors.normalise(vector_type(self.direction)), toward)
         cone = terms.spot_cone(cos_axis, self._cos_cutoff())
-        if not (isinstance(self.exponent, Real) and self.exponent == 0):
+        if not is_number(self.exponent, 0):
             cone *= terms.spot_falloff(cos_axis, self.exponent)
         intensity = colours.as_array(self.intensity, vector_type)
-        return toward, _attenuated(intensity * cone, distance, self.attenuation, self.clamped)
+        return _attenuated(toward, intensity * cone, distance, self)
 
     def _cos_cutoff(self):
         if isinstance(self.cutoff, Real):
@@ -157,11 +166,21 @@ class SpotLight:
         return dr.cos(dr.deg2rad(self.cutoff))
 
 
-def _attenuated(intensity, distance, coefficients, clamped):
-    if coefficients == UNATTENUATED:
-        return intensity
-    law = terms.clamped_attenuation if clamped else terms.attenuation
-    return intensity * law(distance, *coefficients)
+def is_number(value, number):
+    """Tell whether a value is a plain number and that number; Dr.Jit arrays are not looked at."""
+    return isinstance(value, Real) and value == number
+
+
+def is_unattenuated(coefficients):
+    """Tell whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
+    return all(map(is_number, coefficients, UNATTENUATED))
+
+
+def _attenuated(toward, intensity, distance, light):
+    if not is_unattenuated(light.attenuation):
+        law = terms.clamped_attenuation if light.clamped else terms.attenuation
+        intensity = intensity * law(distance, *light.attenuation)
+    return Arrival(toward, intensity, distance)
 
 
 def _set(light, **values):

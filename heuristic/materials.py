@@ -1,10 +1,12 @@
-"""The material of the illumination model: five coefficients."""
+"""The material of the illumination model: coefficients, exponent, and the form of the lobe."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from numbers import Real
 
 from heuristic import colours
 from heuristic.errors import InputError
+
+FORMS = ("phong", "blinn")
 
 
 @dataclass(frozen=True)
@@ -22,11 +24,17 @@ class Material:
         Phong's exponent, 0 or more. A Python integer up to
         :data:`heuristic.terms.LARGEST_LITERAL_EXPONENT` is compiled into the kernel, and a float or
         a Dr.Jit array is not.
+    form
+        ``phong`` for the chapters' ``(R.V)^n`` (8.9), ``blinn`` for ``(N.H)^n`` of Blinn (1977),
+        which OpenGL's fixed pipeline and most engines use.
+    normalised
+        Scale the lobe by :func:`heuristic.terms.normalisation`, so that ``k_s`` is its albedo at
+        normal incidence. The chapters' model does not.
 
     Raises
     ------
     InputError
-        For negative, infinite or NaN values.
+        For negative, infinite or NaN values, or an unknown form.
     """
 
     k_i: colours.Coefficient = 0
@@ -34,16 +42,23 @@ class Material:
     k_d: colours.Coefficient = 0
     k_s: colours.Coefficient = 0
     n: float = 1
+    form: str = "phong"
+    normalised: bool = False
 
     def __post_init__(self):
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name == "n" and isinstance(value, Real):
-                _check_exponent(value)
-            else:
-                object.__setattr__(self, field.name, colours.checked(field.name, value))
+        for name in ("k_i", "k_a", "k_d", "k_s"):
+            object.__setattr__(self, name, colours.checked(name, getattr(self, name)))
+        if isinstance(self.n, Real):
+            _check_exponent(self.n)
+        check_form(self.form)
 
 
 def _check_exponent(n):
     if not (n >= 0 and n < float("inf")):
         raise InputError(f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more.")
+
+
+def check_form(form):
+    """Refuse a form of the specular lobe that is not in :data:`FORMS`."""
+    if form not in FORMS:
+        raise InputError(f"form = {form!r} is not known: choose one of {', '.join(FORMS)}.")

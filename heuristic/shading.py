@@ -3,9 +3,10 @@
 import drjit as dr
 
 from heuristic import colours, terms, vectors
+from heuristic.lighting import sum_lights
 
 
-def shade(position, normal, view, material, lights, ambient=0):
+def shade(position, normal, view, material, lights, ambient=0, visible=None):
     """Equations 8.10, 6.11, 6.12: the sum of all terms over all lights.
 
     ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
@@ -21,9 +22,13 @@ def shade(position, normal, view, material, lights, ambient=0):
     material : Material
         The coefficients.
     lights : sequence of PointLight, DirectionalLight or SpotLight
-        Numbers in lights and material are compiled into the kernel; opaque Dr.Jit values are not.
+        Any number of them. Numbers in up to :data:`heuristic.lighting.BLOCK` lights, and in the
+        material, are compiled into the kernel; opaque Dr.Jit values are not.
     ambient
         ``I_a``: a number, RGB, one value for each wavelength, or a Dr.Jit array.
+    visible : callable, optional
+        ``visible(toward, distance)`` returns a mask of the points that a light in that direction,
+        at that distance, reaches. The chapters' model has no shadows; without it nothing is hidden.
 
     Returns
     -------
@@ -50,39 +55,17 @@ def shade(position, normal, view, material, lights, ambient=0):
     if not (colours.is_zero(material.k_a) or colours.is_zero(ambient)):
         present.append(terms.ambient(ambient, k_a))
     if lights:
-        diffuse, specular = _sum_lights(
-            position, vectors.normalise(normal), vectors.normalise(view), material, lights
+        if material.normalised:
+            k_s = k_s * terms.normalisation(material.form, material.n)
+        diffuse, specular = sum_lights(
+            position, vectors.normalise(normal), vectors.normalise(view), material, lights, visible
         )
         present += [
             coefficient * term
             for coefficient, term in ((k_d, diffuse), (k_s, specular))
             if term is not None
         ]
-    return _total(present, dr.leaf_t(vector_type))
-
-
-def _sum_lights(position, normal, view, material, lights):
-    """Sum the light terms of 8.10 with ``k_d`` and ``k_s`` taken out of the sum.
-
-    Returns the diffuse and the specular sum, each None where its coefficient is zero.
-    """
-    has_diffuse = not colours.is_zero(material.k_d)
-    has_specular = not colours.is_zero(material.k_s)
-    diffuse = specular = None
-    for light in lights if has_diffuse or has_specular else ():
-        toward, intensity = light.illuminate(position)
-        cos_incidence = dr.dot(normal, toward)
-        if has_diffuse:
-            diffuse = _add(diffuse, terms.diffuse(intensity, 1, cos_incidence))
-        if has_specular:
-            mirror = vectors.mirror_vector(normal, toward, cos_incidence)
-            above = dr.select(cos_incidence > 0, dr.dot(mirror, view), 0)
-            specular = _add(specular, terms.specular(intensity, 1, above, material.n))
-    return diffuse, specular
-
-
-def _add(total, term):
-    return term if total is None else total + term
+    return _total(present, dr.value_t(vector_type))
 
 
 def _total(present, float_type):

@@ -7,6 +7,8 @@ each wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The s
 the kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
 """
 
+from numbers import Real
+
 import drjit as dr
 
 
@@ -37,6 +39,21 @@ def specular(intensity, k_s, cos_reflection, n):
     ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
     """
     return intensity * k_s * power(cos_reflection, n)
+
+
+def normalisation(form, n):
+    """Return the factor on ``k_s`` that makes the lobe's albedo at normal incidence ``k_s``.
+
+    With light along the normal, the lobes of 8.9 and of Blinn's ``(N.H)^n`` send back
+
+    - ``phong``: ``2 k_s int cos^(n+1) sin = 2 k_s / (n + 2)``, hence the factor ``(n + 2) / 2``;
+    - ``blinn``: ``2 k_s int cos(t/2)^n cos(t) sin(t) dt``, which is
+      ``8 k_s (n + 2^(-n/2)) / ((n + 2) (n + 4))``, hence its inverse over ``k_s``.
+    """
+    if form == "blinn":
+        halves = 2 ** (-n / 2) if isinstance(n, Real) else dr.exp2(-n / 2)
+        return (n + 2) * (n + 4) / (8 * (n + halves))
+    return (n + 2) / 2
 
 
 LARGEST_LITERAL_EXPONENT = 64

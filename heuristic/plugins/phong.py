@@ -8,6 +8,9 @@ Parameter           Type (default)    Meaning
 ``k_d``, ``k_s``    spectrum or       diffuse and specular coefficient
                     texture (0)
 ``n``               float (1)         Phong's exponent
+``form``            string (phong)    ``phong`` for ``(R.V)^n``, ``blinn`` for ``(N.H)^n``
+``normalised``      boolean (false)   scale the lobe so that ``k_s`` is its albedo at normal
+                                      incidence
 ``twosided``        boolean (false)   shade the side that faces the viewer, whichever it is
 ==================  ================  =============================================================
 
@@ -26,7 +29,7 @@ import mitsuba as mi
 from heuristic import terms
 from heuristic.convention import RADIANCE_PER_IRRADIANCE
 from heuristic.errors import InputError
-from heuristic.materials import Material
+from heuristic.materials import Material, check_form
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
 
 
@@ -46,6 +49,9 @@ def define():
                     f"phong: n = {n} is not allowed: give a finite value of 0 or more."
                 )
             self.n = mi.Float(n)
+            self.form = props.get("form", "phong")
+            check_form(self.form)
+            self.normalised = props.get("normalised", False)
             self.twosided = props.get("twosided", False)
             sides = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.BackSide if self.twosided else 0)
             self.m_components = [
@@ -60,7 +66,7 @@ def define():
             coefficients = {
                 name: getattr(self, name).eval(si, active) for name in self.present if name != "n"
             }
-            return Material(**coefficients, n=self.n)
+            return Material(**coefficients, n=self.n, form=self.form, normalised=self.normalised)
 
         def eval(self, ctx, si, wo, active=True):
             wi, wo = self._facing(si.wi, wo)
@@ -70,8 +76,8 @@ def define():
                 k_d = self.k_d.eval(si, above)
                 value += terms.diffuse(RADIANCE_PER_IRRADIANCE, k_d, wo.z)
             if "k_s" in self.present and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-                k_s = self.k_s.eval(si, above)
-                cosine = dr.dot(mi.reflect(wi), wo)
+                k_s = self.k_s.eval(si, above) * self._scale()
+                cosine = self._lobe_cosine(wi, wo)
                 value += terms.specular(RADIANCE_PER_IRRADIANCE, k_s, cosine, self.n)
             return dr.select(above, value, 0)
 
@@ -80,7 +86,7 @@ def define():
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
-            specular = self._lobe_pdf(dr.dot(mi.reflect(wi), wo))
+            specular = self._lobe_pdf(wi, wo)
             return dr.select(above, dr.lerp(diffuse, specular, probability), 0)
 
         def sample(self, ctx, si, sample1, sample2, active=True):
@@ -90,7 +96,7 @@ def define():
             is_specular = sample1 < probability
             wo = dr.select(
                 is_specular,
-                self._sample_lobe(mi.reflect(wi), sample2),
+                self._sample_lobe(wi, sample2),
                 mi.warp.square_to_cosine_hemisphere(sample2),
             )
             if self.twosided:
@@ -143,26 +149,46 @@ def define():
         def _specular_probability(self, ctx, si, active):
             """Share of samples for the lobe: its part of the albedo at normal incidence.
 
-            The diffuse part reflects ``k_d``, the lobe ``2 k_s / (n + 2)``.
+            The diffuse part reflects ``k_d``, the lobe ``k_s`` over its normalisation.
             """
             if not ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1) or "k_d" not in self.present:
                 return mi.Float(1)
             if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
                 return mi.Float(0)
             diffuse = dr.mean(self.k_d.eval(si, active))
-            specular = dr.mean(self.k_s.eval(si, active)) * 2 / (self.n + 2)
+            albedo = self._scale() / terms.normalisation(self.form, self.n)
+            specular = dr.mean(self.k_s.eval(si, active)) * albedo
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
 
-        def _sample_lobe(self, axis, sample2):
-            """Draw a direction with density ``(n + 1) / (2 pi) cos^n`` about ``axis``."""
+        def _scale(self):
+            return terms.normalisation(self.form, self.n) if self.normalised else 1
+
+        def _lobe_cosine(self, wi, wo):
+            """Return ``R.V`` or ``N.H`` in the local frame."""
+            if self.form == "blinn":
+                return dr.normalize(wi + wo).z
+            return dr.dot(mi.reflect(wi), wo)
+
+        def _sample_lobe(self, wi, sample2):
+            """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
+
+            That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
+            the normal, at which ``wi`` is then mirrored.
+            """
             cosine = dr.power(sample2.y, dr.rcp(self.n + 1))
             sine = dr.safe_sqrt(1 - dr.square(cosine))
             sin_phi, cos_phi = dr.sincos(dr.two_pi * sample2.x)
             local = mi.Vector3f(cos_phi * sine, sin_phi * sine, cosine)
-            return mi.Frame3f(axis).to_world(local)
+            if self.form == "blinn":
+                return mi.reflect(wi, local)
+            return mi.Frame3f(mi.reflect(wi)).to_world(local)
 
-        def _lobe_pdf(self, cosine):
-            return (self.n + 1) * dr.inv_two_pi * terms.power(cosine, self.n)
+        def _lobe_pdf(self, wi, wo):
+            """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``."""
+            density = (self.n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), self.n)
+            if self.form == "blinn":
+                density /= 4 * dr.dot(wi, dr.normalize(wi + wo))
+            return density
 
     mi.register_bsdf("phong", PhongBSDF)

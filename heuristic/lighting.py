@@ -1,0 +1,144 @@
+"""The sum over the lights of 8.10, for a handful of lights and for thousands."""
+
+from collections import defaultdict
+from dataclasses import fields, replace
+from numbers import Real
+
+import drjit as dr
+import numpy as np
+
+from heuristic import colours, terms, vectors
+from heuristic.lights import UNATTENUATED, is_number, is_unattenuated
+
+BLOCK = 8
+"""Lights in one kernel. More are summed block after block by the same kernel, each light costing
+what it costs unrolled; a loop inside the kernel would fetch each parameter for each pixel anew, and
+take twice as long or more. Larger blocks compile longer and gain nothing (see the benchmarks)."""
+
+
+def sum_lights(position, normal, view, material, lights, visible=None):
+    """Sum the light terms of 8.10, with ``k_d`` and ``k_s`` taken out of the sum.
+
+    Parameters
+    ----------
+    position, normal, view
+        As of :func:`heuristic.shade`, normalised.
+    material : Material
+        Tells which of the two sums are needed, and the form and exponent of the specular term.
+    lights : sequence
+        Any number. More than :data:`BLOCK` are evaluated in blocks, so that compile time, kernel
+        size and memory do not grow with their number; where evaluation is not possible, inside a
+        symbolic loop or call, they are unrolled.
+    visible : callable, optional
+        ``visible(toward, distance)`` returns a mask of the points that the light reaches.
+
+    Returns
+    -------
+    diffuse, specular
+        The two sums, each None where its coefficient is zero.
+    """
+    has_diffuse = not colours.is_zero(material.k_d)
+    has_specular = not colours.is_zero(material.k_s)
+    if not (has_diffuse or has_specular):
+        return None, None
+    in_blocks = len(lights) > BLOCK and not dr.flag(dr.JitFlag.SymbolicScope)
+    blocks = _blocks(lights, type(position)) if in_blocks else [lights]
+    diffuse = specular = None
+    for block in blocks:
+        for light in block:
+            arrival = light.illuminate(position)
+            cos_incidence = dr.dot(normal, arrival.toward)
+            intensity = arrival.intensity
+            if visible is not None:
+                seen = visible(arrival.toward, arrival.distance)
+                intensity = dr.select(seen, intensity, 0)
+            if has_diffuse:
+                diffuse = _add(diffuse, terms.diffuse(intensity, 1, cos_incidence))
+            if has_specular:
+                cosine = _lobe_cosine(material, normal, arrival.toward, view, cos_incidence)
+                specular = _add(specular, terms.specular(intensity, 1, cosine, material.n))
+        if in_blocks:
+            dr.eval(diffuse, specular)
+    return diffuse, specular
+
+
+def _lobe_cosine(material, normal, toward, view, cos_incidence):
+    """Return ``R.V`` or ``N.H``, of which the lobe is a power; 0 for lights below the horizon."""
+    if material.form == "blinn":
+        cosine = dr.dot(normal, vectors.half_vector(toward, view))
+    else:
+        cosine = dr.dot(vectors.mirror_vector(normal, toward, cos_incidence), view)
+    return dr.select(cos_incidence > 0, cosine, 0)
+
+
+def _add(total, term):
+    return term if total is None else total + term
+
+
+def _blocks(lights, vector_type):
+    """Split lights into blocks that share one kernel: of one structure, with opaque numbers."""
+    alike = defaultdict(list)
+    for light in lights:
+        alike[_structure(light)].append(light)
+    for group in alike.values():
+        for begin in range(0, len(group), BLOCK):
+            yield _opaque(group[begin : begin + BLOCK], vector_type)
+
+
+def _structure(light):
+    """Return what decides on a light's instructions, apart from its numbers."""
+    return (
+        type(light),
+        is_unattenuated(getattr(light, "attenuation", UNATTENUATED)),
+        getattr(light, "clamped", False),
+        is_number(getattr(light, "exponent", None), 0),
+        colours.wavelength_count(light.intensity),
+    )
+
+
+def _opaque(lights, vector_type):
+    """Move the numbers of a block of lights out of the kernel's code, into one small array.
+
+    Which light comes from where in the array is the same for all blocks of a structure, and so is
+    the kernel.
+    """
+    values = [value for light in lights for value in _numbers(light).values()]
+    flat = [number for value in values for number in np.ravel(value)]
+    buffer = dr.leaf_t(vector_type)(flat)
+    dr.eval(buffer)
+    place = iter(range(len(flat)))
+
+    def fetch(value):
+        if isinstance(value, tuple):
+            return tuple(map(fetch, value))
+        return dr.gather(type(buffer), buffer, next(place))
+
+    def fetched(name, value):
+        fetched = fetch(value)
+        if name in ("position", "direction"):
+            return vector_type(fetched)
+        return colours.as_array(fetched, vector_type) if name == "intensity" else fetched
+
+    return [
+        replace(light, **{name: fetched(name, value) for name, value in _numbers(light).items()})
+        for light in lights
+    ]
+
+
+def _numbers(light):
+    """Return the fields of a light that are numbers, less those that its structure fixes."""
+    fixed = {"clamped"}
+    if is_unattenuated(getattr(light, "attenuation", UNATTENUATED)):
+        fixed.add("attenuation")
+    if is_number(getattr(light, "exponent", None), 0):
+        fixed.add("exponent")
+    given = {field.name: getattr(light, field.name) for field in fields(light)}
+    return {
+        name: value
+        for name, value in given.items()
+        if name not in fixed and all(isinstance(part, Real) for part in _parts(value))
+    }
+
+
+def _parts(value):
+    return value if isinstance(value, tuple) else (value,)

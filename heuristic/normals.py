@@ -1,0 +1,185 @@
+"""Normals of planes, triangles, implicit and parametric surfaces (chapter 6, section 6.5).
+
+Each function takes Dr.Jit arrays of three components, or the floats that they are made of, of any
+float type, and returns unit vectors of the same. A surface has no normal where its gradient
+vanishes or its tangents are parallel; the functions return the zero vector there, which receives no
+light, and never NaN. Two vectors count as parallel where the sine of the angle between them is at
+most :data:`PARALLEL_STEPS` rounding steps, because their own rounding can turn them by as much.
+
+Gradients and tangents are arguments, and are not derived from the surface's function by automatic
+differentiation: that needs a differentiable float type and a graph of its own inside the caller's
+kernel, while closed forms serve every float type and cost what they say.
+"""
+
+import drjit as dr
+from drjit import scalar
+
+from heuristic import vectors
+
+PARALLEL_STEPS = 4
+"""Edges and tangents carry half a rounding step in each component, their products as much again."""
+
+
+def plane_coefficients(normal, point):
+    """Equation 6.17: ``n.(p - p0) = 0``, the plane through ``p0`` with the normal ``n``.
+
+    Returns ``(a, b, c, d) = (n_x, n_y, n_z, -n.p0)``, the coefficients of 6.16.
+    """
+    return normal.x, normal.y, normal.z, -dr.dot(normal, point)
+
+
+def plane_normal(a, b, c):
+    """Equations 6.16, 6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
+
+    ``a``, ``b`` and ``c`` are Dr.Jit floats. Its side is that on which ``ax + by + cz + d > 0``.
+    Where all three are zero there is no plane, and ``n`` is zero.
+    """
+    return unit(_vector_type(a)(a, b, c))
+
+
+def triangle_normal(p0, p1, p2):
+    """Equation 6.19: ``n = (p1 - p0) x (p2 - p0) / |(p1 - p0) x (p2 - p0)|``.
+
+    It points to the side from which the vertices are seen in anticlockwise order. Another order
+    gives the opposite normal, exactly unless two edges are of one length. Collinear vertices give
+    the zero vector.
+    """
+    edges, _ = scaled_edges(p0, p1, p2)
+    return unit_cross(*shorter_edges(*edges))
+
+
+def implicit_normal(gradient):
+    """Equation 6.20: ``n = grad f / |grad f|`` of the surface ``f(x, y, z) = 0``.
+
+    It points to where ``f`` grows: outwards, where ``f`` is negative inside. At a point without a
+    gradient, such as the tip of a cone, it is zero.
+    """
+    return unit(gradient)
+
+
+def ellipsoid(position, a, b, c):
+    """Equation 6.21: ``f = x^2/a^2 + y^2/b^2 + z^2/c^2 - 1``, negative inside the ellipsoid."""
+    return dr.squared_norm(position / type(position)(a, b, c)) - 1
+
+
+def ellipsoid_gradient(position, a, b, c):
+    """Equation 6.22: ``grad f = (2x/a^2, 2y/b^2, 2z/c^2)`` of the ellipsoid of 6.21.
+
+    ``a``, ``b`` and ``c`` are its half axes: numbers or Dr.Jit floats, greater than 0.
+    """
+    axes = type(position)(a, b, c)
+    # Divided twice: the squares of small or large axes would leave the range of single precision.
+    return 2 * position / axes / axes
+
+
+def parametric_normal(tangent_u, tangent_v):
+    """Equations 6.23, 6.25: ``n = p_u x p_v / |p_u x p_v|`` of the surface ``p = p(u, v)``.
+
+    ``p_u`` and ``p_v`` are the derivatives of ``p`` by ``u`` and ``v``. Where they are parallel, or
+    one of them vanishes (as at the poles of 6.24), the normal is zero.
+    """
+    return unit_cross(tangent_u, tangent_v)
+
+
+def ellipsoid_point(u, v, a, b, c):
+    """Equation 6.24: ``p = (a cos v cos u, b cos v sin u, c sin v)``.
+
+    ``u`` is the longitude in ``[-pi, pi]`` and ``v`` the latitude in ``[-pi/2, pi/2]``, Dr.Jit
+    floats in radians. The chapter's own formula is lost; this choice makes ``p_u x p_v`` point
+    outwards.
+    """
+    sin_u, cos_u = dr.sincos(u)
+    sin_v, cos_v = _latitude(v)
+    return _vector_type(u)(a * cos_v * cos_u, b * cos_v * sin_u, c * sin_v)
+
+
+def ellipsoid_tangents(u, v, a, b, c):
+    """Return the derivatives of 6.24 by ``u`` and ``v``, for :func:`parametric_normal`.
+
+    ``p_u = (-a cos v sin u, b cos v cos u, 0)`` and ``p_v = (-a sin v cos u, -b sin v sin u, c cos
+    v)``. At the poles, ``v = +-pi/2`` to within rounding, ``p_u`` is exactly zero.
+    """
+    sin_u, cos_u = dr.sincos(u)
+    sin_v, cos_v = _latitude(v)
+    vector = _vector_type(u)
+    tangent_u = vector(-a * cos_v * sin_u, b * cos_v * cos_u, 0)
+    return tangent_u, vector(-a * sin_v * cos_u, -b * sin_v * sin_u, c * cos_v)
+
+
+def unit(vector):
+    """Return ``vector / |vector|``, and zero for zero, for lengths in the type's whole range."""
+    return vectors.normalise(_scaled(vector))
+
+
+def unit_cross(a, b):
+    """Return ``a x b / |a x b|``, and zero where the two are parallel or one is zero."""
+    a, b = _scaled(a), _scaled(b)
+    product = cross(a, b)
+    limit = dr.square(PARALLEL_STEPS * dr.epsilon(a))
+    is_turned = dr.squared_norm(product) > limit * dr.squared_norm(a) * dr.squared_norm(b)
+    return dr.select(is_turned, vectors.normalise(product), 0)
+
+
+def cross(a, b):
+    """Return ``a x b`` such that ``b x a`` is its exact opposite.
+
+    ``dr.cross`` fuses one product of each pair and rounds the other, so that two opposing faces
+    would not cancel.
+    """
+    return _vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x, type(a))
+
+
+def scaled_edges(p0, p1, p2):
+    """Return the edges ``p1 - p0, p2 - p1, p0 - p2`` over their largest component, and that."""
+    edges = (p1 - p0, p2 - p1, p0 - p2)
+    largest = dr.maximum(_largest(edges[0]), dr.maximum(_largest(edges[1]), _largest(edges[2])))
+    return tuple(_over(edge, largest) for edge in edges), largest
+
+
+def shorter_edges(a, b, c):
+    """Return two of the three edges of a closed triangle, in order, leaving out the longest.
+
+    Any two give the same cross product. In a needle the two long edges are nearly parallel, and
+    their product is lost to rounding, while the short one meets both at a large angle.
+    """
+    square_a, square_b, square_c = (dr.squared_norm(edge) for edge in (a, b, c))
+    omit_a = (square_a > square_b) & (square_a > square_c)
+    omit_b = ~omit_a & (square_b > square_c)
+    first = dr.select(omit_a, b, dr.select(omit_b, c, a))
+    second = dr.select(omit_a, c, dr.select(omit_b, a, b))
+    return first, second
+
+
+def _latitude(v):
+    """Return sine and cosine of a latitude, with a cosine of exactly 0 at the poles.
+
+    No float is pi/2; the cosine of the nearest is a rounding step that may well be negative, and
+    turns the normal inside out.
+    """
+    sine, cosine = dr.sincos(v)
+    return sine, dr.select(abs(cosine) > dr.epsilon(cosine), cosine, 0)
+
+
+def _scaled(vector):
+    """Return a vector over its largest component, so that its square cannot leave the range."""
+    return _over(vector, _largest(vector))
+
+
+def _over(vector, largest):
+    """Divide by the largest component; what is below the smallest normal float becomes zero.
+
+    The reciprocal of anything smaller is infinite.
+    """
+    is_normal = largest >= dr.smallest(type(largest))
+    return dr.select(is_normal, vector / dr.select(is_normal, largest, 1), 0)
+
+
+def _largest(vector):
+    return dr.maximum(abs(vector.x), dr.maximum(abs(vector.y), abs(vector.z)))
+
+
+def _vector_type(component):
+    """Return the type of three components of the given kind; plain numbers are of double precision."""
+    if dr.is_jit_v(component):
+        return dr.replace_shape_t(type(component), (3, -1))
+    return scalar.Array3f64
