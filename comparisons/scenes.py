@@ -35,7 +35,7 @@ class Scene:
 
     def source(self):
         """Return the scene for :func:`reference.pair`."""
-        return Source(self.name, self.make())
+        return Source(self.name, self.make)
 
 
 def builtin(name):

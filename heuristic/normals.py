@@ -117,7 +117,7 @@ def unit_cross(a, b):
     product = cross(a, b)
     limit = dr.square(PARALLEL_STEPS * dr.epsilon(a))
     is_turned = dr.squared_norm(product) > limit * dr.squared_norm(a) * dr.squared_norm(b)
-    return dr.select(is_turned, vectors.normalise(product), 0)
+    return vectors.normalise(dr.select(is_turned, product, type(a)(0)))
 
 
 def cross(a, b):
@@ -126,7 +126,7 @@ def cross(a, b):
     ``dr.cross`` fuses one product of each pair and rounds the other, so that two opposing faces
     would not cancel.
     """
-    return _vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x, type(a))
+    return type(a)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 def scaled_edges(p0, p1, p2):
@@ -144,7 +144,7 @@ def shorter_edges(a, b, c):
     """
     square_a, square_b, square_c = (dr.squared_norm(edge) for edge in (a, b, c))
     omit_a = (square_a > square_b) & (square_a > square_c)
-    omit_b = ~omit_a & (square_b > square_c)
+    omit_b = square_b > square_c  # asked where a stays
     first = dr.select(omit_a, b, dr.select(omit_b, c, a))
     second = dr.select(omit_a, c, dr.select(omit_b, a, b))
     return first, second
@@ -157,7 +157,7 @@ def _latitude(v):
     turns the normal inside out.
     """
     sine, cosine = dr.sincos(v)
-    return sine, dr.select(abs(cosine) > dr.epsilon(cosine), cosine, 0)
+    return sine, dr.select(abs(cosine) > dr.epsilon(_vector_type(v)), cosine, 0)
 
 
 def _scaled(vector):
@@ -170,8 +170,8 @@ def _over(vector, largest):
 
     The reciprocal of anything smaller is infinite.
     """
-    is_normal = largest >= dr.smallest(type(largest))
-    return dr.select(is_normal, vector / dr.select(is_normal, largest, 1), 0)
+    is_normal = largest >= dr.smallest(vector)
+    return dr.select(is_normal, vector / dr.select(is_normal, largest, 1), type(vector)(0))
 
 
 def _largest(vector):
@@ -179,7 +179,7 @@ def _largest(vector):
 
 
 def _vector_type(component):
-    """Return the type of three components of the given kind; plain numbers are of double precision."""
+    """Return the type of three such components: of double precision for plain numbers."""
     if dr.is_jit_v(component):
         return dr.replace_shape_t(type(component), (3, -1))
     return scalar.Array3f64

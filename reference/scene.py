@@ -4,7 +4,7 @@ Both halves of a pair are derived from one such graph. It comes from an XML file
 dictionary, and knows the file and line of each node, which is what error messages name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -50,13 +50,14 @@ class Source:
     name
         Name in reports and of the output folder.
     content
-        Path of a Mitsuba XML file, or a dictionary as ``mitsuba.load_dict`` takes it.
+        Path of a Mitsuba XML file, a dictionary as ``mitsuba.load_dict`` takes it, or a function
+        that returns one.
     parameters
         Values for the ``$name`` placeholders of an XML file.
     """
 
     name: str
-    content: str | PathLike | Mapping
+    content: str | PathLike | Mapping | Callable[[], Mapping]
     parameters: Mapping[str, str] = field(default_factory=dict)
 
     def parse(self):
@@ -70,10 +71,11 @@ class Source:
         """
         config = Parser.ParserConfig(mi.variant())
         try:
-            if isinstance(self.content, Mapping):
-                state = Parser.parse_dict(config, dict(self.content))
+            content = self.content() if callable(self.content) else self.content
+            if isinstance(content, Mapping):
+                state = Parser.parse_dict(config, dict(content))
             else:
-                path = Path(self.content)
+                path = Path(content)
                 if not path.is_file():
                     raise InputError(
                         f"{path}: there is no such file. Give a Mitsuba scene (.xml) or the name of"

@@ -4,6 +4,8 @@
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``ambient``         spectrum (0)        ``I_a`` of 8.2
+``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
+                                        chapters' model does not
 ``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
                                         nothing
 ==================  ==================  ===========================================================
@@ -21,6 +23,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from heuristic.materials import Material
+from heuristic.plugins.lights import FAR
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.shading import shade
 
@@ -34,6 +37,7 @@ def define():
         def __init__(self, props):
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
+            self.occlusion = props.get("occlusion", False)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
             si = scene.ray_intersect(ray, active)
@@ -44,7 +48,9 @@ def define():
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             lights = [emitter.light(si, hit) for emitter in _lights(scene)]
             ambient = self.ambient.eval(si, hit) if may_be_nonzero(self.ambient) else 0
-            colour = mi.Spectrum(shade(si.p, normal, -ray.d, material, lights, ambient))
+            visible = _shadow_test(scene, si, hit) if self.occlusion else None
+            colour = shade(si.p, normal, -ray.d, material, lights, ambient, visible)
+            colour = mi.Spectrum(colour)
             colour = dr.select(hit & (twosided | (si.wi.z > 0)), colour, 0)
             environment = scene.environment()
             if environment is not None and not self.hide_emitters:
@@ -112,6 +118,18 @@ class SceneMaterials:
 def _registry_index(shape):
     """Return the number under which Dr.Jit knows a shape, as found in ``si.shape``."""
     return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+
+
+def _shadow_test(scene, si, active):
+    """Return the test whether a light at some distance in some direction can be seen from ``si``."""
+
+
+    def visible(toward, distance):
+        # Mitsuba aims at a point for parallel light too, and grazing rays feel the difference.
+        distance = FAR if isinstance(distance, float) else distance
+        return ~scene.ray_test(si.spawn_ray_to(si.p + toward * distance), active)
+
+    return visible
 
 
 def _lights(scene):

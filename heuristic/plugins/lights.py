@@ -29,6 +29,10 @@ from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLight
 from heuristic.plugins.spectra import emitted
 
+FAR = 1e8
+"""Where shadow rays of parallel light end: outside any scene. Mitsuba does not tell a plugin in
+Python how large the scene is, and rays of this length still keep their direction to 1e-7."""
+
 KINDS = ("heuristic_point", "heuristic_spot", "heuristic_directional")
 
 
@@ -160,16 +164,11 @@ def define():
             super().__init__(props)
             self.direction = mi.Vector3f(props.get("direction", mi.ScalarVector3f(0, 0, 1)))
             self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
-            self.radius = mi.Float(1)
             dr.make_opaque(self.direction)
-
-        def set_scene(self, scene):
-            self.radius = mi.Float(dr.norm(scene.bbox().extents()))
 
         def sample_direction(self, it, sample, active=True):
             direction = -dr.normalize(self.direction)
-            distance = 2 * self.radius
-            ds = self._direction_sample(it, it.p + direction * distance, direction, distance)
+            ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
             return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
 
         def light(self, si, active=True):
