@@ -41,6 +41,9 @@ class Options:
         How roughplastic and phong are paired.
     viewing
         How linear values are looked at.
+    heuristic_variant
+        Variant of the heuristic half where it is not the current one, as for RGB shading against a
+        spectral reference.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class Options:
     resolution: tuple[int, int] | None = None
     convention: Convention = Convention.MATCHED
     viewing: Viewing = DEFAULT_VIEWING
+    heuristic_variant: str | None = None
 
     def __post_init__(self):
         if self.spp < 2:
@@ -108,26 +112,23 @@ def compare(source, options=None, progress=None, command=""):
     stages = _Stages()
     pair = halves.pair(source, options.convention, options.resolution)
     chosen = plan.plan(pair)
-    scenes = pair.heuristic.instantiate(), pair.physical.instantiate()
-    heuristic = rendering.Renderer(scenes[0], None, options.spp_of_a_pass, "heuristic image")
-    reference = rendering.Renderer(
-        scenes[1],
-        rendering.physical_integrator(chosen, pair.hide_emitters),
-        options.spp_of_a_pass,
-        "reference image",
-    )
+    physical = pair.physical.instantiate()
+    integrator = rendering.physical_integrator(chosen, pair.hide_emitters)
+    reference = rendering.Renderer(physical, integrator, options.spp_of_a_pass, "reference image")
+    heuristic = _heuristic_renderer(source, pair, options)
     stages.done("scene and pairing")
     estimates = _render(heuristic, reference, options, progress)
     stages.done("sums of passes", sum(heuristic.times) + sum(reference.times))
-    width, height = (int(side) for side in scenes[0].sensors()[0].film().crop_size())
-    surface = gbuffer(scenes[0], width, height)
+    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
+    surface = gbuffer(physical, width, height)
     stages.done("geometry")
     metrics, images = _measure(estimates, surface, options)
     stages.done("metrics")
 
     data = {
         "scene": source.name,
-        "variant": record.variant(),
+        "variant": reference.variant,
+        "heuristic_variant": heuristic.variant,
         "seed": options.seed,
         "resolution": [width, height],
         "plan": record.plan_data(
@@ -148,6 +149,15 @@ def compare(source, options=None, progress=None, command=""):
         "command": command,
     }
     return Comparison(data, images)
+
+
+def _heuristic_renderer(source, pair, options):
+    """Make the heuristic half ready to render, in its own variant if it has one."""
+    with rendering.variant(options.heuristic_variant or mi.variant()):
+        if options.heuristic_variant:
+            pair = halves.pair(source, options.convention, options.resolution)
+        scene = pair.heuristic.instantiate()
+        return rendering.Renderer(scene, None, options.spp_of_a_pass, "heuristic image")
 
 
 @dataclass(frozen=True)

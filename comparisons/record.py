@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from heuristic import __version__
@@ -85,11 +84,6 @@ def times_data(times):
         "total_s": times.total,
         "compile_s": times.compilation,
     }
-
-
-def variant():
-    """Return the name of the current Mitsuba variant."""
-    return mi.variant()
 
 
 def _plain(value):

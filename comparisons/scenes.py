@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import mitsuba as mi
 
+from comparisons import spectral_scenes
 from heuristic.errors import InputError
 from reference.scene import Source
 
@@ -27,11 +28,17 @@ THREE_LIGHTS = (
 
 @dataclass(frozen=True)
 class Scene:
-    """A built-in scene: a sentence on what it shows, and a function that makes its dictionary."""
+    """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
+
+    ``variant`` is the one that it needs, ``heuristic_variant`` that of the heuristic half if it is
+    another: RGB against the spectral reference.
+    """
 
     name: str
     title: str
     make: Callable[[], dict]
+    variant: str = "llvm_ad_rgb"
+    heuristic_variant: str | None = None
 
     def source(self):
         """Return the scene for :func:`reference.pair`."""
@@ -179,6 +186,19 @@ def _physical():
     yield Scene(
         "plastic-spheres", "Rough plastic from sharp to dull under a lamp", _plastic_spheres
     )
+    for name, title, make in (
+        (
+            "narrow-band-lamp",
+            "Coloured spheres under a sodium lamp: RGB against spectra",
+            spectral_scenes.narrow_band_lamp,
+        ),
+        (
+            "metameric-pair",
+            "Two surfaces of one colour in daylight, under lamplight: RGB against spectra",
+            spectral_scenes.metameric_pair,
+        ),
+    ):
+        yield Scene(name, title, make, "llvm_ad_spectral", "llvm_ad_rgb")
     yield Scene("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", _cornell_box)
 
 

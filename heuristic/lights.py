@@ -150,7 +150,10 @@ class SpotLight:
         )
 
     def illuminate(self, position):
-        """Return ``L`` (6.26) and the intensity of 6.4 (6.3 where ``m = 0``), as an Arrival."""
+        """Equation 6.3: ``I_0 f_att`` within the cone; times the fall-off of 6.4 where ``m > 0``.
+
+        Returns an :class:`Arrival`.
+        """
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         cos_axis = -dr.dot(vectors.normalise(vector_type(self.direction)), toward)

@@ -7,12 +7,12 @@ from heuristic.lighting import sum_lights
 
 
 def shade(position, normal, view, material, lights, ambient=0, visible=None):
-    """Equations 8.10, 6.11, 6.12: the sum of all terms over all lights.
+    """Equations 8.10-8.12, 6.11-6.15: the sum of all terms over all lights.
 
     ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
-    wavelength (8.11, 8.12, 6.13-6.15). Lights at or below the horizon (``N.L <= 0``) give neither
-    diffuse nor specular light. Only terms that can be other than zero are traced: a coefficient of
-    0, or an empty list of lights, leaves no instruction behind.
+    wavelength (8.11) or for RGB (8.12, 6.13-6.15). Lights at or below the horizon (``N.L <= 0``)
+    give neither diffuse nor specular light. Only terms that can be other than zero are traced: a
+    coefficient of 0, or an empty list of lights, leaves no instruction behind.
 
     Parameters
     ----------

@@ -23,20 +23,20 @@ def ambient(ambient_intensity, k_a):
 
 
 def diffuse(intensity, k_d, cos_incidence):
-    """Equations 8.5, 6.6: ``I = I_p k_d (N.L)`` for ``N.L > 0``, otherwise 0.
+    """Equations 8.5, 8.6, 6.6, 6.7: ``I = I_p k_d (N.L)`` for ``N.L > 0``, otherwise 0.
 
-    With ``intensity`` already attenuated this is also 8.6 and 6.7, ``I_p0 f_att k_d (N.L)``.
+    8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
     Lambert's law (8.3, 8.4) is why no view angle appears.
     """
     return intensity * k_d * dr.maximum(cos_incidence, 0)
 
 
 def specular(intensity, k_s, cos_reflection, n):
-    """Equations 8.8, 8.9, 6.8, 6.9: ``I = I_p k_s (R.V)^n``.
+    """Equations 8.8, 8.9, 6.8-6.10: ``I = I_p k_s (R.V)^n``.
 
-    With ``intensity`` already attenuated this is also 6.10. The limit of large ``n`` is the perfect
-    mirror of 8.7. The caller sees to the horizon (``N.L > 0``); the lobe itself ends where
-    ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
+    6.10 is the same for an ``intensity`` that is already attenuated. The limit of large ``n`` is
+    the perfect mirror of 8.7. The caller sees to the horizon (``N.L > 0``); the lobe itself ends
+    where ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
     """
     return intensity * k_s * power(cos_reflection, n)
 
@@ -91,10 +91,7 @@ def clamped_attenuation(distance, c1, c2, c3):
 
 
 def spot_cone(cos_axis, cos_cutoff):
-    """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it.
-
-    Times :func:`attenuation` this is 6.3.
-    """
+    """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it."""
     return dr.select(cos_axis >= cos_cutoff, 1.0, 0.0)
 
 

@@ -12,7 +12,13 @@ from reference.pairing import Convention, Phong
 from reference.scene import properties
 
 BSDF = mi.ObjectType.BSDF
-PAIRED = ("diffuse", "roughplastic", "phong", "twosided")
+COLOURS = {
+    "diffuse": ("reflectance",),
+    "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
+    "phong": ("k_i", "k_a", "k_d", "k_s"),
+    "twosided": (),
+}
+"""The BSDFs that can be paired, and their colours."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,12 @@ def check(graph):
     """
     for index in graph.nodes(BSDF):
         plugin = graph.plugin(index)
-        if plugin not in PAIRED:
+        if plugin not in COLOURS:
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: the BSDF {plugin!r} cannot be paired yet."
-                f" Known are {', '.join(PAIRED)}."
+                f" Known are {', '.join(COLOURS)}."
             )
+        values.check_colours(graph, index, COLOURS[plugin])
         if plugin == "twosided" and len(graph.children(index, BSDF)) != 1:
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: twosided with two different sides cannot be"

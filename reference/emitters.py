@@ -14,8 +14,16 @@ from reference.scene import properties
 EMITTER = mi.ObjectType.Emitter
 SHAPE = mi.ObjectType.Shape
 BSDF = mi.ObjectType.BSDF
-PAIRED = ("point", "directional", "area", "constant")
-HEURISTIC = ("heuristic_point", "heuristic_directional")
+COLOURS = {
+    "point": "intensity",
+    "directional": "irradiance",
+    "area": "radiance",
+    "constant": "radiance",
+    "heuristic_point": "intensity",
+    "heuristic_directional": "intensity",
+}
+"""The emitters that can be paired, and their colour."""
+
 FLATNESS = 0.5
 """A light whose mean normal is longer is treated as flat; a closed one has a mean normal of 0."""
 
@@ -40,13 +48,13 @@ def check(graph):
     InputError
         Naming the plugin and its place.
     """
-    known = (*PAIRED, *HEURISTIC)
     for index in graph.nodes(EMITTER):
-        if graph.plugin(index) not in known:
+        if graph.plugin(index) not in COLOURS:
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: the emitter {graph.plugin(index)!r} cannot be"
-                f" paired yet. Known are {', '.join(known)}."
+                f" paired yet. Known are {', '.join(COLOURS)}."
             )
+        values.check_colours(graph, index, (COLOURS[graph.plugin(index)],))
 
 
 def to_heuristic(graph, geometry, hide_emitters):
@@ -71,7 +79,6 @@ def to_heuristic(graph, geometry, hide_emitters):
             record = _directional_to_heuristic(graph, index)
         elif plugin == "constant":
             ambient = props.get("radiance", 1.0)
-            props["sampling_weight"] = 0.0  # seen by the camera, but not a light
             record = PairedEmitter(graph.label(index), plugin, "ambient", 1.0, True)
         else:
             continue

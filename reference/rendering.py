@@ -6,6 +6,7 @@ Passes differ in seed alone and are independent; samples within a pass are strat
 so that every standard error here comes from the spread of passes.
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
@@ -88,7 +89,7 @@ class Accumulator:
 
 
 class Renderer:
-    """One half of a pair, ready to render passes.
+    """One half of a pair, ready to render passes in the variant that it was made in.
 
     Parameters
     ----------
@@ -107,6 +108,7 @@ class Renderer:
         self.integrator = integrator or scene.integrator()
         self.spp = spp
         self.label = label
+        self.variant = mi.variant()
         self.times = []
         self.compilation = 0.0
 
@@ -118,7 +120,7 @@ class Renderer:
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
         """
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
             # An opaque seed lets all passes share one kernel.
@@ -148,6 +150,16 @@ class Renderer:
             compilation=self.compilation,
             passes=len(self.times),
         )
+
+
+@contextmanager
+def variant(name):
+    """Switch to a Mitsuba variant for the block, if it is not the current one already."""
+    if name == mi.variant():
+        yield
+        return
+    with mi.scoped_set_variant(name):
+        yield
 
 
 def physical_integrator(plan, hide_emitters):

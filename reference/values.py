@@ -39,6 +39,20 @@ def colour(graph, index, key, default):
     return components
 
 
+def check_colours(graph, index, keys):
+    """Refuse plain values that are negative or not finite; textures and spectra pass unread.
+
+    Raises
+    ------
+    InputError
+        Naming the parameter, its value and its place.
+    """
+    props = graph.props(index)
+    for key in keys:
+        if key in props and isinstance(props[key], (Real, *COLOURS)):
+            colour(graph, index, key, 0.0)
+
+
 def number(graph, index, key, default):
     """Return a parameter as a finite number.
 

@@ -42,8 +42,11 @@ def cli():
 
 def _rendering_options(command):
     options = (
-        click.option("--variant", default="llvm_ad_rgb", type=click.Choice(VARIANTS),
-                     show_default=True, help="Mitsuba variant."),
+        click.option("--variant", type=click.Choice(VARIANTS),
+                     help="Mitsuba variant. [default: the scene's own, else llvm_ad_rgb]"),
+        click.option("--heuristic-variant", type=click.Choice(VARIANTS),
+                     help="Variant of the heuristic half, where it is another: RGB shading against"
+                     " a spectral reference. [default: the scene's own, else that of --variant]"),
         click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
                      help="Seed of the first pass."),
         click.option("--spp", default=256, show_default=True, type=click.IntRange(min=2),
@@ -93,7 +96,6 @@ def compare(scenes, output, **rendering):
 @_rendering_options
 def report(output, **rendering):
     """Compare all built-in scenes and write one report."""
-    _set_variant(rendering["variant"])
     from comparisons.scenes import SCENES
 
     _compare(tuple(SCENES), output, rendering)
@@ -121,7 +123,7 @@ def doctor():
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        cli(standalone_mode=False)
+        cli(prog_name="fotismos", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("fotismos: interrupted; finished scenes are kept.", err=True)
         sys.exit(130)
@@ -134,17 +136,19 @@ def main():
 
 
 def _compare(names, folder, rendering):
-    options = _options(rendering)
+    _check_installation()
     from comparisons.compare import compare as run
+    from reference.scene import set_variant
     from reports import output, progress
 
     folder = output.prepare(folder)
-    sources = _sources(names)
+    jobs = [_job(name, rendering) for name in names]
     views = {}
     with progress.shown() as bar:
-        for source in sources:
+        for source, chosen in jobs:
             start_up = perf_counter() - START if not views else 0.0
-            result = run(source, options, bar.of(source.name), _command(source, rendering))
+            set_variant(chosen["variant"])
+            result = run(source, _options(chosen), bar.of(source.name), _command(source, chosen))
             begin = perf_counter()
             name = output.folder_name(source.name, views)
             views[name] = output.write_scene(folder, name, result)
@@ -161,9 +165,40 @@ def _compare(names, folder, rendering):
     click.echo(f"\n{folder / 'index.html'}")
 
 
+def _check_installation():
+    from heuristic import backend
+
+    backend.check()
+
+
+def _job(name, rendering):
+    """Find a scene, and complete the options with what it asks for.
+
+    All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
+    """
+    from comparisons.scenes import builtin
+    from reference.scene import Source
+
+    path = Path(name)
+    if path.suffix == ".xml" or path.exists():
+        if not path.is_file():
+            raise InputError(
+                f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
+                " built-in scene; `fotismos scenes` lists them."
+            )
+        source, variant, heuristic_variant = Source(path.stem, path), "llvm_ad_rgb", None
+    else:
+        scene = builtin(name)
+        source, variant, heuristic_variant = scene.source(), scene.variant, scene.heuristic_variant
+    if rendering["variant"] is not None:
+        # Somebody who names the variant means both halves, unless they name the other one too.
+        variant, heuristic_variant = rendering["variant"], None
+    heuristic_variant = rendering["heuristic_variant"] or heuristic_variant
+    return source, rendering | {"variant": variant, "heuristic_variant": heuristic_variant}
+
+
 def _options(rendering):
-    """Turn the command's options into those of a comparison, and set the variant."""
-    _set_variant(rendering["variant"])
+    """Turn the command's options into those of a comparison."""
     from comparisons.compare import Options
     from reference.pairing import Convention
 
@@ -172,44 +207,16 @@ def _options(rendering):
         spp=rendering["spp"],
         resolution=rendering["resolution"],
         convention=Convention(rendering["pairing"]),
+        heuristic_variant=rendering["heuristic_variant"],
     )
-
-
-def _set_variant(name):
-    from heuristic import backend
-
-    backend.check()
-    from reference.scene import set_variant
-
-    set_variant(name)
-
-
-def _sources(names):
-    """Find all scenes before anything is rendered, so that a typing mistake costs nothing."""
-    from comparisons.scenes import builtin
-    from reference.scene import Source
-
-    sources = []
-    for name in names:
-        path = Path(name)
-        if path.suffix == ".xml" or path.exists():
-            if not path.is_file():
-                raise InputError(
-                    f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
-                    " built-in scene; `fotismos scenes` lists them."
-                )
-            sources.append(Source(path.stem, path))
-        else:
-            sources.append(builtin(name).source())
-    return sources
 
 
 def _command(source, rendering):
     """Return the command that repeats one comparison."""
-    scene = source.name if isinstance(source.content, dict) else str(source.content)
+    scene = source.name if callable(source.content) else str(source.content)
     words = ["fotismos", "compare", scene]
     for key, value in rendering.items():
         if value is not None:
             text = "x".join(map(str, value)) if key == "resolution" else str(value)
-            words += [f"--{key}", text]
+            words += [f"--{key.replace('_', '-')}", text]
     return shlex.join(words)

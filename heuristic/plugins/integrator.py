@@ -121,8 +121,7 @@ def _registry_index(shape):
 
 
 def _shadow_test(scene, si, active):
-    """Return the test whether a light at some distance in some direction can be seen from ``si``."""
-
+    """Return the test whether a light in some direction, at some distance, is seen from ``si``."""
 
     def visible(toward, distance):
         # Mitsuba aims at a point for parallel light too, and grazing rays feel the difference.

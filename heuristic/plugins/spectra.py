@@ -5,6 +5,8 @@ from numbers import Real
 import drjit as dr
 import mitsuba as mi
 
+from heuristic import colours
+
 
 def coefficient(props, name):
     """Read a reflection coefficient, 0 where it is not given.
@@ -32,11 +34,11 @@ def emitted(props, name, default):
 def _plain(props, name, default):
     """Return a number's or colour's components, None for textures and tabulated spectra."""
     value = props.get(name, default)
-    if isinstance(value, Real):
-        return (float(value),)
-    if isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
-        return tuple(float(component) for component in value)
-    return None
+    if not isinstance(value, Real | mi.ScalarColor3f | mi.ScalarColor3d):
+        return None
+    components = (float(value),) if isinstance(value, Real) else tuple(map(float, value))
+    colours.checked(f"{props.plugin_name()}: {name}", components)
+    return components
 
 
 def may_be_nonzero(texture):
