@@ -27,12 +27,17 @@ class GBuffer:
     hit: np.ndarray
 
     def mean_irradiance(self, light_position, falloff):
-        """Return the mean of ``(N.L)+ falloff(d)`` over the surface, for a unit light."""
+        """Return the mean of ``(N.L)+ falloff(d, travel)`` over the surface, for a unit light.
+
+        ``travel`` holds the unit vectors from the light to the surface, (M, 3).
+        """
         offset = np.asarray(light_position) - self.position[self.hit]
         distance = np.linalg.norm(offset, axis=1)
         distance = np.where(distance > 0, distance, np.inf)
         cosine = np.sum(self.normal[self.hit] * offset, axis=1) / distance
-        return float(np.mean(np.maximum(cosine, 0) * falloff(distance))) if len(distance) else 0.0
+        travel = -offset / distance[:, None]
+        lit = np.maximum(cosine, 0) * falloff(distance, travel)
+        return float(np.mean(lit)) if len(distance) else 0.0
 
 
 def gbuffer(scene, width=GRID, height=GRID, sensor=0):

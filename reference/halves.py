@@ -12,7 +12,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from heuristic.plugins import register
-from reference import bsdfs, emitters, values
+from reference import bsdfs, emitters, to_heuristic, to_physical, values
 from reference.gbuffer import gbuffer
 from reference.pairing import Convention, Miss, phong_specular_albedo
 from reference.scene import Graph, properties
@@ -81,14 +81,14 @@ def pair(source, convention=Convention.MATCHED, resolution=None):
 
     heuristic = graph.copy()
     given_physical = bsdfs.to_heuristic(heuristic, convention)
-    lights, radiance = emitters.to_heuristic(heuristic, geometry, settings.hide_emitters)
+    lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(heuristic, ambient, settings.hide_emitters)
 
     physical = graph.copy()
-    lights += emitters.glowing_to_physical(physical)
+    lights += to_physical.add_glowing_shapes(physical)
     given_heuristic = bsdfs.to_physical(physical, convention)
-    lights += emitters.to_physical(physical, lambda: gbuffer(geometry()))
+    lights += to_physical.replace_lights(physical, lambda: gbuffer(geometry()))
     if settings.ambient is not None:
         lights.append(_add_environment(physical, graph, settings.ambient, convention))
 
