@@ -116,8 +116,13 @@ class Graph:
         InputError
             With Mitsuba's own message when a plugin refuses its parameters.
         """
+        state = Parser.ParserState(self.state)
+        for node in state.nodes:
+            for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
+                # Reading a value marks it as used, and would hide it from Mitsuba's check.
+                node.props.mark_queried(key, False)
         try:
-            made = Parser.instantiate(self.config, Parser.ParserState(self.state))
+            made = Parser.instantiate(self.config, state)
         except RuntimeError as error:
             raise InputError(f"{self.name}: {_message(error)}") from error
         return made[0] if isinstance(made, list) else made

@@ -1,0 +1,184 @@
+"""The command line: results, messages, exit codes; most of it inside this process, for speed."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from reports import cli
+
+ROOT = Path(__file__).parent.parent
+SCENE = """<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="perspective">
+    <transform name="to_world">
+      <lookat origin="0, -5, 2" target="0, 0, 0" up="0, 0, 1"/>
+    </transform>
+    <film type="hdrfilm">
+      <integer name="width" value="24"/><integer name="height" value="16"/>
+    </film>
+  </sensor>
+  <shape type="sphere">
+    <bsdf type="roughplastic">
+      <rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/><float name="alpha" value="0.2"/>
+    </bsdf>
+  </shape>
+  <shape type="rectangle">
+    <transform name="to_world"><translate z="-1"/><scale x="5" y="5"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"/></bsdf>
+  </shape>
+  <emitter type="point">
+    <point name="position" x="2" y="-3" z="4"/><rgb name="intensity" value="60"/>
+  </emitter>
+  <emitter type="constant"><rgb name="radiance" value="0.2"/></emitter>
+</scene>
+"""
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process; returns exit code, output and messages."""
+
+    def command(*words):
+        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as leaving:
+            code = leaving.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    path = tmp_path / "my scene.xml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
+    out = tmp_path / "out"
+    code, printed, messages = run("compare", scene_file, "fig-8-9", "-o", out, "--spp", 4)
+    assert (code, messages) == (0, "")
+    assert str(out / "index.html") in printed
+    schema = json.loads((ROOT / "reports/comparison.schema.json").read_text(encoding="utf-8"))
+    for name, scene, size in (("my-scene", "my scene", [24, 16]), ("fig-8-9",) * 2 + ([512, 512],)):
+        record = json.loads((out / name / "comparison.json").read_text(encoding="utf-8"))
+        jsonschema.validate(record, schema)
+        assert record["scene"] == scene
+        assert record["resolution"] == size
+        assert (out / name / "comparison.exr").stat().st_size > 0
+        assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
+    assert sorted(path.name for path in out.iterdir()) == ["fig-8-9", "index.html", "my-scene"]
+
+
+def test_the_recorded_command_repeats_the_result(run, scene_file, tmp_path):
+    options = ("--spp", 8, "--seed", 3, "--resolution", "20x12", "--pairing", "literal")
+    run("compare", scene_file, "-o", tmp_path / "a", *options)
+    first = json.loads((tmp_path / "a/my-scene/comparison.json").read_text(encoding="utf-8"))
+    words = shlex.split(first["command"])
+    assert words[0] == "fotismos"
+    run(*words[1:], "-o", tmp_path / "b")
+    second = json.loads((tmp_path / "b/my-scene/comparison.json").read_text(encoding="utf-8"))
+    assert second["metrics"] == first["metrics"]
+    assert second["command"] == first["command"]
+
+
+def _changed(old, new):
+    assert old in SCENE
+    return SCENE.replace(old, new)
+
+
+BAD_FILES = {
+    "malformed": (SCENE[:300], r"line \d+|byte offset \d+"),
+    "no scene": ("<bsdf version='3.0.0' type='diffuse'/>", "must be a scene"),
+    "unknown BSDF": (_changed("roughplastic", "roughplastik"), r"roughplastik.*line 12.*Known are"),
+    "BSDF without a pair": (
+        _changed('type="diffuse"', 'type="conductor"'),
+        r"conductor.*Known are",
+    ),
+    "emitter without a pair": (_changed('type="constant"', 'type="envmap"'), r"envmap.*Known are"),
+    "negative reflectance": (_changed("0.2, 0.3, 0.5", "-0.2, 0.3, 0.5"), r"-0\.2.*0 or more"),
+    "NaN": (_changed('name="alpha" value="0.2"', 'name="alpha" value="nan"'), r"alpha = nan"),
+    "no sensor": (re.sub("<sensor.*</sensor>", "", SCENE, flags=re.DOTALL), "no sensor"),
+    "unknown parameter": (_changed('name="alpha"', 'name="alhpa"'), "alhpa"),
+    "broken reference": (_changed('<bsdf type="diffuse"/>', '<ref id="nix"/>'), "nix"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_scene_that_cannot_be_used_is_refused_in_one_message(name, run, tmp_path):
+    content, expected = BAD_FILES[name]
+    path = tmp_path / "scene.xml"
+    path.write_text(content, encoding="utf-8")
+    code, printed, messages = run("compare", path, "-o", tmp_path / "out", "--spp", 2)
+    assert code == 2
+    assert printed == ""
+    assert messages.startswith("fotismos: error: scene: ")
+    assert re.search(expected, messages)
+    assert "Traceback" not in messages
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nix.xml",), r"nix\.xml: there is no such file"),
+        (("fig-9-9",), r"'fig-9-9' is neither .*fig-8-9"),
+        (("fig-8-9", "--resolution", "0x5"), "at least 1"),
+        (("fig-8-9", "--resolution", "big"), "write it like 512x512"),
+        (("fig-8-9", "--variant", "cuda_rgb"), "llvm_ad_rgb"),
+        (("fig-8-9", "--spp", "1"), "range"),
+        (("fig-8-9", "--pairing", "fit"), "literal"),
+        ((), "Missing argument"),
+    ],
+)
+def test_bad_words_are_refused(words, expected, run, tmp_path):
+    code, _, messages = run("compare", *words, "-o", tmp_path / "out")
+    assert code == 2
+    assert re.search(expected, messages)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_rendering(run, tmp_path):
+    (tmp_path / "file").write_text("")
+    code, _, messages = run("compare", "fig-8-9", "-o", tmp_path / "file" / "out")
+    assert code == 2
+    assert "output folder" in messages
+
+
+def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    run("compare", scene_file, "-o", out, "--spp", 4)
+    before = (out / "my-scene/comparison.json").read_bytes()
+
+    def fail(*_args, **_kwargs):
+        raise RuntimeError("the disk is full")
+
+    monkeypatch.setattr("reports.exr.write", fail)
+    with pytest.raises(RuntimeError, match="disk"):
+        run("compare", scene_file, "-o", out, "--spp", 4, "--seed", 1)
+    assert (out / "my-scene/comparison.json").read_bytes() == before
+    assert sorted(path.name for path in out.iterdir()) == ["index.html", "my-scene"]
+
+
+def test_scenes_lists_every_figure(run):
+    code, printed, _ = run("scenes")
+    assert code == 0
+    for figure in ("8-5a", "8-6b", "8-7c", "8-8a", "8-9", "8-11-n9", "8-11-n3"):
+        assert f"fig-{figure} " in printed
+
+
+def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
+    words = [sys.executable, "-m", "reports", "compare", scene_file, "-o", "out", "--spp", "2"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out/index.html").is_file()
