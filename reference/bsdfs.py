@@ -122,9 +122,9 @@ def _phong_properties(graph, index, convention):
         reflectance = given.get("reflectance", 0.5)
         props = properties("phong", k_a=reflectance, k_d=reflectance)
         return props, PairedBSDF(graph.label(index), "diffuse", "phong", {"k_d": "reflectance"})
-    phong, misses = _phong_of(_roughplastic(graph, index), convention)
-    props = properties("phong", k_a=phong.k_d, k_d=phong.k_d, k_s=phong.k_s, n=phong.n)
-    record = PairedBSDF(graph.label(index), "roughplastic", "phong", asdict(phong), tuple(misses))
+    found, misses = _phong_of(_roughplastic(graph, index), convention)
+    props = properties("phong", k_a=found.k_d, **asdict(found))
+    record = PairedBSDF(graph.label(index), "roughplastic", "phong", asdict(found), tuple(misses))
     return props, record
 
 
@@ -140,9 +140,7 @@ def _physical_properties(graph, index, convention):
         props = properties("diffuse", reflectance=reflectance)
         record = PairedBSDF(graph.label(index), "phong", "diffuse", {"reflectance": source})
     else:
-        k_d = values.colour(graph, index, "k_d", 0.0)
-        n = values.number(graph, index, "n", 1.0)
-        plastic, misses = _roughplastic_of(Phong(k_d, k_s, n), convention)
+        plastic, misses = _roughplastic_of(phong(graph, index), convention)
         props = properties("roughplastic", **asdict(plastic))
         record = PairedBSDF(
             graph.label(index), "phong", "roughplastic", asdict(plastic), tuple(misses)
@@ -150,6 +148,24 @@ def _physical_properties(graph, index, convention):
     if given.get("twosided"):
         props["twosided"] = True
     return props, record
+
+
+def phong(graph, index):
+    """Read the parameters of a ``phong``, with the plugin's defaults.
+
+    Raises
+    ------
+    InputError
+        When a coefficient is a texture or a tabulated spectrum, or not allowed.
+    """
+    props = graph.props(index)
+    return Phong(
+        k_d=values.colour(graph, index, "k_d", 0.0),
+        k_s=values.colour(graph, index, "k_s", 0.0),
+        n=values.number(graph, index, "n", 1.0),
+        form=props.get("form", "phong"),
+        normalised=props.get("normalised", False),
+    )
 
 
 def _roughplastic(graph, index):

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import mitsuba as mi
+import numpy as np
 
 from heuristic.errors import InputError
 from heuristic.plugins import register
 from reference import bsdfs, emitters, to_heuristic, to_physical, values
 from reference.gbuffer import gbuffer
-from reference.pairing import Convention, Miss, phong_specular_albedo
+from reference.pairing import Convention, Miss, specular_albedo
 from reference.scene import Graph, properties
 
 BSDF, EMITTER, FILM, INTEGRATOR, SENSOR, SHAPE = (
@@ -232,13 +233,12 @@ def _energy_warnings(graph):
     """Name the materials that reflect more light than they receive at normal incidence."""
     for index in _phongs(graph):
         try:
-            k_d, k_s = (values.colour(graph, index, key, 0.0) for key in ("k_d", "k_s"))
+            material = bsdfs.phong(graph, index)
         except InputError:
             continue  # a texture; its values are not known here
-        n = values.number(graph, index, "n", 1.0)
-        reflected = max(d + s for d, s in zip(k_d, phong_specular_albedo(k_s, n), strict=True))
+        reflected = max(np.add(material.k_d, specular_albedo(material)))
         if reflected > 1 + 1e-6:
             yield (
                 f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives"
-                " at normal incidence (k_d + 2 k_s / (n + 2)): no physical material does."
+                " at normal incidence (k_d and the lobe's albedo): no physical material does."
             )

@@ -37,6 +37,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar, root_scalar
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from heuristic.terms import normalisation
 from reference import albedo
 from reference.albedo import Albedo, RoughPlastic
 
@@ -57,14 +58,13 @@ class Convention(Enum):
     """How roughplastic and phong are paired.
 
     ``LITERAL``
-        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))``, IOR 1.5. The
-        other way the name ``specular_reflectance`` gives ``k_s``.
+        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))`` whatever the
+        form of the lobe, IOR 1.5. The other way the name ``specular_reflectance`` gives ``k_s``.
     ``MATCHED``
         By albedo at normal incidence (light along the normal, light leaving in all directions):
         ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
-        part's is ``2 k_s / (n + 2)``, and ``alpha`` as above. Phong's lobe sends the radiance
-        ``k_s cos^n / pi`` for unit irradiance, hence the albedo ``(k_s / pi) 2 pi int cos^n cos sin
-        d(theta) = 2 k_s / (n + 2)``.
+        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe has the
+        same width (:func:`alpha_of`).
     """
 
     LITERAL = "literal"
@@ -73,11 +73,13 @@ class Convention(Enum):
 
 @dataclass(frozen=True)
 class Phong:
-    """Coefficients and exponent of a phong material; three components a coefficient."""
+    """Coefficients, exponent and form of a phong material; three components a coefficient."""
 
     k_d: tuple[float, float, float]
     k_s: tuple[float, float, float]
     n: float
+    form: str = "phong"
+    normalised: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,32 +91,45 @@ class Miss:
     reached: float
 
 
-def alpha_of(n):
-    """Return the roughness ``alpha = sqrt(2 / (n + 2))`` that stands for Phong's exponent."""
-    return sqrt(2 / (n + 2))
+def alpha_of(n, form="phong"):
+    """Return the roughness whose microfacet lobe is as wide as a lobe of exponent ``n``.
+
+    At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
+    ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
+    chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
+    the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
+    1))``. Both forms are 1 at ``n = 0``.
+    """
+    return sqrt(2 / (n + 2)) if form == "blinn" else sqrt(1 / (2 * n + 1))
 
 
-def exponent_of(alpha):
-    """Return the exponent ``n = 2 / alpha^2 - 2`` that stands for a roughness; 0 from 1 upwards."""
-    return max(2 / alpha**2 - 2, 0.0)
+def exponent_of(alpha, form="phong"):
+    """Return the inverse of :func:`alpha_of`; 0 from ``alpha = 1`` upwards."""
+    return max(2 / alpha**2 - 2 if form == "blinn" else (1 / alpha**2 - 1) / 2, 0.0)
 
 
-def phong_specular_albedo(k_s, n):
-    """Return ``2 k_s / (n + 2)``, the lobe's albedo at normal incidence."""
-    return 2 * np.asarray(k_s) / (n + 2)
+def specular_albedo(phong):
+    """Return the albedo of a phong's lobe at normal incidence, for each channel.
+
+    ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
+    irradiance, hence ``(k_s / pi) 2 pi int cos^n cos sin d(theta)``. In general it is ``k_s`` over
+    :func:`heuristic.terms.normalisation`, and ``k_s`` itself where the lobe is normalised.
+    """
+    scale = 1.0 if phong.normalised else 1 / normalisation(phong.form, phong.n)
+    return np.asarray(phong.k_s) * scale
 
 
 def to_roughplastic(phong, convention):
     """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses."""
-    alpha = alpha_of(phong.n)
     if convention is Convention.LITERAL:
         rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
-        return RoughPlastic(rho, alpha, LITERAL_IOR), misses
+        return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
+    alpha = alpha_of(phong.n, phong.form)
     strength = max(phong.k_s)
     tint = tuple(k_s / strength for k_s in phong.k_s)
     white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
-    wanted = Albedo(np.array(phong.k_d), phong_specular_albedo(phong.k_s, phong.n))
+    wanted = Albedo(np.array(phong.k_d), specular_albedo(phong))
     int_ior = _ior_for(white, max(wanted.specular))
     passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
     if any(wanted.diffuse > passed):
@@ -127,11 +142,12 @@ def to_roughplastic(phong, convention):
 
 def to_phong(plastic, convention):
     """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses."""
-    n = exponent_of(plastic.alpha)
     if convention is Convention.LITERAL:
+        n = exponent_of(plastic.alpha, "blinn")
         return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n), []
+    n = exponent_of(plastic.alpha)
     reflected = albedo.of_roughplastic(plastic)
-    k_s = reflected.specular * (n + 2) / 2
+    k_s = reflected.specular * normalisation("phong", n)
     return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
 
 
