@@ -97,6 +97,8 @@ def corner_angles(p0, p1, p2):
 
 def _weighted(positions, faces, weights):
     """Sum the faces' normals at each vertex; ``weights`` maps corners to a weight for each."""
+    if dr.width(faces) == 0:
+        return dr.zeros(type(positions), dr.width(positions))
     corners = [dr.gather(type(positions), positions, faces[corner]) for corner in range(3)]
     normals = triangle_normal(*corners)
     has_area = dr.squared_norm(normals) > 0

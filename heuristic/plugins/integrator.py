@@ -21,6 +21,7 @@ equal seeds give equal rays. Python::
 import drjit as dr
 import mitsuba as mi
 
+from heuristic import terms
 from heuristic.errors import InputError
 from heuristic.materials import Material
 from heuristic.plugins.lights import FAR
@@ -42,15 +43,17 @@ def define():
         def sample(self, scene, sampler, ray, medium=None, active=True):
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
-            material, twosided = SceneMaterials(scene).at(si, hit)
+            materials, twosided = SceneMaterials(scene).at(si, hit)
             normal = mi.Vector3f(si.sh_frame.n)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             lights = [emitter.light(si, hit) for emitter in _lights(scene)]
             ambient = self.ambient.eval(si, hit) if may_be_nonzero(self.ambient) else 0
             visible = _shadow_test(scene, si, hit) if self.occlusion else None
-            colour = shade(si.p, normal, -ray.d, material, lights, ambient, visible)
-            colour = mi.Spectrum(colour)
+            colour = mi.Spectrum(0)
+            for material, is_here in materials:
+                value = shade(si.p, normal, -ray.d, material, lights, ambient, visible)
+                colour += dr.select(is_here, value, 0)
             colour = dr.select(hit & (twosided | (si.wi.z > 0)), colour, 0)
             environment = scene.environment()
             if environment is not None and not self.hide_emitters:
@@ -92,27 +95,49 @@ class SceneMaterials:
         self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
 
     def at(self, si, active):
-        """Return the material at a surface interaction and whether it is two-sided."""
+        """Return the materials at a surface interaction, and whether the surface is two-sided.
+
+        The materials are pairs of a :class:`Material` and a mask of where it holds: one pair for
+        each form of the lobe that the scene has, since the form decides on the kernel's code.
+        """
         if len(self.bsdfs) == 1:
-            return self.bsdfs[0].material(si, active), self.bsdfs[0].twosided
-        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+            (bsdf,) = self.bsdfs
+            return [(bsdf.material(si, active), True)], bsdf.twosided
         index = dr.gather(
             mi.UInt32, mi.UInt32(self.table), dr.reinterpret_array(mi.UInt32, si.shape), active
         )
-
-        def reader(bsdf):
-            def read(si, active):
-                material = bsdf.material(si, active)
-                values = [mi.Spectrum(getattr(material, name)) for name in present]
-                return (*values, mi.Float(material.n), mi.Bool(bsdf.twosided))
-
-            return read
-
-        readers = [reader(bsdf) for bsdf in self.bsdfs]
-        *values, n, twosided = dr.switch(index, readers, si, active)
+        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+        readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
+        *values, n, is_blinn, twosided = dr.switch(index, readers, si, active)
         if not any(bsdf.twosided for bsdf in self.bsdfs):
             twosided = False
-        return Material(**dict(zip(present, values, strict=True)), n=n), twosided
+        forms = {bsdf.form for bsdf in self.bsdfs}
+        coefficients = dict(zip(present, values, strict=True))
+        return [
+            (
+                Material(**coefficients, n=n, form=form),
+                len(forms) == 1 or is_blinn == (form == "blinn"),
+            )
+            for form in sorted(forms)
+        ], twosided
+
+
+def _reader(bsdf, present):
+    """Return the function that reads one BSDF's coefficients, normalisation applied."""
+
+    def read(si, active):
+        material = bsdf.material(si, active)
+        values = {name: mi.Spectrum(getattr(material, name)) for name in present}
+        if bsdf.normalised and "k_s" in values:
+            values["k_s"] *= terms.normalisation(bsdf.form, bsdf.n)
+        return (
+            *values.values(),
+            mi.Float(bsdf.n),
+            mi.Bool(bsdf.form == "blinn"),
+            mi.Bool(bsdf.twosided),
+        )
+
+    return read
 
 
 def _registry_index(shape):

@@ -1,0 +1,154 @@
+"""Lights in scenes with occluders, by the thousands, and against closed forms."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import heuristic
+from heuristic import lighting
+from tests import checks, oracle
+
+COLOUR = {"type": "rgb", "value": (1.0, 0.8, 0.6)}
+PLACE = {"position": (-4.24, -1, 3), "intensity": COLOUR}
+AXIS = {"direction": (4.24, 1, -3)}
+LIGHTS = {
+    "point": {"type": "heuristic_point", **PLACE},
+    "attenuated point": {"type": "heuristic_point", **PLACE, "k0": 0.5, "k1": 0.1, "k2": 0.05},
+    "clamped point": {
+        "type": "heuristic_point", **PLACE, "k0": 0.1, "k2": 0.02, "clamped": True
+    },
+    "directional": {"type": "heuristic_directional", **AXIS, "intensity": COLOUR},
+    "spot": {"type": "heuristic_spot", **PLACE, **AXIS, "cutoff": 20.0},
+    "fading spot": {
+        "type": "heuristic_spot", **PLACE, **AXIS, "cutoff": 20.0, "exponent": 5.0, "k2": 0.05
+    },
+}  # fmt: skip
+
+
+def with_occluders(light, occlusion=True, **sphere):
+    """A sphere and a small ball over a floor, each of another material."""
+    bsdf = {"type": "phong", "k_d": {"type": "rgb", "value": (0.5, 0.3, 0.2)}, "k_s": 0.4, "n": 9}
+    to_world = mi.ScalarTransform4f()
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic", "occlusion": occlusion},
+        "sensor": {
+            "type": "perspective",
+            "fov": 45.0,
+            "to_world": to_world.look_at((-3, 0, 1), (0, 0, 0), (0, 0, 1)),
+            "film": {"type": "hdrfilm", "rfilter": {"type": "box"}},
+        },
+        "sphere": {"type": "sphere", "bsdf": {**bsdf, **sphere}},
+        "ball": {
+            "type": "sphere",
+            "center": (-1.5, -0.8, 0.6),
+            "radius": 0.4,
+            "bsdf": {"type": "phong", "k_d": 0.2, "k_s": 0.5, "n": 3},
+        },
+        "floor": {
+            "type": "rectangle",
+            "to_world": to_world.translate((0, 0, -1)).scale(5),
+            "bsdf": {"type": "phong", "k_d": 0.5, "k_s": 0.2, "n": 20},
+        },
+        "light": light,
+    }
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_kernel_and_plugins_agree_on_every_pixel_with_occluders(variant, light):
+    scene = checks.with_film(with_occluders(LIGHTS[light]), 128, 9)
+    kernel = checks.render(scene, 9, 3)
+    direct = checks.render(scene, 9, 3, {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
+    assert (direct[64:, 32:96] == 0).any(), "there should be a shadow to disagree on"
+    oracle.require_close(kernel, direct, relative=1e-5, absolute=2.0**-23)
+
+
+@pytest.mark.parametrize(
+    "lobe", [{"form": "blinn"}, {"form": "blinn", "normalised": True}, {"normalised": True}]
+)
+def test_so_they_do_for_the_other_lobes(rgb, lobe):
+    scene = checks.with_film(with_occluders(LIGHTS["point"], **lobe), 96, 9)
+    kernel = checks.render(scene, 9, 3)
+    direct = checks.render(scene, 9, 3, {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
+    oracle.require_close(kernel, direct, relative=1e-5, absolute=2.0**-23)
+
+
+def test_without_occlusion_there_are_no_shadows(rgb):
+    scenes = (with_occluders(LIGHTS["point"], occlusion) for occlusion in (True, False))
+    shadowed, lit = (checks.render(checks.with_film(scene, 64, 4), 4, 1) for scene in scenes)
+    assert (lit >= shadowed).all()
+    assert lit.mean() > 1.02 * shadowed.mean()
+
+
+def many(count, seed=1):
+    """Point, spot and directional lights in no order, of intensities that differ a thousandfold."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for number in range(count):
+        position, direction = rng.normal(size=(2, 3))
+        intensity = tuple(10.0 ** rng.uniform(-3, 0, 3))
+        attenuation = [(1, 0, 0), (0.5, 0.1, 0.2)][number % 2]
+        kind = number % 3
+        if kind == 0:
+            light = oracle.Light("point", intensity, tuple(4 * position), attenuation=attenuation)
+        elif kind == 1:
+            light = oracle.Light("directional", intensity, direction=tuple(direction))
+        else:
+            light = oracle.Light(
+                "spot", intensity, tuple(4 * position), tuple(direction), 60.0, float(number % 4),
+                attenuation,
+            )  # fmt: skip
+        made.append(light)
+    return made
+
+
+@pytest.mark.parametrize("count", [lighting.BLOCK, lighting.BLOCK + 1, 150])
+def test_any_number_of_lights_adds_up(count):
+    points, lights = checks.random_points(4000), many(count)
+    arrays = (points.position, points.normal, points.view)
+    material = {"k_a": 0.1, "k_d": (0.5, 0.4, 0.1), "k_s": 0.7, "n": 9}
+    expected = oracle.shade(*arrays, oracle.Material(**material), lights, 0.5)
+    away = ~oracle.near_an_edge(points.position, points.normal, lights, 1e-6)
+    for vector_type, tolerance in ((dr.llvm.Array3f64, 1e-12), (dr.llvm.Array3f, 4e-6)):
+        found = heuristic.shade(
+            *(vector_type(array.T) for array in arrays),
+            heuristic.Material(**material),
+            [checks.kernel_light(light) for light in lights],
+            0.5,
+        )
+        largest = np.abs(expected).max()
+        oracle.require_close(
+            checks.as_rows(found), expected, absolute=tolerance * largest, where=away
+        )
+
+
+def test_blocks_of_lights_share_their_kernels(kernel_history):
+    points = checks.random_points(1000)
+    arrays = [dr.llvm.Array3f(v.T) for v in (points.position, points.normal, points.view)]
+    dr.eval(arrays)
+    rng = np.random.default_rng(2)
+    material = heuristic.Material(k_d=0.5, k_s=0.3, n=5)
+
+    def kernels(count):
+        lights = [
+            heuristic.PointLight(tuple(map(float, rng.normal(size=3))), 1.0) for _ in range(count)
+        ]
+        history = kernel_history(lambda: heuristic.shade(*arrays, material, lights))
+        return {kernel["hash"] for kernel in history}
+
+    few, more = kernels(4 * lighting.BLOCK), kernels(16 * lighting.BLOCK)
+    assert few == more
+    assert len(few) <= 3, "one for the first block, one for those after it, one for the total"
+
+
+def test_many_lights_pass_gradients():
+    position = dr.llvm.ad.Array3f([0, 0.5], [0, 0.1], [0, 0.2])
+    k_d = dr.llvm.ad.Float(0.5)
+    dr.enable_grad(k_d)
+    lights = [heuristic.PointLight((x, 1.0, 3.0), 0.1) for x in np.linspace(-1, 1, 20)]
+    up = dr.llvm.ad.Array3f(0, 0, 1)
+    value = heuristic.shade(position, up, up, heuristic.Material(k_d=k_d), lights)
+    dr.backward(dr.sum(value))
+    assert dr.grad(k_d)[0] == pytest.approx(dr.sum(value)[0] / 0.5, rel=1e-5)

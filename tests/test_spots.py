@@ -1,0 +1,76 @@
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from reference import spots
+from reference.halves import pair
+from reference.scene import Source
+
+
+def solid_angle_error(cutoff, exponent, beam_width):
+    """Mean square difference over the cone, by another quadrature: uniform in the cosine."""
+    cosine = np.linspace(np.cos(np.radians(cutoff)), 1, 20_001)
+    theta = np.degrees(np.arccos(cosine))
+    power = np.where(cosine > 0, cosine, 0) ** exponent
+    linear = np.clip((cutoff - theta) / (cutoff - beam_width), 0, 1)
+    return np.mean((power - linear) ** 2)
+
+
+@pytest.mark.parametrize(("cutoff", "beam_width"), [(20, 15), (20, 1), (45, 30), (80, 10)])
+def test_no_other_exponent_fits_better(cutoff, beam_width):
+    m = spots.exponent_for(cutoff, beam_width)
+    best = solid_angle_error(cutoff, m, beam_width)
+    for other in m * np.array([0.5, 0.9, 1.1, 2.0]):
+        assert solid_angle_error(cutoff, other, beam_width) > best
+
+
+@pytest.mark.parametrize(("cutoff", "exponent"), [(20, 10), (30, 3), (60, 8), (85, 2)])
+def test_no_other_beam_width_fits_better(cutoff, exponent):
+    beam_width = spots.beam_width_for(cutoff, exponent)
+    best = solid_angle_error(cutoff, exponent, beam_width)
+    for other in np.linspace(0, 0.999 * cutoff, 40):
+        assert solid_angle_error(cutoff, exponent, other) >= best * (1 - 1e-6)
+
+
+def test_an_even_cone_is_a_beam_as_wide_as_the_cone():
+    assert spots.beam_width_for(30, 0) == pytest.approx(30, rel=1e-3)
+    assert spots.exponent_for(30, 29.99) == pytest.approx(0, abs=1e-2)
+
+
+def test_mitsubas_spot_falls_off_as_the_fit_believes(rgb):
+    light = mi.load_dict({"type": "spot", "intensity": 1.0, "cutoff_angle": 40, "beam_width": 10})
+    theta = np.linspace(0, 50, 101)
+    it = mi.SurfaceInteraction3f()
+    angle = mi.Float(np.radians(theta))
+    it.p = mi.Point3f(dr.sin(angle), 0, dr.cos(angle))
+    _, weight = light.sample_direction(it, mi.Point2f(0.5))
+    assert np.array(weight)[0] == pytest.approx(spots.linear_falloff(theta, 40, 10), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["spot", "heuristic_spot"])
+def test_spots_pair_both_ways(rgb, name):
+    to_world = mi.ScalarTransform4f().look_at((1, 2, 3), (0, 0, 0), (0, 0, 1))
+    given = {
+        "spot": {"type": "spot", "to_world": to_world, "intensity": 20.0, "cutoff_angle": 25.0},
+        "heuristic_spot": {
+            "type": "heuristic_spot", "position": (1, 2, 3), "direction": (-1, -2, -3),
+            "intensity": 20.0, "cutoff": 25.0, "exponent": 30.0, "k0": 0.0, "k2": 1.0,
+        },
+    }[name]  # fmt: skip
+    scene = {
+        "type": "scene",
+        "sensor": {"type": "perspective"},
+        "wall": {"type": "rectangle", "bsdf": {"type": "diffuse"}},
+        "light": given,
+    }
+    made = pair(Source("spots", scene))
+    point = mi.SurfaceInteraction3f()
+    point.p = mi.Point3f(0, 0, 0)
+    heuristic, physical = (
+        half.instantiate().emitters()[0].sample_direction(point, mi.Point2f(0.5))[1][0][0]
+        for half in (made.heuristic, made.physical)
+    )
+    # On the axis both fall-offs are 1, so that the factor pi between the two is all there is.
+    assert heuristic == pytest.approx(physical, rel=1e-5)
+    assert not made.emitters[0].exact
