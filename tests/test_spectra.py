@@ -1,0 +1,71 @@
+"""Wavelengths: what three numbers a colour cannot say, and what the spectral variant does."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons import spectral_scenes
+from comparisons.compare import Options, compare
+from comparisons.scenes import SCENES
+
+
+def xyz(spectrum, illuminant):
+    """Tristimulus values on the scenes' own grid of wavelengths, by a plain sum."""
+    matching = np.array(mi.cie1931_xyz(mi.Float(spectral_scenes.WAVELENGTHS)))
+    return matching @ (spectrum * illuminant)
+
+
+def test_metamers_have_one_colour_in_daylight_and_two_under_a_lamp(rgb):
+    plain, other = spectral_scenes.metamers()
+    wavelengths = spectral_scenes.WAVELENGTHS
+    daylight = np.array(mi.cie_d65(mi.Float(wavelengths)))
+    assert xyz(other, daylight) == pytest.approx(xyz(plain, daylight), rel=1e-5)
+    metres = wavelengths * 1e-9
+    lamp = metres**-5 / np.expm1(6.62607e-34 * 2.99792e8 / (1.380649e-23 * metres * 2848))
+    assert np.abs(xyz(other, lamp) / xyz(plain, lamp) - 1).max() > 0.02
+    for reflectance in (plain, other):
+        assert reflectance.min() > 0
+        assert reflectance.max() < 1
+
+
+def test_rgb_cannot_tell_metamers_apart_and_spectra_can(rgb):
+    def colours(variant):
+        mi.set_variant(variant)
+        result = compare(SCENES["metameric-pair"].source(), Options(spp=64, resolution=(64, 36)))
+        image, counted = result.images.heuristic, result.images.counted
+        halves = np.arange(64) < 32
+        return [image[counted & side].mean(axis=0) for side in (halves, ~halves)]
+
+    plain, other = colours("llvm_ad_rgb")
+    assert other / other.sum() == pytest.approx(plain / plain.sum(), rel=1e-3)
+    plain, other = colours("llvm_ad_spectral")
+    assert np.abs(other / other.sum() - plain / plain.sum()).max() > 0.01
+
+
+def test_under_one_wavelength_all_surfaces_have_one_colour_and_in_rgb_they_keep_theirs(spectral):
+    options = Options(spp=256, resolution=(80, 25), heuristic_variant="llvm_ad_rgb")
+    images = compare(SCENES["narrow-band-lamp"].source(), options).images
+
+    def spread(image):
+        """Largest difference of r / (r + g) between the four spheres."""
+        shares = []
+        for number in range(4):
+            red, green, _ = image[images.counted & (np.arange(80) // 20 == number)].mean(axis=0)
+            shares.append(red / (red + green))
+        return np.ptp(shares)
+
+    assert spread(images.reference) < 0.03
+    assert spread(images.heuristic) > 0.3
+
+
+@pytest.mark.parametrize("name", ["narrow-band-lamp", "metameric-pair"])
+def test_rgb_departs_from_the_spectral_reference_where_spectra_do_not(spectral, name):
+    scene = SCENES[name]
+    both = Options(spp=256, resolution=(80, 25))
+    mixed = Options(spp=256, resolution=(80, 25), heuristic_variant=scene.heuristic_variant)
+    exact, departing = (
+        compare(scene.source(), options).data["metrics"]["dE2000"] for options in (both, mixed)
+    )
+    # Both halves draw the same wavelengths, so that even their noise is the same.
+    assert exact["mean"] < 0.01
+    assert departing["mean"] > 5 * departing["noise_floor"]
