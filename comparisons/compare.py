@@ -13,6 +13,7 @@ from comparisons.record import Comparison, Images
 from comparisons.significance import significance
 from comparisons.spaces import DEFAULT_VIEWING, Viewing
 from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
 from reference import halves, plan, rendering
 from reference.gbuffer import gbuffer
 from reference.halves import SAMPLER
@@ -39,6 +40,8 @@ class Options:
         ``(width, height)`` in place of the film's own.
     convention
         How roughplastic and phong are paired.
+    interpolation, tessellation
+        How the heuristic half shades its surfaces, and how fine the meshes for it are.
     viewing
         How linear values are looked at.
     heuristic_variant
@@ -55,6 +58,8 @@ class Options:
     spp: int = 256
     resolution: tuple[int, int] | None = None
     convention: Convention = Convention.MATCHED
+    interpolation: Interpolation = Interpolation.PHONG
+    tessellation: int | None = None
     viewing: Viewing = DEFAULT_VIEWING
     heuristic_variant: str | None = None
 
@@ -110,7 +115,7 @@ def compare(source, options=None, progress=None, command=""):
     options = options or Options()
     progress = progress or _silent
     stages = _Stages()
-    pair = halves.pair(source, options.convention, options.resolution)
+    pair = _pair(source, options)
     chosen = plan.plan(pair)
     physical = pair.physical.instantiate()
     integrator = rendering.physical_integrator(chosen, pair.hide_emitters)
@@ -129,6 +134,7 @@ def compare(source, options=None, progress=None, command=""):
         "scene": source.name,
         "variant": reference.variant,
         "heuristic_variant": heuristic.variant,
+        "interpolation": options.interpolation.value,
         "seed": options.seed,
         "resolution": [width, height],
         "plan": record.plan_data(
@@ -151,11 +157,21 @@ def compare(source, options=None, progress=None, command=""):
     return Comparison(data, images)
 
 
+def _pair(source, options):
+    return halves.pair(
+        source,
+        options.convention,
+        options.resolution,
+        options.interpolation,
+        options.tessellation,
+    )
+
+
 def _heuristic_renderer(source, pair, options):
     """Make the heuristic half ready to render, in its own variant if it has one."""
     with rendering.variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
-            pair = halves.pair(source, options.convention, options.resolution)
+            pair = _pair(source, options)
         scene = pair.heuristic.instantiate()
         return rendering.Renderer(scene, None, options.spp_of_a_pass, "heuristic image")
 

@@ -6,10 +6,11 @@ field of view and the up vector; one camera that frames the sphere serves them a
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import mitsuba as mi
 
-from comparisons import spectral_scenes
+from comparisons import chapter_six, spectral_scenes
 from heuristic.errors import InputError
 from reference.scene import Source
 
@@ -31,7 +32,8 @@ class Scene:
     """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
 
     ``variant`` is the one that it needs, ``heuristic_variant`` that of the heuristic half if it is
-    another: RGB against the spectral reference.
+    another: RGB against the spectral reference. ``interpolation`` and ``tessellation`` are those
+    of the heuristic half.
     """
 
     name: str
@@ -39,6 +41,8 @@ class Scene:
     make: Callable[[], dict]
     variant: str = "llvm_ad_rgb"
     heuristic_variant: str | None = None
+    interpolation: str = "phong"
+    tessellation: int | None = None
 
     def source(self):
         """Return the scene for :func:`reference.pair`."""
@@ -122,6 +126,26 @@ def _figures():
         yield _figure(f"fig-8-11-n{n}", title, THREE_LIGHTS, VIEWER_C, **whole, n=n)
 
 
+def _chapter_six():
+    for m in (1.0, 40.0):
+        title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
+        yield Scene(f"fig-6-5-m{m:g}", title, partial(chapter_six.spot, m))
+    yield Scene(
+        "fig-6-10",
+        "Figure 6.10: flat shading of a coarse sphere; see it with --interpolation gouraud, phong",
+        chapter_six.coarse_sphere,
+        interpolation="flat",
+        tessellation=4,
+    )
+    yield Scene(
+        "fig-6-14",
+        "Figure 6.14: a highlight inside a triangle, lost by Gouraud shading, kept by Phong's",
+        chapter_six.highlight_in_a_triangle,
+        interpolation="gouraud",
+        tessellation=1,
+    )
+
+
 def _cornell_box():
     scene = mi.cornell_box()
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
@@ -202,4 +226,4 @@ def _physical():
     yield Scene("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", _cornell_box)
 
 
-SCENES = {scene.name: scene for scene in (*_figures(), *_physical())}
+SCENES = {scene.name: scene for scene in (*_figures(), *_chapter_six(), *_physical())}

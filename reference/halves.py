@@ -11,9 +11,11 @@ from functools import cache
 import mitsuba as mi
 import numpy as np
 
+from heuristic import meshes
 from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
-from reference import bsdfs, emitters, to_heuristic, to_physical, values
+from reference import bsdfs, emitters, meshing, to_heuristic, to_physical, values
 from reference.gbuffer import gbuffer
 from reference.pairing import Convention, Miss, specular_albedo
 from reference.scene import Graph, properties
@@ -57,7 +59,13 @@ class Pair:
     warnings: tuple[str, ...]
 
 
-def pair(source, convention=Convention.MATCHED, resolution=None):
+def pair(
+    source,
+    convention=Convention.MATCHED,
+    resolution=None,
+    interpolation=Interpolation.PHONG,
+    tessellation=None,
+):
     """Derive both halves of a scene, for the current variant.
 
     Parameters
@@ -68,6 +76,11 @@ def pair(source, convention=Convention.MATCHED, resolution=None):
         How roughplastic and phong are paired.
     resolution : (width, height), optional
         In place of the film's own.
+    interpolation : Interpolation
+        Of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
+    tessellation : int, optional
+        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 where it is not given;
+        given, it makes meshes for PHONG too.
 
     Raises
     ------
@@ -84,7 +97,11 @@ def pair(source, convention=Convention.MATCHED, resolution=None):
     given_physical = bsdfs.to_heuristic(heuristic, convention)
     lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    _set_integrator(heuristic, ambient, settings.hide_emitters)
+    _set_integrator(heuristic, ambient, settings.hide_emitters, interpolation)
+    if interpolation is not Interpolation.PHONG or tessellation is not None:
+        meshing.replace_shapes(
+            heuristic, geometry(), tessellation or meshes.RESOLUTION, interpolation
+        )
 
     physical = graph.copy()
     lights += to_physical.add_glowing_shapes(physical)
@@ -172,8 +189,8 @@ def _integrator_settings(graph):
     return settings
 
 
-def _set_integrator(graph, ambient, hide_emitters):
-    props = properties("heuristic", hide_emitters=hide_emitters)
+def _set_integrator(graph, ambient, hide_emitters, interpolation):
+    props = properties("heuristic", hide_emitters=hide_emitters, interpolation=interpolation.value)
     if ambient is not None:
         props["ambient"] = ambient
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))

@@ -8,9 +8,9 @@ Physical (Mitsuba)                             Heuristic
 ``diffuse``, reflectance ``rho``               ``k_d = k_a = rho``, ``k_s = 0``
 ``point``, intensity ``I``                     ``I_p0 = I / pi``, ``f_att = 1 / d^2``
 ``directional``, irradiance ``E``              ``I_p = E / pi``, ``f_att = 1``
-``spot``, intensity ``I``                      ``I_p0 = I / pi``, the same cone and
-                                               ``f_att = 1 / d^2``, ``m`` fitted
-                                               (:mod:`reference.spots`)
+``spot``, intensity ``I``                      ``I_p0 = I / pi``, ``f_att = 1 / d^2``, the same
+                                               cone, ``m`` fitted; the other way cone and beam
+                                               width are fitted (:mod:`reference.spots`)
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``

@@ -103,6 +103,7 @@ class Graph:
         self.name = name
         self.config = config
         self.state = state
+        self.folders = []  # temporary ones with files that nodes refer to
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""

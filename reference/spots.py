@@ -25,18 +25,29 @@ def exponent_for(cutoff, beam_width):
     return float(np.expm1(found.x))
 
 
-def beam_width_for(cutoff, exponent):
-    """Return the beam width whose linear fall-off is nearest to ``cos^m``, in degrees."""
+def cone_for(cutoff, exponent):
+    """Return the cutoff and beam width whose linear fall-off is nearest to ``cos^m``, in degrees.
+
+    A sharp beam ends long before its cone does, so that the cutoff is fitted too, up to the cone's.
+    """
     theta, weight = _cone(cutoff)
     wanted = power_falloff(theta, exponent)
 
-    def distance(beam_width):
-        return np.sum(weight * (linear_falloff(theta, cutoff, beam_width) - wanted) ** 2)
+    def distance(edge, beam_width):
+        return np.sum(weight * (linear_falloff(theta, edge, beam_width) - wanted) ** 2)
 
-    # Mitsuba refuses a beam as wide as the cone; just below it the cone is even.
-    widest = cutoff * (1 - 1e-4)
-    found = minimize_scalar(distance, bounds=(0, widest), method="bounded")
-    return float(min((0.0, widest, found.x), key=distance))
+    def best_beam(edge):
+        # Mitsuba refuses a beam as wide as the cone; just below it the cone is even.
+        return _least(lambda beam_width: distance(edge, beam_width), 0.0, edge * (1 - 1e-4))
+
+    edge = _least(lambda edge: distance(edge, best_beam(edge)), 1e-3 * cutoff, cutoff)
+    return edge, best_beam(edge)
+
+
+def _least(function, low, high):
+    """Return where a function of one minimum is least, the ends of the interval included."""
+    found = minimize_scalar(function, bounds=(low, high), method="bounded").x
+    return float(min((low, high, found), key=function))
 
 
 def linear_falloff(theta, cutoff, beam_width):

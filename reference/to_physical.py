@@ -56,7 +56,7 @@ def _spot_to_physical(graph, index, surface):
     position, direction = emitters.position(graph, index), emitters.axis(graph, index)
     cutoff = values.number(graph, index, "cutoff", 30.0)
     exponent = values.number(graph, index, "exponent", 0.0)
-    beam_width = spots.beam_width_for(cutoff, exponent)
+    edge, beam_width = spots.cone_for(cutoff, exponent)
 
     def cone(travel):
         theta = np.degrees(np.arccos(np.clip(travel @ direction, -1, 1)))
@@ -71,11 +71,11 @@ def _spot_to_physical(graph, index, surface):
             np.ravel(position).tolist(), target.tolist(), up.tolist()
         ),
         intensity=_scaled_intensity(graph, index, factor),
-        cutoff_angle=cutoff,
+        cutoff_angle=edge,
         beam_width=beam_width,
     )
     graph.replace(index, derived)
-    fitted = f"beam width {beam_width:.4g} deg fitted to m = {exponent:g}"
+    fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
     note = f"{fitted}; {note}" if note else fitted
     return PairedEmitter(graph.label(index), "heuristic_spot", "spot", factor, False, note)
 

@@ -53,6 +53,12 @@ def _rendering_options(command):
                      help="Samples a pixel, over all passes."),
         click.option("--resolution", type=Resolution(),
                      help="Width and height in place of the film's own."),
+        click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
+                     help="Shading of polygons in the heuristic half. [default: the scene's own,"
+                     " else phong]"),
+        click.option("--tessellation", type=click.IntRange(min=1), metavar="N",
+                     help="Mesh the shapes of the heuristic half: N edges a quarter turn or a"
+                     " straight side. [default: the scene's own, else 16 for flat and gouraud]"),
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
@@ -176,7 +182,7 @@ def _job(name, rendering):
 
     All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
     """
-    from comparisons.scenes import builtin
+    from comparisons.scenes import Scene, builtin
     from reference.scene import Source
 
     path = Path(name)
@@ -186,20 +192,26 @@ def _job(name, rendering):
                 f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
                 " built-in scene; `fotismos scenes` lists them."
             )
-        source, variant, heuristic_variant = Source(path.stem, path), "llvm_ad_rgb", None
+        scene, source = Scene(path.stem, "", dict), Source(path.stem, path)
     else:
         scene = builtin(name)
-        source, variant, heuristic_variant = scene.source(), scene.variant, scene.heuristic_variant
+        source = scene.source()
+    own = {
+        "variant": scene.variant,
+        "heuristic_variant": scene.heuristic_variant,
+        "interpolation": scene.interpolation,
+        "tessellation": scene.tessellation,
+    }
     if rendering["variant"] is not None:
-        # Somebody who names the variant means both halves, unless they name the other one too.
-        variant, heuristic_variant = rendering["variant"], None
-    heuristic_variant = rendering["heuristic_variant"] or heuristic_variant
-    return source, rendering | {"variant": variant, "heuristic_variant": heuristic_variant}
+        own["heuristic_variant"] = None  # who names the variant means both halves
+    chosen = {key: value for key, value in rendering.items() if value is not None}
+    return source, dict.fromkeys(rendering) | own | chosen
 
 
 def _options(rendering):
     """Turn the command's options into those of a comparison."""
     from comparisons.compare import Options
+    from heuristic.interpolation import Interpolation
     from reference.pairing import Convention
 
     return Options(
@@ -208,6 +220,8 @@ def _options(rendering):
         resolution=rendering["resolution"],
         convention=Convention(rendering["pairing"]),
         heuristic_variant=rendering["heuristic_variant"],
+        interpolation=Interpolation(rendering["interpolation"]),
+        tessellation=rendering["tessellation"],
     )
 
 

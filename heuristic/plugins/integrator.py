@@ -4,6 +4,9 @@
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``ambient``         spectrum (0)        ``I_a`` of 8.2
+``interpolation``   string (phong)      ``phong`` shades every point, with the normal that Mitsuba
+                                        interpolates; ``gouraud`` the vertices and ``flat`` the
+                                        faces of meshes (:mod:`heuristic.plugins.interpolated`)
 ``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
                                         chapters' model does not
 ``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
@@ -23,14 +26,16 @@ import mitsuba as mi
 
 from heuristic import terms
 from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
 from heuristic.materials import Material
+from heuristic.plugins.interpolated import interpolating
 from heuristic.plugins.lights import FAR
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.shading import shade
 
 
 def define():
-    """Create the class for the current variant and register it."""
+    """Create the classes for the current variant and register them under one name."""
 
     class HeuristicIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
@@ -39,27 +44,53 @@ def define():
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
             self.occlusion = props.get("occlusion", False)
+            self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
-            materials, twosided = SceneMaterials(scene).at(si, hit)
-            normal = mi.Vector3f(si.sh_frame.n)
-            if twosided is not False:
-                normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
-            lights = [emitter.light(si, hit) for emitter in _lights(scene)]
-            ambient = self.ambient.eval(si, hit) if may_be_nonzero(self.ambient) else 0
-            visible = _shadow_test(scene, si, hit) if self.occlusion else None
-            colour = mi.Spectrum(0)
-            for material, is_here in materials:
-                value = shade(si.p, normal, -ray.d, material, lights, ambient, visible)
-                colour += dr.select(is_here, value, 0)
-            colour = dr.select(hit & (twosided | (si.wi.z > 0)), colour, 0)
+            colour = self.surface_colour(scene, si, mi.Vector3f(-ray.d), hit)
             environment = scene.environment()
             if environment is not None and not self.hide_emitters:
                 colour += dr.select(active & ~hit, environment.eval(si, active & ~hit), 0)
                 hit = active
             return colour, hit, []
+
+        def surface_colour(self, scene, si, view, active):
+            """Return the value that is seen at what a ray hits: Phong shading (6.37, 6.38)."""
+            twosided = self.twosided(scene, si, active)
+            normal = mi.Vector3f(si.sh_frame.n)
+            if twosided is not False:
+                normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
+            colour = self.shaded(scene, si, view, normal, active)
+            return dr.select(active & (twosided | (si.wi.z > 0)), colour, 0)
+
+        def shaded(self, scene, si, view, normal, active):
+            """Evaluate the kernel at a surface interaction."""
+            lights = self.lights(scene, si, active)
+            ambient = self.ambient_at(si, active)
+            visible = self.visibility(scene, si, active)
+            colour = mi.Spectrum(0)
+            for material, is_here in SceneMaterials(scene).at(si, active):
+                value = shade(si.p, normal, view, material, lights, ambient, visible)
+                colour += dr.select(is_here, value, 0)
+            return colour
+
+        def lights(self, scene, si, active):
+            """Return the kernel's form of the scene's lights."""
+            return [emitter.light(si, active) for emitter in _lights(scene)]
+
+        def ambient_at(self, si, active):
+            """Return ``I_a``, a plain 0 where there is none."""
+            return self.ambient.eval(si, active) if may_be_nonzero(self.ambient) else 0
+
+        def visibility(self, scene, si, active):
+            """Return the shadow test for :func:`heuristic.shade`, None where there is none."""
+            return _shadow_test(scene, si, active) if self.occlusion else None
+
+        def twosided(self, scene, si, active):
+            """Return whether the surface is two-sided; a plain False where none of the scene is."""
+            return SceneMaterials(scene).twosided(si, active)
 
         def traverse(self, callback):
             callback.put("ambient", self.ambient, mi.ParamFlags.Differentiable)
@@ -67,7 +98,21 @@ def define():
         def to_string(self):
             return f"HeuristicIntegrator[ambient = {self.ambient}]"
 
-    mi.register_integrator("heuristic", HeuristicIntegrator)
+    interpolating_class = interpolating(HeuristicIntegrator)
+
+    def make(props):
+        is_phong = props.get("interpolation", "phong") == "phong"
+        return (HeuristicIntegrator if is_phong else interpolating_class)(props)
+
+    mi.register_integrator("heuristic", make)
+
+
+def _interpolation(props):
+    name = props.get("interpolation", "phong")
+    known = [kind.value for kind in Interpolation]
+    if name not in known:
+        raise InputError(f"interpolation {name!r} is not known: choose one of {', '.join(known)}.")
+    return Interpolation(name)
 
 
 class SceneMaterials:
@@ -95,31 +140,36 @@ class SceneMaterials:
         self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
 
     def at(self, si, active):
-        """Return the materials at a surface interaction, and whether the surface is two-sided.
+        """Return the materials at a surface interaction, as pairs of a material and a mask.
 
-        The materials are pairs of a :class:`Material` and a mask of where it holds: one pair for
-        each form of the lobe that the scene has, since the form decides on the kernel's code.
+        There is one pair for each form of the lobe that the scene has, since the form decides on
+        the kernel's code; the mask tells where it holds.
         """
         if len(self.bsdfs) == 1:
-            (bsdf,) = self.bsdfs
-            return [(bsdf.material(si, active), True)], bsdf.twosided
-        index = dr.gather(
-            mi.UInt32, mi.UInt32(self.table), dr.reinterpret_array(mi.UInt32, si.shape), active
-        )
+            return [(self.bsdfs[0].material(si, active), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
-        *values, n, is_blinn, twosided = dr.switch(index, readers, si, active)
-        if not any(bsdf.twosided for bsdf in self.bsdfs):
-            twosided = False
-        forms = {bsdf.form for bsdf in self.bsdfs}
+        *values, n, is_blinn = dr.switch(self._index(si, active), readers, si, active)
+        forms = sorted({bsdf.form for bsdf in self.bsdfs})
         coefficients = dict(zip(present, values, strict=True))
         return [
             (
                 Material(**coefficients, n=n, form=form),
                 len(forms) == 1 or is_blinn == (form == "blinn"),
             )
-            for form in sorted(forms)
-        ], twosided
+            for form in forms
+        ]
+
+    def twosided(self, si, active):
+        """Return whether the surface is two-sided; a plain value where all agree."""
+        sides = [bsdf.twosided for bsdf in self.bsdfs]
+        if len(set(sides)) <= 1:
+            return any(sides)
+        return dr.gather(mi.Bool, mi.Bool(sides), self._index(si, active), active)
+
+    def _index(self, si, active):
+        shape = dr.reinterpret_array(mi.UInt32, si.shape)
+        return dr.gather(mi.UInt32, mi.UInt32(self.table), shape, active)
 
 
 def _reader(bsdf, present):
@@ -130,12 +180,7 @@ def _reader(bsdf, present):
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if bsdf.normalised and "k_s" in values:
             values["k_s"] *= terms.normalisation(bsdf.form, bsdf.n)
-        return (
-            *values.values(),
-            mi.Float(bsdf.n),
-            mi.Bool(bsdf.form == "blinn"),
-            mi.Bool(bsdf.twosided),
-        )
+        return (*values.values(), mi.Float(bsdf.n), mi.Bool(bsdf.form == "blinn"))
 
     return read
 

@@ -1,0 +1,79 @@
+"""Flat, Gouraud and Phong shading of triangle meshes (chapter 6, section 6.6).
+
+The chapter interpolates twice along straight lines: along two edges to the points D and E where a
+scan line meets them (6.35, 6.37), then along the scan line (6.36, 6.38). On a triangle that is the
+same as weighting the three vertices by barycentric coordinates, for every direction of the scan
+line. Renderers use the latter, on the surface itself; the chapter's scan lines lie in the image,
+where perspective would have to be corrected for.
+
+This module holds the equations. :mod:`heuristic.mesh_shading` applies them to Mitsuba's meshes.
+"""
+
+from enum import Enum
+
+import drjit as dr
+
+from heuristic import vectors
+
+
+class Interpolation(Enum):
+    """What is interpolated over a face: nothing, the intensity, or the normal."""
+
+    FLAT = "flat"
+    GOURAUD = "gouraud"
+    PHONG = "phong"
+
+
+def edge_intensity(intensity_a, intensity_b, y_a, y_b, y):
+    """Equation 6.35: ``I_D = [I_A (y_D - y_B) + I_B (y_A - y_D)] / (y_A - y_B)``.
+
+    The intensity where the scan line at the height ``y`` meets the edge from A to B; ``I_E``
+    likewise on the other edge. A scan line never crosses an edge parallel to it; there the result
+    is ``I_A``.
+    """
+    return _between(intensity_a, intensity_b, y_a, y_b, y)
+
+
+def scan_line_intensity(intensity_d, intensity_e, x_d, x_e, x):
+    """Equation 6.36: ``I_P = [I_D (x_E - x_P) + I_E (x_P - x_D)] / (x_E - x_D)``.
+
+    The chapter's text names I_D and I_C as what is interpolated, which can only mean I_D and I_E.
+    """
+    return _between(intensity_d, intensity_e, x_d, x_e, x)
+
+
+def edge_normal(normal_a, normal_b, y_a, y_b, y):
+    """Equation 6.37: ``n_D = [n_A (y_D - y_B) + n_B (y_A - y_D)] / (y_A - y_B)``.
+
+    Not normalised: that would make the result at P depend on the direction of the scan line.
+    """
+    return _between(normal_a, normal_b, y_a, y_b, y)
+
+
+def scan_line_normal(normal_d, normal_e, x_d, x_e, x):
+    """Equation 6.38: ``n_P = [n_D (x_E - x_P) + n_E (x_P - x_D)] / |...|``, a unit vector.
+
+    Where opposite normals meet in the middle it is zero, and such a point receives no light.
+    """
+    return vectors.normalise(_between(normal_d, normal_e, x_d, x_e, x))
+
+
+def barycentric_coordinates(point, p0, p1, p2):
+    """Return the weights ``b0, b1, b2`` with ``point = b0 p0 + b1 p1 + b2 p2`` and sum 1.
+
+    Of a point outside the triangle's plane they are those of its foot. A triangle without area has
+    none; the weights are then ``1, 0, 0``.
+    """
+    edge_1, edge_2, offset = p1 - p0, p2 - p0, point - p0
+    product = dr.cross(edge_1, edge_2)
+    squared = dr.squared_norm(product)
+    inverse = dr.select(squared > 0, dr.rcp(squared), 0)
+    b1 = dr.dot(dr.cross(offset, edge_2), product) * inverse
+    b2 = dr.dot(dr.cross(edge_1, offset), product) * inverse
+    return 1 - b1 - b2, b1, b2
+
+
+def _between(value_a, value_b, place_a, place_b, place):
+    length = place_b - place_a
+    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
+    return value_a * (1 - fraction) + value_b * fraction

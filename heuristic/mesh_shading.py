@@ -1,0 +1,250 @@
+"""Flat and Gouraud shading of Mitsuba's meshes (chapter 6, sections 6.6.1 and 6.6.2).
+
+:func:`shade_mesh` evaluates the model once a vertex (Gouraud) or once a face (flat), and stores the
+values as attributes of the mesh. :func:`stored_shade` reads them at what a ray hits, interpolated
+by Mitsuba. What is stored holds for one viewer, one set of lights and one of wavelengths.
+
+:class:`MeshCorners` is Gouraud shading without storage: three evaluations for each ray, at the
+vertices of the face that it meets. It is for spectral variants, whose wavelengths change from ray
+to ray.
+
+Phong shading needs neither: Mitsuba interpolates and normalises the vertex normals.
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic import meshes
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation, barycentric_coordinates
+from heuristic.shading import shade
+
+BLOCK = 3
+"""Components of one attribute: Mitsuba 3.9.1 reads 1 or 3, and any other number as zero."""
+
+
+def shading_points(mesh, interpolation):
+    """Return the points of a mesh at which flat or Gouraud shading evaluates the model.
+
+    Parameters
+    ----------
+    mesh : mitsuba.Mesh
+        With vertex normals, or else they are those of 6.34.
+    interpolation : Interpolation
+        GOURAUD for the vertices with their normals, FLAT for the faces' centroids with theirs.
+
+    Returns
+    -------
+    mitsuba.SurfaceInteraction3f
+        In the order of the vertices or faces, as far as textures need it: ``p``, ``n``,
+        ``sh_frame.n``, ``uv``, ``shape`` and ``prim_index``.
+
+    Raises
+    ------
+    InputError
+        For PHONG, which has no such points, and for GOURAUD on a mesh with ``face_normals`` or
+        with vertices that have no normal.
+    """
+    if interpolation is Interpolation.PHONG:
+        raise InputError(
+            "interpolation phong evaluates the model at every point, not at those of the mesh: call"
+            " shade with si.sh_frame.n."
+        )
+    corners, points = meshes.faces(mesh), meshes.positions(mesh)
+    uv = meshes.texture_coordinates(mesh)
+    face = dr.arange(mi.UInt32, mesh.face_count())
+    si = dr.zeros(mi.SurfaceInteraction3f, mesh.vertex_count())
+    if interpolation is Interpolation.FLAT:
+        si = dr.zeros(mi.SurfaceInteraction3f, mesh.face_count())
+        si.p = mi.Point3f(_mean(points, corners))
+        si.n = meshes.face_normals(mesh)
+        si.uv = _mean(uv, corners) if uv is not None else si.uv
+        si.prim_index = face
+    else:
+        _refuse_face_normals(mesh)
+        si.p = mi.Point3f(points)
+        si.n = meshes.normals(mesh)
+        si.uv = uv if uv is not None else si.uv
+        for corner in range(3):  # any of the faces around a vertex will do
+            dr.scatter(si.prim_index, face, corners[corner])
+    si.sh_frame.n = si.n
+    si.shape = mi.ShapePtr(mesh)
+    si.t = mi.Float(0)
+    return si
+
+
+def shade_mesh(
+    mesh, interpolation, viewer, material, lights, ambient=0, visible=None, twosided=False
+):
+    """Evaluate the model (8.10) at a mesh's vertices or faces, and store it with the mesh.
+
+    Parameters
+    ----------
+    mesh, interpolation
+        As of :func:`shading_points`.
+    viewer
+        ``P_V``: three numbers, or a Dr.Jit point. What is stored is what is seen from there.
+    material, lights, ambient, visible
+        As of :func:`heuristic.shade`; Dr.Jit values hold one entry, or one a vertex or face.
+    twosided
+        Store the values of the back, with reversed normals, beside those of the front.
+
+    Returns
+    -------
+    int
+        The number of components stored, which :func:`stored_shade` needs: 3 for single numbers.
+
+    Raises
+    ------
+    InputError
+        As :func:`shading_points` and :func:`heuristic.shade`.
+    """
+    si = shading_points(mesh, interpolation)
+    position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
+    view = mi.Vector3f(viewer) - position
+    components = 0
+    for back in (False, True)[: 1 + twosided]:
+        facing = -normal if back else normal
+        colour = shade(position, facing, view, material, lights, ambient, visible)
+        components = _store(mesh, interpolation, colour, back, dr.width(position))
+    return components
+
+
+def stored_shade(si, interpolation, components=BLOCK, twosided=False, active=True):
+    """Read what :func:`shade_mesh` stored, at the surface interactions of rays.
+
+    A face shows its front where the ray meets the side to which its vertices are anticlockwise,
+    whatever its vertex normals say. Its back is black, or with ``twosided`` what was stored for it.
+    Shapes with nothing stored read as black.
+
+    Returns
+    -------
+    list of mitsuba.Float
+        One for each component.
+    """
+    is_front = dr.dot(si.n, si.to_world(si.wi)) > 0
+    values = []
+    for block in range(-(-components // BLOCK)):
+        front = _name(interpolation, False, block)
+        value = si.shape.eval_attribute_3(front, si, active & is_front)
+        if twosided:
+            back = _name(interpolation, True, block)
+            reverse = si.shape.eval_attribute_3(back, si, active & ~is_front)
+            value = dr.select(is_front, value, reverse)
+        values += list(dr.select(is_front | twosided, value, 0))
+    return values[:components]
+
+
+class MeshCorners:
+    """The vertices of all faces of a scene's meshes, for evaluating at those of the face hit.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+        Its meshes count as in :func:`shading_points`, except that ``face_normals`` are taken as
+        what they say: each face has its own normal at its vertices.
+
+    Raises
+    ------
+    InputError
+        For a mesh with vertices that have no normal.
+    """
+
+    def __init__(self, scene):
+        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face is that of no mesh
+        for shape in scene.shapes():
+            if shape.is_mesh():
+                starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
+                parts.append(_corner_arrays(shape))
+                count += shape.face_count()
+        largest = max(starts, default=0)
+        self.starts = mi.UInt32([starts.get(index, 0) for index in range(largest + 1)])
+        self.positions, self.normals, self.uv = (
+            _joined(arrays) for arrays in zip(*parts, strict=True)
+        )
+
+    def at(self, si, active=True):
+        """Return three pairs of a weight and an interaction, one a vertex of the face hit.
+
+        The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
+        :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are no
+        meshes all weights are zero.
+        """
+        index = dr.reinterpret_array(mi.UInt32, si.shape)
+        is_known = active & (index < dr.width(self.starts))
+        start = dr.gather(mi.UInt32, self.starts, index, is_known)
+        is_mesh = is_known & (start > 0)
+        place = 3 * (start + si.prim_index)
+        points = [dr.gather(mi.Vector3f, self.positions, place + i, is_mesh) for i in range(3)]
+        weights = barycentric_coordinates(mi.Vector3f(si.p), *points)
+        corners = []
+        for i, (weight, point) in enumerate(zip(weights, points, strict=True)):
+            corner = mi.SurfaceInteraction3f(si)
+            corner.p = mi.Point3f(point)
+            normal = dr.gather(mi.Vector3f, self.normals, place + i, is_mesh)
+            corner.n = corner.sh_frame.n = mi.Normal3f(normal)
+            corner.uv = dr.gather(mi.Point2f, self.uv, place + i, is_mesh)
+            corners.append((dr.select(is_mesh, weight, 0), corner))
+        return corners
+
+
+def _corner_arrays(mesh):
+    """Return positions, normals and texture coordinates, three entries a face."""
+    if mesh is None:
+        return dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Point2f, 3)
+    if mesh.has_face_normals():
+        mesh = meshes.split_faces(mesh)
+    corners = dr.ravel(meshes.faces(mesh))
+    uv = meshes.texture_coordinates(mesh)
+    return (
+        dr.gather(mi.Vector3f, meshes.positions(mesh), corners),
+        dr.gather(mi.Vector3f, meshes.normals(mesh), corners),
+        dr.zeros(mi.Point2f, dr.width(corners))
+        if uv is None
+        else dr.gather(mi.Point2f, uv, corners),
+    )
+
+
+def _joined(arrays):
+    """Join vectors end to end; Dr.Jit's own function does so for arrays of one component."""
+    components = range(len(arrays[0]))
+    return type(arrays[0])(*(dr.concat([array[i] for array in arrays]) for i in components))
+
+
+def _mean(values, corners):
+    return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
+
+
+def _refuse_face_normals(mesh):
+    if mesh.has_face_normals():
+        raise InputError(
+            f"mesh {mesh.id()!r} has face_normals, and so several normals at a vertex. Gouraud"
+            " shading needs one: pass it through heuristic.meshes.split_faces, or take face_normals"
+            " off."
+        )
+
+
+def _store(mesh, interpolation, colour, back, count):
+    """Store a float or a colour in attributes of three components, the last filled with zeros."""
+    is_colour = dr.depth_v(colour) > 1
+    values = [mi.Float(component) for component in colour] if is_colour else [mi.Float(colour)] * 3
+    components = len(values)
+    values += [mi.Float(0)] * (-components % BLOCK)
+    names = [_name(interpolation, back, block) for block in range(len(values) // BLOCK)]
+    for name in names:
+        if not mesh.has_attribute(name):
+            # Zeros, as this copies one by one; all of them, as Mitsuba does not check the length.
+            mesh.add_attribute(name, BLOCK, [0.0] * (BLOCK * count))
+    parameters = mi.traverse(mesh)
+    for block, name in enumerate(names):
+        # Terms that depend on no position are a single number until they are spread out.
+        triple = mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)]) + dr.zeros(mi.Float, count)
+        parameters[name] = dr.ravel(triple)
+    parameters.update()
+    return components
+
+
+def _name(interpolation, back, block):
+    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and suffixes."""
+    element = "face" if interpolation is Interpolation.FLAT else "vertex"
+    return f"{element}_heuristic" + ("_back" if back else "") + (f"_{block}" if block else "")

@@ -1,0 +1,234 @@
+"""Meshes for flat, Gouraud and Phong shading: made from other shapes, given normals, taken apart.
+
+Everything returns a new ``mitsuba.Mesh`` in world space, with the BSDF of the original and no
+emitter; the original stays as it is. A flipped orientation (``flip_normals``) goes into the order
+of the vertices. Call it after ``mitsuba.set_variant``.
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from heuristic.normals import triangle_normal
+from heuristic.vertex_normals import Weighting, vertex_normals
+
+RESOLUTION = 16
+
+
+def to_mesh(shape, resolution=RESOLUTION):
+    """Return a shape as a triangle mesh with the shape's own normals and texture coordinates.
+
+    A grid over the shape's ``(u, v)``, two triangles a cell, so that textures stay in place. With
+    ``h = pi / (2 resolution)``, the angle of one step along a circle, its largest distance from the
+    shape, for the radius ``r``, is:
+
+    =============  ===============================================  ========================
+    Shape          Cells                                            Distance
+    =============  ===============================================  ========================
+    ``rectangle``  ``resolution`` a side                            0
+    ``disk``       ``4 resolution`` around, ``resolution`` rings    ``r (1 - cos(h / 2))``
+    ``cylinder``   ``4 resolution`` around, ``resolution`` along    ``r (1 - cos(h / 2))``
+    ``sphere``     ``4 resolution`` around, ``2 resolution`` bands  ``r (1 - cos^2(h / 2))``
+    =============  ===============================================  ========================
+
+    Vertices lie on the shape, so that the mesh lies inside a sphere. Other meshes, the cube among
+    them, are returned as they are.
+
+    Raises
+    ------
+    InputError
+        For a shape of any other type, or a resolution that is no whole number of 1 or more.
+    """
+    if not isinstance(resolution, int) or resolution < 1:
+        raise InputError(
+            f"resolution = {resolution!r} is not allowed: give a whole number of 1 or more."
+        )
+    kind = mi.ShapeType(shape.shape_type())
+    if kind not in _cells(resolution):
+        if shape.is_mesh():
+            return shape
+        raise InputError(
+            f"shape {shape.id()!r}: a {shape.class_name()} cannot be made into triangles. Flat and"
+            " Gouraud shading take meshes, spheres, disks, cylinders and rectangles; give it as a"
+            " mesh, or use phong interpolation."
+        )
+    return _tessellated(shape, kind, *_cells(resolution)[kind])
+
+
+def with_vertex_normals(mesh, weighting=Weighting.ANGLE):
+    """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, in place of any of its own.
+
+    Raises
+    ------
+    InputError
+        When the faces at a vertex oppose each other, so that it has no normal.
+    """
+    computed = _checked_normals(mesh, weighting)
+    return _build(mesh, positions(mesh), computed, texture_coordinates(mesh), faces(mesh))
+
+
+def split_faces(mesh):
+    """Return a mesh whose faces share no vertices, each with its face's normal.
+
+    It is the form in which a mesh with ``face_normals`` has vertices to evaluate at.
+    """
+    corners = dr.ravel(faces(mesh))
+    normals = dr.repeat(face_normals(mesh), 3)
+    uv = texture_coordinates(mesh)
+    if uv is not None:
+        uv = dr.gather(mi.Point2f, uv, corners)
+    split = mi.Vector3u(*(3 * dr.arange(mi.UInt32, mesh.face_count()) + i for i in range(3)))
+    return _build(mesh, dr.gather(mi.Vector3f, positions(mesh), corners), normals, uv, split)
+
+
+def positions(mesh):
+    """Return the positions of a mesh's vertices, as vectors."""
+    return dr.unravel(mi.Vector3f, mesh.vertex_positions_buffer())
+
+
+def faces(mesh):
+    """Return the vertex numbers of a mesh's faces, anticlockwise as seen from the outside."""
+    corners = dr.unravel(mi.Vector3u, mesh.faces_buffer())
+    return corners.xzy if mesh.has_flipped_normals() else corners
+
+
+def texture_coordinates(mesh):
+    """Return a mesh's texture coordinates, None where it has none."""
+    if not mesh.has_vertex_texcoords():
+        return None
+    return dr.unravel(mi.Point2f, mesh.vertex_texcoords_buffer())
+
+
+def face_normals(mesh):
+    """Return the unit normals of a mesh's faces (see 6.19), zero for faces without area."""
+    return _flat_normals(positions(mesh), faces(mesh))
+
+
+def normals(mesh):
+    """Return a mesh's vertex normals: its own, or by 6.34 where it has none.
+
+    Raises
+    ------
+    InputError
+        When it has none, and the faces at a vertex oppose each other.
+    """
+    if not mesh.has_vertex_normals():
+        return _checked_normals(mesh, Weighting.ANGLE)
+    own = dr.unravel(mi.Vector3f, mesh.vertex_normals_buffer())
+    return -own if mesh.has_flipped_normals() else own
+
+
+def _flat_normals(points, corners):
+    return triangle_normal(*(dr.gather(mi.Vector3f, points, corners[i]) for i in range(3)))
+
+
+def _checked_normals(mesh, weighting):
+    corners = faces(mesh)
+    computed = vertex_normals(positions(mesh), corners, weighting)
+    is_used = dr.zeros(mi.Bool, mesh.vertex_count())
+    has_area = dr.squared_norm(face_normals(mesh)) > 0
+    for i in range(3):
+        dr.scatter(is_used, mi.Bool(True), corners[i], has_area)
+    missing = dr.count(is_used & (dr.squared_norm(computed) == 0))[0]
+    if missing:
+        raise InputError(
+            f"mesh {mesh.id()!r}: {missing} vertices have no normal, because the faces around them"
+            " oppose each other. Separate the two sides, or set face_normals on the mesh."
+        )
+    return computed
+
+
+def _cells(resolution):
+    """Return the cells along ``u`` and ``v`` for each type of shape."""
+    around = 4 * resolution
+    return {
+        mi.ShapeType.Rectangle: (resolution, resolution),
+        mi.ShapeType.Disk: (resolution, around),
+        mi.ShapeType.Cylinder: (around, resolution),
+        mi.ShapeType.Sphere: (around, 2 * resolution),
+    }
+
+
+def _tessellated(shape, kind, columns, rows):
+    """Evaluate a shape at the corners of a grid of cells, and join them by triangles."""
+    index = dr.arange(mi.UInt32, (columns + 1) * (rows + 1))
+    column, row = index % (columns + 1), index // (columns + 1)
+    uv = mi.Point2f(mi.Float(column) / columns, mi.Float(row) / rows)
+    points, surface_normals = _surface(shape, kind, _closed(kind, uv))
+    cell = dr.arange(mi.UInt32, columns * rows)
+    first = cell + cell // columns
+    second, third, fourth = first + 1, first + columns + 2, first + columns + 1
+    corners = mi.Vector3u(
+        dr.concat([first, first]), dr.concat([second, third]), dr.concat([third, fourth])
+    )
+    flat = _flat_normals(points, corners)
+    has_area = dr.squared_norm(flat) > 0  # at a pole, and in the middle of a disk, half have none
+    alignment = dr.dot(flat, dr.gather(mi.Vector3f, surface_normals, corners.x))
+    if dr.sum(alignment)[0] < 0:
+        corners = corners.xzy
+    corners = dr.gather(mi.Vector3u, corners, dr.compress(has_area))
+    return _build(shape, points, surface_normals, uv, corners)
+
+
+def _surface(shape, kind, uv):
+    """Return points and normals of a shape, one for each of its coordinates."""
+    if kind in (mi.ShapeType.Cylinder, mi.ShapeType.Disk):
+        # Mitsuba finds the point with a ray, which may miss the rim; the shape is straight across.
+        along_u = kind == mi.ShapeType.Disk
+        low, high = (
+            _evaluated(shape, mi.Point2f(s, uv.y) if along_u else mi.Point2f(uv.x, s))
+            for s in (0.25, 0.75)
+        )
+        points = dr.lerp(low.p, high.p, 2 * (uv.x if along_u else uv.y) - 0.5)
+        normals = low.n
+    else:
+        si = _evaluated(shape, uv)
+        # Mitsuba's rectangle leaves its orientation out of its parametrisation.
+        flipped = kind == mi.ShapeType.Rectangle and shape.has_flipped_normals()
+        points, normals = si.p, -si.n if flipped else si.n
+    everywhere = dr.zeros(mi.Vector3f, dr.width(uv))  # plane shapes have a single normal
+    return mi.Vector3f(points), mi.Vector3f(normals) + everywhere
+
+
+def _evaluated(shape, uv):
+    si = shape.eval_parameterization(uv)
+    if not dr.all(si.is_valid() & dr.all(dr.isfinite(si.p))):
+        raise InputError(
+            f"shape {shape.id()!r}: this {shape.class_name()} cannot be made into triangles,"
+            " because its to_world shears or stretches it. Rotate and scale it evenly, or give it"
+            " as a mesh."
+        )
+    return si
+
+
+def _closed(kind, uv):
+    """Let both ends of a circle, and all meridians at a pole or centre, meet in one point."""
+    full_turn_u, full_turn_v = dr.select(uv.x < 1, uv.x, 0), dr.select(uv.y < 1, uv.y, 0)
+    if kind == mi.ShapeType.Sphere:
+        return mi.Point2f(dr.select((uv.y > 0) & (uv.y < 1), full_turn_u, 0), uv.y)
+    if kind == mi.ShapeType.Cylinder:
+        return mi.Point2f(full_turn_u, uv.y)
+    if kind == mi.ShapeType.Disk:
+        return mi.Point2f(uv.x, dr.select(uv.x > 0, full_turn_v, 0))
+    return uv
+
+
+def _build(original, points, vertex_normals, uv, corners):
+    """Make a mesh from its arrays."""
+    mesh = mi.Mesh(
+        original.id(),
+        dr.width(points),
+        dr.width(corners),
+        has_vertex_normals=True,
+        has_vertex_texcoords=uv is not None,
+    )
+    mesh.set_id(original.id())
+    mesh.set_bsdf(original.bsdf())
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = dr.ravel(points)
+    parameters["vertex_normals"] = dr.ravel(vertex_normals)
+    parameters["faces"] = dr.ravel(corners)
+    if uv is not None:
+        parameters["vertex_texcoords"] = dr.ravel(uv)
+    parameters.update()
+    return mesh

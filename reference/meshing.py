@@ -1,0 +1,53 @@
+"""Replacing the shapes of a scene by triangle meshes, for flat and Gouraud shading."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import mitsuba as mi
+
+from heuristic import meshes
+from heuristic.interpolation import Interpolation
+from reference.scene import Reference, properties
+
+SHAPE = mi.ObjectType.Shape
+
+
+def replace_shapes(graph, scene, resolution, interpolation):
+    """Replace every shape of a graph by a mesh of the same place, name, material and light.
+
+    Parameters
+    ----------
+    graph : reference.scene.Graph
+        The graph to change. It keeps the folder that the meshes are written to until it is deleted.
+    scene : mitsuba.Scene
+        The same shapes, instantiated; they are told by their ids.
+    resolution
+        Of what is no mesh yet, as in :func:`heuristic.meshes.to_mesh`.
+    interpolation : Interpolation
+        Gouraud shading needs one normal a vertex, hence faces that share none where the mesh has
+        ``face_normals``.
+
+    Raises
+    ------
+    InputError
+        Naming a shape that cannot be made into triangles.
+    """
+    folder = TemporaryDirectory(prefix="fotismos-")
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    for index in graph.nodes(SHAPE):
+        given = graph.props(index)
+        mesh = meshes.to_mesh(shapes[given.id()], resolution)
+        if mesh.has_face_normals():
+            if interpolation is Interpolation.GOURAUD:
+                mesh = meshes.split_faces(mesh)
+        elif not mesh.has_vertex_normals():
+            mesh = meshes.with_vertex_normals(mesh)
+        path = Path(folder.name) / f"{index}.ply"
+        mesh.write_ply(str(path))
+        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
+        # The file holds world coordinates; flat faces are told by the lack of vertex normals.
+        derived = properties("ply", filename=str(path), **children)
+        if mesh.has_face_normals():
+            derived["face_normals"] = True
+        graph.replace(index, derived)
+    graph.folders.append(folder)

@@ -1,0 +1,601 @@
+"""Flat, Gouraud and Phong shading: 6.35-6.38, their convergence, and Mitsuba's mesh attributes."""
+
+import drjit as dr
+import drjit.llvm.ad
+import mitsuba as mi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from comparisons.scenes import builtin
+from heuristic import DirectionalLight, Material, PointLight, meshes, shade
+from heuristic.errors import InputError
+from heuristic.interpolation import (
+    Interpolation,
+    barycentric_coordinates,
+    edge_intensity,
+    edge_normal,
+    scan_line_intensity,
+    scan_line_normal,
+)
+from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
+from heuristic.vertex_normals import Weighting
+from reference.scene import Reference, properties
+from tests import oracle
+from tests.test_normals import rows, uv_sphere
+
+FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
+Float64, Array3f64 = drjit.llvm.ad.Float64, drjit.llvm.ad.Array3f64
+
+# --- On a triangle: scan lines and barycentric coordinates ---------------------------------------
+
+TRIANGLE = ((0.0, 4.0), (-3.0, 0.5), (2.0, -1.0))  # A, B, C, from top to bottom
+place = st.floats(0.05, 0.95)
+
+
+def scan(values, point, turn, along_edge, along_line):
+    """Interpolate three values at a point by a scan line, after turning the picture by an angle.
+
+    The scan line through the point meets the edge to the vertex that is alone on its side twice.
+    """
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    corners, (x, y) = np.array(TRIANGLE) @ rotation.T, rotation @ point
+    above = corners[:, 1] > y
+    alone = int(np.flatnonzero(above == (above.sum() == 1))[0])
+    crossings = []
+    for other in ((alone + 1) % 3, (alone + 2) % 3):
+        (x_a, y_a), (x_b, y_b) = corners[alone], corners[other]
+        value = along_edge(values[alone], values[other], Float64(y_a), Float64(y_b), Float64(y))
+        crossings.append((value, x_a + (x_b - x_a) * (y - y_a) / (y_b - y_a)))
+    (value_d, x_d), (value_e, x_e) = crossings
+    return along_line(value_d, value_e, Float64(x_d), Float64(x_e), Float64(x))
+
+
+def inside(s, t):
+    """Weights of a point inside the triangle, and the point."""
+    weights = np.array([1 - s, s * (1 - t), s * t])
+    return weights, weights @ np.array(TRIANGLE)
+
+
+@settings(max_examples=60, deadline=None)
+@given(s=place, t=place, turn=st.floats(0, 2 * np.pi))
+def test_scan_lines_of_any_direction_give_the_barycentric_mean(s, t, turn):
+    weights, point = inside(s, t)
+    intensities = [Float64(value) for value in (0.2, 0.9, 0.5)]
+    found = scan(intensities, point, turn, edge_intensity, scan_line_intensity)
+    assert float(found[0]) == pytest.approx(weights @ [0.2, 0.9, 0.5], rel=1e-9)
+    vectors = np.array([(0.6, 0, 0.8), (0, -0.6, 0.8), (0, 0, 1)])
+    found = scan(
+        [Array3f64(*v) for v in vectors.tolist()], point, turn, edge_normal, scan_line_normal
+    )
+    mean = weights @ vectors
+    np.testing.assert_allclose(rows(found)[0], mean / np.linalg.norm(mean), atol=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(s=place, t=place, height=st.floats(-1, 1))
+def test_barycentric_coordinates_of_a_point_and_of_its_foot(s, t, height):
+    weights, point = inside(s, t)
+    x, y = point.tolist()
+    found = barycentric_coordinates(
+        Array3f64(x, y, 2 + height), *(Array3f64(*corner, 2) for corner in TRIANGLE)
+    )
+    assert [float(w[0]) for w in found] == pytest.approx(list(weights), abs=1e-12)
+
+
+def test_what_cannot_be_interpolated_takes_the_first_value():
+    one, two = Float64(1), Float64(2)
+    assert edge_intensity(one, two, Float64(5), Float64(5), Float64(5))[0] == 1
+    normal = scan_line_normal(Array3f64(0, 0, 1), Array3f64(0, 0, -1), one, one + 2, two)
+    assert rows(normal).tolist() == [[0, 0, 0]]
+    weights = barycentric_coordinates(*[Array3f64(1, 2, 3)] * 4)
+    assert [float(w[0]) for w in weights] == [1, 0, 0]
+
+
+# --- Convergence --------------------------------------------------------------------------------
+
+LIGHT = PointLight((3.0, -2.0, 4.0), 1.0)
+VIEWER = (4.0, -1.0, 2.0)
+INNER = np.random.default_rng(5).dirichlet((1, 1, 1), 20)
+"""Where in every triangle the ways of shading are compared."""
+
+
+def shade_on_sphere(position, normal, material):
+    return shade(position, normal, Array3f64(*VIEWER) - position, material, [LIGHT])
+
+
+def difference(bands, material, one, other, near_light=0.2):
+    """Root mean square over a sphere mesh of ``one - other``, two ways of shading.
+
+    Only faces that the light meets at a cosine of ``near_light`` or more count, so that the kink of
+    the horizon is left out.
+    """
+    points, faces = uv_sphere(bands)
+    corners = [dr.gather(Array3f64, points, faces[i]) for i in range(3)]
+    toward = dr.normalize(Array3f64(*LIGHT.position))
+    lit = [dr.dot(corner, toward) > near_light for corner in corners]
+    total, count = 0.0, 0
+    for weights in INNER:
+        gap = one(corners, weights, material) - other(corners, weights, material)
+        gap = dr.select(lit[0] & lit[1] & lit[2], gap, 0)
+        total += float(dr.sum(dr.square(gap))[0])
+        count += float(dr.count(lit[0] & lit[1] & lit[2])[0])
+    return (total / count) ** 0.5
+
+
+def mean_of(values, weights):
+    return sum(float(w) * value for w, value in zip(weights, values, strict=True))
+
+
+def flat(corners, weights, material):
+    centroid = mean_of(corners, (1 / 3,) * 3)
+    normal = dr.cross(corners[1] - corners[0], corners[2] - corners[0])
+    return shade_on_sphere(centroid, normal, material)
+
+
+def gouraud(corners, weights, material):
+    # On the unit sphere a position is its own normal.
+    values = [shade_on_sphere(corner, corner, material) for corner in corners]
+    return mean_of(values, weights)
+
+
+def phong(corners, weights, material):
+    point = mean_of(corners, weights)
+    return shade_on_sphere(point, point, material)
+
+
+def sphere(corners, weights, material):
+    """The analytic sphere, at the point in front of which the mesh lies."""
+    point = dr.normalize(mean_of(corners, weights))
+    return shade_on_sphere(point, point, material)
+
+
+DIFFUSE, GLOSSY = Material(k_d=0.8), Material(k_d=0.3, k_s=0.6, n=5)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "order"),
+    [(gouraud, phong, 2), (flat, phong, 1), (flat, gouraud, 1), (phong, sphere, 2)],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+@pytest.mark.parametrize("material", [DIFFUSE, GLOSSY], ids=["diffuse", "glossy"])
+def test_ways_of_shading_converge_at_their_order(one, other, order, material):
+    """Linear interpolation errs by the square of the edge's length, a constant by the length."""
+    errors = [difference(bands, material, one, other) for bands in (16, 32, 64, 128)]
+    orders = -np.diff(np.log2(errors))
+    print(f"{one.__name__} to {other.__name__}: rms {errors}, orders {orders}")
+    assert orders[-1] == pytest.approx(order, abs=0.1)
+    assert np.all(abs(orders - order) < 0.35)
+
+
+def test_the_horizon_costs_gouraud_half_an_order():
+    """Along it, where N.L is cut off at 0, the error falls with the edge's length."""
+    errors = [
+        difference(bands, DIFFUSE, gouraud, phong, near_light=-2) for bands in (16, 32, 64, 128)
+    ]
+    orders = -np.diff(np.log2(errors))
+    print(f"gouraud to phong, whole sphere: rms {errors}, orders {orders}")
+    assert np.mean(orders) == pytest.approx(1.5, abs=0.25)
+
+
+# --- In Mitsuba -----------------------------------------------------------------------------------
+
+
+def triangle_mesh(points, normals=None, faces=((0, 1, 2),), **properties):
+    """A mesh of a few triangles, as a user would build it."""
+    props = mi.Properties()
+    for name, value in properties.items():
+        props[name] = value
+    mesh = mi.Mesh("few", len(points), len(faces), props, has_vertex_normals=normals is not None)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(np.ravel(points).astype(np.float32))
+    parameters["faces"] = mi.UInt32(np.ravel(faces).astype(np.uint32))
+    if normals is not None:
+        parameters["vertex_normals"] = mi.Float(np.ravel(normals).astype(np.float32))
+    parameters.update()
+    mesh.set_id("few")
+    return mesh
+
+
+def looking_down(xy, height=5.0):
+    xy = np.asarray(xy, np.float32)
+    return mi.Ray3f(mi.Point3f(*xy.T, height), mi.Vector3f(0, 0, -1))
+
+
+def hits(mesh, ray):
+    si = mi.load_dict({"type": "scene", "mesh": mesh}, optimize=False).ray_intersect(ray)
+    assert dr.all(si.is_valid())
+    return si
+
+
+CORNERS = np.array([(0, 0, 0), (4, 0, 0), (0, 4, 1.0)])
+TILTED = np.array([(0.6, 0, 0.8), (0, -0.6, 0.8), (0, 0, 1.0)])
+COLOURED = Material(k_a=0.1, k_d=(0.5, 0.3, 0.2), k_s=0.4, n=4)
+LIGHTS = [PointLight((1, 2, 6), (1, 0.5, 0.25)), DirectionalLight((0, 1, -2), 0.5)]
+
+
+def by_oracle(position, normal, viewer):
+    """COLOURED under LIGHTS, by the NumPy oracle."""
+    material = oracle.Material(k_a=0.1, k_d=(0.5, 0.3, 0.2), k_s=0.4, n=4)
+    lights = [
+        oracle.Light("point", (1, 0.5, 0.25), position=(1, 2, 6)),
+        oracle.Light("directional", 0.5, direction=(0, 1, -2)),
+    ]
+    return oracle.shade(position, normal, np.array(viewer) - position, material, lights, 1.0)
+
+
+def test_gouraud_is_stored_at_vertices_and_interpolated(rgb):
+    mesh = triangle_mesh(CORNERS, TILTED)
+    assert shade_mesh(mesh, GOURAUD, (1, 1, 9), COLOURED, LIGHTS, 1.0) == 3
+    at_vertices = by_oracle(CORNERS, TILTED, (1, 1, 9))
+    stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
+    np.testing.assert_allclose(stored, at_vertices, rtol=1e-5)
+    weights = INNER
+    si = hits(mesh, looking_down((weights @ CORNERS)[:, :2]))
+    found = rows(mi.Color3f(stored_shade(si, GOURAUD)))
+    np.testing.assert_allclose(found, weights @ at_vertices, rtol=1e-5, atol=1e-6)
+
+
+def test_flat_is_one_value_a_face(rgb):
+    mesh = triangle_mesh(CORNERS, TILTED)
+    shade_mesh(mesh, FLAT, (1, 1, 9), COLOURED, LIGHTS, 1.0)
+    normal = np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])
+    expected = by_oracle(CORNERS.mean(0)[None], normal[None] / np.linalg.norm(normal), (1, 1, 9))
+    si = hits(mesh, looking_down((INNER @ CORNERS)[:, :2]))
+    found = rows(mi.Color3f(stored_shade(si, FLAT)))
+    np.testing.assert_allclose(found, np.repeat(expected, len(INNER), 0), rtol=1e-5)
+
+
+def test_phong_interpolates_the_normal_that_mitsuba_shades_with(rgb):
+    mesh = triangle_mesh(CORNERS, TILTED)
+    si = hits(mesh, looking_down((INNER @ CORNERS)[:, :2]))
+    mean = INNER @ TILTED
+    expected = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    np.testing.assert_allclose(rows(si.sh_frame.n), expected, atol=1e-6)
+
+
+def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb):
+    """Figure 6.14: light and viewer stand over the middle, and no vertex sees the highlight."""
+    angles = 2 * np.pi * np.arange(3) / 3
+    corners = np.stack([2 * np.cos(angles), 2 * np.sin(angles), 0 * angles], 1)
+    mesh = triangle_mesh(corners, [(0, 0, 1)] * 3)
+    above = (0, 0, 2.0)
+    material, lights = Material(k_s=0.9, n=50), [PointLight(above, 1.0)]
+    si = hits(mesh, looking_down(np.zeros((1, 2))))
+    kept = shade(
+        mi.Vector3f(si.p), mi.Vector3f(si.sh_frame.n), mi.Vector3f(above), material, lights
+    )
+    for interpolation, at_most in {GOURAUD: 1e-6, FLAT: 0.9}.items():
+        shade_mesh(mesh, interpolation, above, material, lights)
+        value = float(stored_shade(si, interpolation, components=1)[0][0])
+        assert value <= at_most * (1 + 1e-6)
+    assert float(kept[0]) == pytest.approx(0.9, rel=1e-5)
+
+
+@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
+@pytest.mark.parametrize("count", [1, 3, 4, 7])
+def test_any_number_of_wavelengths(rgb, count, interpolation):
+    shares = tuple(np.linspace(0.1, 1, count))
+    material = Material(k_d=shares[0] if count == 1 else shares)
+    mesh = triangle_mesh(CORNERS, TILTED)
+    stored = shade_mesh(mesh, interpolation, (1, 1, 9), material, LIGHTS[1:])
+    assert stored == (count if count > 1 else 3)
+    si = hits(mesh, looking_down([(1, 1)]))
+    values = [float(v[0]) for v in stored_shade(si, interpolation, count)]
+    assert len(values) == count
+    assert values[-1] > 0
+    np.testing.assert_allclose(
+        np.array(values) / values[-1], np.array(shares) / shares[-1], rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
+def test_large_meshes_are_stored_whole(rgb, interpolation):
+    """Mitsuba reads past the end of a list that is too short, which large meshes bring to light."""
+    mesh = meshes.to_mesh(mi.load_dict({"type": "sphere"}), 256)
+    shade_mesh(mesh, interpolation, (0, 0, 9), Material(k_d=1.0), LIGHTS[1:])
+    name = "face_heuristic" if interpolation is FLAT else "vertex_heuristic"
+    stored = dr.unravel(mi.Color3f, mesh.attribute_buffer(name))
+    points = shading_points(mesh, interpolation)
+    toward = dr.normalize(mi.Vector3f(0, -1, 2))
+    expected = 0.5 * dr.maximum(dr.dot(points.n, toward), 0)
+    assert float(dr.max(abs(stored.y - expected))[0]) < 1e-6
+
+
+def test_shading_again_replaces_what_was_stored(rgb):
+    mesh = triangle_mesh(CORNERS, TILTED)
+    si = hits(mesh, looking_down([(1, 1)]))
+    for k_a in (0.25, 0.5):
+        shade_mesh(mesh, GOURAUD, (1, 1, 9), Material(k_a=k_a), [], 1.0)
+        assert [float(v[0]) for v in stored_shade(si, GOURAUD)] == pytest.approx([k_a] * 3)
+
+
+def test_the_back_is_black_or_has_its_own_values(rgb):
+    mesh = triangle_mesh(CORNERS, -TILTED, [(0, 2, 1)])
+    material, lights = Material(k_d=1.0), [DirectionalLight((0, 0, -1), 1.0)]
+    si = hits(mesh, looking_down([(1, 1)]))
+    for interpolation in (FLAT, GOURAUD):
+        shade_mesh(mesh, interpolation, (1, 1, 9), material, lights, twosided=True)
+        assert float(stored_shade(si, interpolation)[0][0]) == 0
+        assert float(stored_shade(si, interpolation, twosided=True)[0][0]) > 0.7
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+@pytest.mark.parametrize("flipped", [False, True])
+def test_evaluating_at_the_corners_of_the_face_gives_what_is_stored(variant, flipped):
+    """Several meshes and a sphere, with texture coordinates and normals or without."""
+    ball = mi.load_dict({"type": "sphere", "center": (0, 0, -5)})
+    mesh = meshes.to_mesh(mi.load_dict({"type": "sphere", "flip_normals": flipped}), 6)
+    few = triangle_mesh(np.add(CORNERS, (3, 3, 0)), TILTED)
+    roof = triangle_mesh(np.add(ROOF, (-4, 3, 0)), faces=ROOF_FACES)
+    faceted = triangle_mesh(CORNERS - (6, 6, 0), face_normals=True)
+    smooth = (mesh, few, roof)
+    for each in smooth:
+        shade_mesh(each, GOURAUD, (1, 1, 9), COLOURED, LIGHTS, 1.0)
+    shapes = {"a": ball, "b": mesh, "c": few, "d": roof, "e": faceted}
+    scene = mi.load_dict({"type": "scene", **shapes}, optimize=False)
+    xy = np.random.default_rng(4).uniform(-6, 8, (5000, 2))
+    si = scene.ray_intersect(looking_down(xy))
+    corners = MeshCorners(scene).at(si, si.is_valid())
+    total = mi.Color3f(0)
+    for weight, at in corners:
+        position = mi.Vector3f(at.p)
+        view = mi.Vector3f(1, 1, 9) - position
+        colour = shade(position, mi.Vector3f(at.sh_frame.n), view, COLOURED, LIGHTS, 1.0)
+        total += weight * mi.Color3f(colour)
+    stored = mi.Color3f(stored_shade(si, GOURAUD, twosided=False, active=si.is_valid()))
+    for each in smooth:
+        where = np.array(si.shape == mi.ShapePtr(each))
+        assert where.sum() > 30
+        if flipped and each is mesh:  # rays from above meet its outside, which is its back
+            assert not rows(stored)[where].any()
+        else:
+            np.testing.assert_allclose(rows(total)[where], rows(stored)[where], atol=2e-6)
+    where = np.array(si.shape == mi.ShapePtr(faceted))
+    assert where.sum() > 30
+    np.testing.assert_allclose(rows(corners[0][1].n)[where], rows(si.n)[where], atol=1e-6)
+    assert np.isfinite(rows(total)).all()
+    assert not rows(total)[np.array(si.shape == mi.ShapePtr(ball))].any()
+
+
+def test_flipped_normals_are_those_that_mitsuba_shades_with(rgb):
+    mesh = triangle_mesh(CORNERS, TILTED, flip_normals=True)
+    si = hits(mesh, looking_down([(1, 1)]))
+    for interpolation in (FLAT, GOURAUD):
+        points = shading_points(mesh, interpolation)
+        assert dr.all(dr.dot(points.n, si.sh_frame.n) > 0.7)
+        assert dr.all(dr.dot(points.n, si.n) > 0.7)
+
+
+@pytest.mark.parametrize("plugin", ["sphere", "disk", "cylinder", "rectangle"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
+    placed = mi.ScalarTransform4f().translate((1, 2, 3)).rotate((0.6, 0, 0.8), 40).scale(2)
+    shape = mi.load_dict(
+        {
+            "type": plugin,
+            "id": "it",
+            "to_world": placed,
+            "flip_normals": flipped,
+            "bsdf": {"type": "phong"},
+        }
+    )
+    mesh = meshes.to_mesh(shape, 32)
+    assert mesh.id() == "it"
+    assert mesh.bsdf().class_name() == shape.bsdf().class_name()
+    step = np.pi / 64
+    area = {
+        "rectangle": 1,
+        "disk": np.sinc(1 / 64),
+        "cylinder": np.sinc(1 / 128),
+        "sphere": 1 - 5 / 24 * step**2,
+    }
+    assert float(mesh.surface_area()[0] / shape.surface_area()[0]) == pytest.approx(
+        area[plugin], rel=1e-4
+    )
+
+    rng = np.random.default_rng(8)
+    centre = np.array([[1], [2], [3]])
+    origin = mi.Point3f(*(centre + rng.normal(size=(3, 4000)) * 9).astype(np.float32))
+    aim = mi.Point3f(*(centre + rng.uniform(-1.2, 1.2, (3, 4000))).astype(np.float32))
+    ray = mi.Ray3f(origin, dr.normalize(aim - origin))
+    one, other = (
+        mi.load_dict({"type": "scene", "it": it}, optimize=False).ray_intersect(ray)
+        for it in (shape, mesh)
+    )
+    both = one.is_valid() & other.is_valid()
+    assert float(dr.count(both)[0]) > 0.97 * float(dr.count(one.is_valid())[0]) > 300
+    # Rays along the surface meet it far apart; those within 80 degrees of the normal do not.
+    steep = both & (abs(dr.dot(one.n, ray.d)) > 0.17)
+    assert float(dr.max(dr.select(steep, dr.norm(one.p - other.p), 0))[0]) < 8 * step**2
+    gap = dr.norm(one.sh_frame.n - other.sh_frame.n)
+    assert float(dr.max(dr.select(steep, gap, 0))[0]) < 4 * step**2
+    assert dr.all(~steep | (dr.dot(other.n, other.sh_frame.n) > 0.99))
+    seam = abs(one.uv - other.uv)
+    seam = dr.minimum(seam, 1 - seam)
+    middle = steep & (one.uv.x > 0.1) & (one.uv.x < 0.9) & (one.uv.y > 0.1) & (one.uv.y < 0.9)
+    assert float(dr.max(dr.select(middle, dr.max(seam), 0))[0]) < 0.02
+
+
+@pytest.mark.parametrize("plugin", ["sphere", "cylinder", "disk"])
+def test_made_meshes_have_no_cracks(rgb, plugin):
+    """Edges that meet at the seam and the poles do so in equal points: each is shared or a rim."""
+    mesh = meshes.to_mesh(mi.load_dict({"type": plugin}), 5)
+    points, faces = rows(meshes.positions(mesh)) + 0.0, np.array(meshes.faces(mesh)).T  # no -0
+    _, same = np.unique(points, axis=0, return_inverse=True)
+    edges = {
+        (a, b) for face in same.ravel()[faces] for a, b in zip(face, np.roll(face, -1), strict=True)
+    }
+    rim = [edge for edge in edges if edge[::-1] not in edges]
+    assert len(edges) == 3 * len(faces)
+    assert len(rim) == {"sphere": 0, "cylinder": 40, "disk": 20}[plugin]
+
+
+def test_a_cube_stays_the_mesh_that_it_is(rgb):
+    cube = mi.load_dict({"type": "cube"})
+    assert meshes.to_mesh(cube) is cube
+
+
+def test_other_shapes_are_refused(rgb):
+    shape = mi.load_dict(
+        {
+            "type": "sdfgrid",
+            "id": "blob",
+            "grid": mi.TensorXf(np.linspace(-1, 1, 8).reshape(2, 2, 2, 1)),
+        }
+    )
+    with pytest.raises(InputError, match=r"'blob'.*SDFGrid.*phong interpolation"):
+        meshes.to_mesh(shape)
+
+
+def test_a_sheared_cylinder_is_refused(rgb, capfd):
+    sheared = mi.ScalarTransform4f().rotate((1, 2, 3), 40)  # an axis of another length than 1
+    shape = mi.load_dict({"type": "cylinder", "id": "tube", "to_world": sheared})
+    assert "shearing" in capfd.readouterr().out
+    with pytest.raises(InputError, match=r"'tube'.*to_world"):
+        meshes.to_mesh(shape)
+
+
+@pytest.mark.parametrize("resolution", [0, -3, 1.5])
+def test_resolutions_that_mean_nothing_are_refused(rgb, resolution):
+    with pytest.raises(InputError, match="whole number of 1 or more"):
+        meshes.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
+
+
+# --- Meshes without, or with several, vertex normals ----------------------------------------------
+
+ROOF = np.array([(0, 0, 1), (0, 2, 1), (2, 0, 0), (-2, 0, 0.0)])
+ROOF_FACES = [(0, 2, 1), (0, 1, 3)]
+
+
+def test_a_mesh_without_vertex_normals_gets_those_of_6_34(rgb):
+    mesh = triangle_mesh(ROOF, faces=ROOF_FACES)
+    expected = np.array([(0, 0, 1)] * 2 + [(1, 0, 2) / np.sqrt(5), (-1, 0, 2) / np.sqrt(5)])
+    np.testing.assert_allclose(rows(shading_points(mesh, GOURAUD).n), expected, atol=1e-6)
+    for weighting in Weighting:
+        smooth = meshes.with_vertex_normals(mesh, weighting)
+        np.testing.assert_allclose(rows(meshes.normals(smooth)), expected, atol=1e-6)
+        assert smooth.has_vertex_normals()
+    assert not mesh.has_vertex_normals()
+
+
+def test_face_normals_need_faces_of_their_own_vertices(rgb):
+    mesh = triangle_mesh(ROOF, faces=ROOF_FACES, face_normals=True)
+    with pytest.raises(InputError, match="split_faces"):
+        shading_points(mesh, GOURAUD)
+    split = meshes.split_faces(mesh)
+    expected = np.repeat([(1, 0, 2), (-1, 0, 2)], 3, axis=0) / np.sqrt(5)
+    np.testing.assert_allclose(rows(shading_points(split, GOURAUD).n), expected, atol=1e-6)
+    assert split.vertex_count() == 6
+    assert float(split.surface_area()[0]) == pytest.approx(float(mesh.surface_area()[0]))
+
+
+def test_opposing_faces_are_refused(rgb):
+    mesh = triangle_mesh(CORNERS, faces=[(0, 1, 2), (2, 1, 0)])
+    with pytest.raises(InputError, match="'few': 3 vertices have no normal"):
+        shading_points(mesh, GOURAUD)
+    assert rows(shading_points(mesh, FLAT).n)[:, 2] == pytest.approx([0.9701425, -0.9701425])
+
+
+def test_degenerate_faces_and_lone_vertices_stay_black_and_finite(rgb):
+    points = [*CORNERS, (8, 0, 0), (9, 9, 9)]
+    mesh = triangle_mesh(points, faces=[(0, 1, 2), (0, 1, 3), (1, 1, 1)])
+    for interpolation, name in {FLAT: "face_heuristic", GOURAUD: "vertex_heuristic"}.items():
+        shade_mesh(mesh, interpolation, (1, 1, 9), COLOURED, LIGHTS)
+        stored = np.array(mesh.attribute_buffer(name)).reshape(-1, 3)
+        assert np.isfinite(stored).all()
+        assert stored[0].min() > 0
+        assert not stored[-1].any()
+
+
+def test_phong_has_nothing_to_store(rgb):
+    with pytest.raises(InputError, match="every point"):
+        shade_mesh(triangle_mesh(CORNERS, TILTED), PHONG, (0, 0, 1), COLOURED, LIGHTS)
+
+
+# --- Whole pictures -------------------------------------------------------------------------------
+
+
+def picture(shape, interpolation, viewer, material, lights):
+    """Render a shape by an integrator that reads what `shade_mesh` stored."""
+
+    class Interpolated(mi.SamplingIntegrator):
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            si = scene.ray_intersect(ray, active)
+            hit = active & si.is_valid()
+            if interpolation is PHONG:
+                colour = shade(
+                    mi.Vector3f(si.p), mi.Vector3f(si.sh_frame.n), -ray.d, material, lights
+                )
+                colour = mi.Color3f(colour)
+            else:
+                colour = mi.Color3f(stored_shade(si, interpolation, active=hit))
+            return mi.Spectrum(dr.select(hit, colour, 0)), hit, []
+
+    if interpolation is not PHONG:
+        shade_mesh(shape, interpolation, viewer, material, lights)
+    sensor = {
+        "type": "perspective",
+        "fov": 40.0,
+        "to_world": mi.ScalarTransform4f().look_at(viewer, (0, 0, 0), (0, 0, 1)),
+        "film": {"type": "hdrfilm", "width": 96, "height": 96, "rfilter": {"type": "box"}},
+    }
+    scene = mi.load_dict({"type": "scene", "it": shape, "sensor": sensor}, optimize=False)
+    return np.array(mi.render(scene, integrator=Interpolated(mi.Properties()), spp=16, seed=2))
+
+
+def test_pictures_of_a_finer_mesh_come_near_the_analytic_sphere(rgb):
+    """Silhouettes differ by the mesh's step, so the pixels that count are those inside both."""
+    viewer, lights = (-3, -3, 0), [PointLight((-4.24, 0, 0), 1.0)]
+    material = Material(k_d=0.5, k_s=0.7, n=9)
+    ball = mi.load_dict({"type": "sphere"})
+    analytic = picture(ball, PHONG, viewer, material, lights)
+    rows_, columns = np.mgrid[:96, :96] - 47.5
+    inner = rows_**2 + columns**2 < 25**2
+    assert analytic[inner].mean() > 0.2
+    errors = {}
+    for interpolation in Interpolation:
+        for resolution in (8, 32):
+            found = picture(
+                meshes.to_mesh(ball, resolution), interpolation, viewer, material, lights
+            )
+            assert np.isfinite(found).all()
+            errors[interpolation.value, resolution] = np.sqrt(
+                np.mean((found - analytic)[inner] ** 2)
+            )
+    print(errors)
+    assert errors["flat", 8] > 1.5 * errors["gouraud", 8] > 5 * errors["phong", 8]
+    assert errors["flat", 32] < 0.35 * errors["flat", 8]
+    assert errors["gouraud", 32] < 0.15 * errors["gouraud", 8]
+    assert errors["phong", 32] < 1e-3
+
+
+def test_a_scenes_shapes_are_replaced_by_meshes_that_keep_material_and_name(rgb, tmp_path):
+    """From a figure's graph to values at vertices, with the plugins' own material and lights."""
+    graph = builtin("fig-8-9").source().parse()
+    shapes = {shape.id(): shape for shape in graph.instantiate().shapes()}
+    for node in graph.nodes(mi.ObjectType.Shape):
+        given = graph.props(node)
+        path = tmp_path / f"{node}.ply"
+        meshes.to_mesh(shapes[given.id()], 8).write_ply(str(path))
+        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
+        graph.replace(node, properties("ply", filename=str(path), **children))
+    scene = graph.instantiate()
+    (mesh,) = scene.shapes()
+    assert mesh.id() == "sphere"
+    at = shading_points(mesh, GOURAUD)
+    viewer = scene.sensors()[0].world_transform().translation()
+    lights = [emitter.light(at) for emitter in scene.emitters()]
+    shade_mesh(mesh, GOURAUD, viewer, mesh.bsdf().material(at), lights, 1.0)
+    points, light = rows(at.p), oracle.Light("point", 1.0, position=(-4.24, 0, 0))
+    expected = oracle.shade(
+        points,
+        points,
+        np.array((-3, 0, 1)) - points,
+        oracle.Material(k_a=0.3, k_d=0.5, k_s=0.7, n=9),
+        [light],
+        1.0,
+    )
+    stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
+    np.testing.assert_allclose(stored, np.broadcast_to(expected, stored.shape), atol=1e-5)

@@ -1,0 +1,392 @@
+"""Normals of surfaces (6.16-6.25) and of mesh vertices (6.32-6.34), against closed forms."""
+
+import drjit as dr
+import drjit.llvm
+import drjit.llvm.ad
+import drjit.scalar
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heuristic import normals
+from heuristic.errors import InputError
+from heuristic.vertex_normals import Weighting, corner_angles, relative_areas, vertex_normals
+
+SINGLE, DOUBLE = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
+EVERY_TYPE = pytest.mark.parametrize(
+    "vector_type", [SINGLE, DOUBLE, drjit.llvm.Array3f, drjit.llvm.Array3f64], ids=str
+)
+EVERY_WEIGHTING = pytest.mark.parametrize("weighting", Weighting, ids=lambda w: w.value)
+Array3u = drjit.llvm.ad.Array3u
+
+
+def rows(vectors):
+    return np.atleast_2d(np.array(vectors, float).T)
+
+
+def rounding(vector_type):
+    return 2 * dr.epsilon(vector_type)
+
+
+def require_units(found, expected, tolerance):
+    np.testing.assert_allclose(rows(found), np.atleast_2d(expected), rtol=0, atol=tolerance)
+
+
+# --- Planes and triangles ----------------------------------------------------------------------
+
+
+@EVERY_TYPE
+def test_a_plane_has_its_coefficients_as_normal(vector_type):
+    number = dr.value_t(vector_type)
+    require_units(
+        normals.plane_normal(number(2), number(-3), number(6)),
+        (2 / 7, -3 / 7, 6 / 7),
+        rounding(vector_type),
+    )
+
+
+def test_both_forms_of_a_plane_are_one():
+    normal, point = DOUBLE(2 / 7, -3 / 7, 6 / 7), DOUBLE(1, 2, -4)
+    a, b, c, d = normals.plane_coefficients(normal, point)
+    require_units(normals.plane_normal(a, b, c), rows(normal)[0], 1e-15)
+    assert float((a * 1 + b * 2 + c * -4 + d)[0]) == pytest.approx(0, abs=1e-15)
+    other = DOUBLE(1.5, -2, 0.25)
+    value = a * other.x + b * other.y + c * other.z + d
+    assert float(value[0]) == pytest.approx(float(dr.dot(normal, other - point)[0]))
+
+
+@EVERY_TYPE
+def test_a_triangle_faces_those_who_see_it_anticlockwise(vector_type):
+    p0, p1, p2 = vector_type(1, 1, 5), vector_type(3, 1, 5), vector_type(1, 2, 5)
+    require_units(normals.triangle_normal(p0, p1, p2), (0, 0, 1), 0)
+    require_units(normals.triangle_normal(p1, p2, p0), (0, 0, 1), 0)
+    require_units(normals.triangle_normal(p0, p2, p1), (0, 0, -1), 0)
+
+
+def test_scalar_arrays_work_too():
+    array = drjit.scalar.Array3f64
+    found = normals.triangle_normal(array(0, 0, 0), array(2, 0, 0), array(5, 3, 0))
+    assert list(found) == [0, 0, 1]
+    found = normals.triangle_normal(array(0, 0, 0), array(2, 0, 0), array(5, 0, 0))
+    assert list(found) == [0, 0, 0]
+
+
+whole = st.integers(-1000, 1000)
+vectors = st.tuples(whole, whole, whole)
+
+
+@settings(max_examples=50, deadline=None)
+@given(point=vectors, direction=vectors, s=st.integers(-1000, 1000), t=st.integers(-1000, 1000))
+def test_collinear_vertices_have_no_normal(point, direction, s, t):
+    """Whole numbers are exact in both precisions, so that the points are truly on a line."""
+    for vector_type in (SINGLE, DOUBLE):
+        p = vector_type(*point)
+        found = normals.triangle_normal(
+            p, p + s * vector_type(*direction), p + t * vector_type(*direction)
+        )
+        require_units(found, (0, 0, 0), 0)
+
+
+def test_nearly_collinear_vertices_have_no_normal():
+    """0.1, 0.2, 0.3 and three times that are no multiples of each other as floats."""
+    found = normals.triangle_normal(SINGLE(0), SINGLE(0.1, 0.2, 0.3), SINGLE(0.3, 0.6, 0.9))
+    require_units(found, (0, 0, 0), 0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(a=vectors, b=vectors)
+def test_two_opposing_faces_cancel_exactly(a, b):
+    p0, p1, p2 = SINGLE(0.1, 0.2, 0.3), SINGLE(*a) * 0.37, SINGLE(*b) * 0.73
+    forth, back = normals.cross(p1 - p0, p2 - p0), normals.cross(p2 - p0, p1 - p0)
+    require_units(forth + back, (0, 0, 0), 0)
+
+
+@EVERY_TYPE
+@pytest.mark.parametrize("scale", [1e-30, 1e-18, 1.0, 1e18, 1e37])
+def test_the_size_of_a_triangle_does_not_matter(vector_type, scale):
+    found = normals.triangle_normal(
+        vector_type(0), vector_type(scale, 0, scale), vector_type(0, scale, 0)
+    )
+    require_units(found, (-(0.5**0.5), 0, 0.5**0.5), rounding(vector_type))
+
+
+@EVERY_TYPE
+def test_the_length_of_gradients_and_tangents_does_not_matter(vector_type):
+    for scale in (1e-30, 1e30):
+        found = normals.implicit_normal(vector_type(scale, 0, -scale))
+        require_units(found, (0.5**0.5, 0, -(0.5**0.5)), rounding(vector_type))
+        for other in (1e-30, 1e30):
+            tangents = vector_type(scale, 0, 0), vector_type(other, other, 0)
+            require_units(normals.parametric_normal(*tangents), (0, 0, 1), rounding(vector_type))
+
+
+@pytest.mark.parametrize(
+    "order", [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)]
+)
+def test_a_needle_has_the_normal_of_its_points(order):
+    """Sides near 1, base 1e-4, away from the axes: two long sides would lose four digits."""
+    points = np.array([[0.3, 0.1, 0.2], [0.9, 0.7, 0.5], [0.9, 0.70006, 0.49992]], np.float32)
+    exact = points.astype(float)
+    a, b, c = exact[list(order)]
+    product = np.cross(b - a, c - a)
+    found = normals.triangle_normal(*(SINGLE(*points[i].tolist()) for i in order))
+    require_units(found, product / np.linalg.norm(product), 4 * rounding(SINGLE))
+
+
+# --- Implicit and parametric surfaces ------------------------------------------------------------
+
+AXES = [(1, 1, 1), (3, 2, 1), (1000, 1, 1), (1, 1, 1000), (1, 1000, 0.03), (1e-3, 1, 0.5)]
+
+
+def longitude_latitude(vector_type, seed=1):
+    """Random places on an ellipsoid, the equator, meridians and the near of a pole among them."""
+    rng = np.random.default_rng(seed)
+    u = np.concatenate([rng.uniform(-np.pi, np.pi, 500), [0, np.pi / 2, 1, 1, 1]])
+    v = np.concatenate([rng.uniform(-1.55, 1.55, 500), [0, 0, 0, 1.5707, -1.5707]])
+    number = dr.value_t(vector_type)
+    return number(u), number(v)
+
+
+@EVERY_TYPE
+@pytest.mark.parametrize("axes", AXES)
+def test_both_ways_to_an_ellipsoids_normal_agree_and_point_outwards(vector_type, axes):
+    u, v = longitude_latitude(vector_type)
+    point = normals.ellipsoid_point(u, v, *axes)
+    implicit = normals.implicit_normal(normals.ellipsoid_gradient(point, *axes))
+    parametric = normals.parametric_normal(*normals.ellipsoid_tangents(u, v, *axes))
+    require_units(implicit, rows(parametric), 8 * rounding(vector_type))
+    assert dr.all(dr.dot(implicit, point) > 0)
+    np.testing.assert_allclose(dr.norm(implicit), 1, atol=2 * rounding(vector_type))
+
+
+@EVERY_TYPE
+def test_points_of_6_24_satisfy_6_21(vector_type):
+    u, v = longitude_latitude(vector_type)
+    value = normals.ellipsoid(normals.ellipsoid_point(u, v, 3, 2, 1), 3, 2, 1)
+    assert float(dr.max(abs(value))[0]) < 8 * rounding(vector_type)
+    assert float(normals.ellipsoid(vector_type(0), 3, 2, 1)[0]) == -1
+
+
+def test_gradient_and_tangents_are_the_derivatives():
+    """Dr.Jit differentiates 6.21 and 6.24; the closed forms must say the same."""
+    axes = (3.0, 2.0, 0.5)
+    u, v = longitude_latitude(DOUBLE)
+    point = dr.detach(normals.ellipsoid_point(u, v, *axes))
+    dr.enable_grad(point)
+    dr.backward(normals.ellipsoid(point, *axes))
+    gradient = normals.ellipsoid_gradient(dr.detach(point), *axes)
+    np.testing.assert_allclose(rows(dr.grad(point)), rows(gradient), atol=1e-13)
+    for number, tangent in enumerate(normals.ellipsoid_tangents(u, v, *axes)):
+        place = [drjit.llvm.ad.Float64(u), drjit.llvm.ad.Float64(v)]
+        dr.enable_grad(place[number])
+        moved = normals.ellipsoid_point(*place, *axes)
+        dr.forward(place[number])
+        np.testing.assert_allclose(rows(dr.grad(moved)), rows(tangent), atol=1e-13)
+
+
+@EVERY_TYPE
+def test_an_ellipsoid_has_no_parametric_normal_at_its_poles(vector_type):
+    number = dr.value_t(vector_type)
+    u, v = number([0.3, 0.3, 2.0]), number([np.pi / 2, -np.pi / 2, np.pi / 2])
+    tangents = normals.ellipsoid_tangents(u, v, 3, 2, 1)
+    require_units(normals.parametric_normal(*tangents), np.zeros((3, 3)), 0)
+    point = normals.ellipsoid_point(u, v, 3, 2, 1)
+    implicit = normals.implicit_normal(normals.ellipsoid_gradient(point, 3, 2, 1))
+    require_units(implicit, [(0, 0, 1), (0, 0, -1), (0, 0, 1)], rounding(vector_type))
+
+
+@EVERY_TYPE
+def test_what_has_no_direction_has_the_zero_normal(vector_type):
+    zero = vector_type(0)
+    require_units(normals.implicit_normal(zero), (0, 0, 0), 0)
+    require_units(normals.plane_normal(zero.x, zero.y, zero.z), (0, 0, 0), 0)
+    require_units(normals.parametric_normal(zero, vector_type(1, 2, 3)), (0, 0, 0), 0)
+    parallel = normals.parametric_normal(vector_type(0.1, 0.2, 0.3), vector_type(0.3, 0.6, 0.9))
+    require_units(parallel, (0, 0, 0), 0)
+
+
+# --- Vertices ------------------------------------------------------------------------------------
+
+
+def uv_sphere(bands, vector_type=DOUBLE):
+    """A closed sphere of ``bands`` bands whose vertices at the seam and the poles are shared."""
+    columns = 2 * bands
+    v = np.repeat(np.linspace(-np.pi / 2, np.pi / 2, bands + 1)[1:-1], columns)
+    u = np.tile(np.arange(columns) * 2 * np.pi / columns, bands - 1)
+    points = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], 1)
+    points = np.concatenate([points, [[0, 0, -1], [0, 0, 1]]])
+    south, north = len(points) - 2, len(points) - 1
+    faces = []
+    for c in range(columns):
+        d = (c + 1) % columns
+        faces.append((south, d, c))
+        for r in range(bands - 2):
+            low, high = r * columns, (r + 1) * columns
+            faces += [(low + c, low + d, high + d), (low + c, high + d, high + c)]
+        top = (bands - 2) * columns
+        faces.append((top + c, top + d, north))
+    return vector_type(points.T), Array3u(np.array(faces).T.astype(np.uint32))
+
+
+@EVERY_WEIGHTING
+def test_vertex_normals_of_a_sphere_converge_to_its_own(weighting):
+    """At second order by angle; by the others the rows next to the poles, where faces are unlike,
+    stay wrong, which leaves 3/2.
+    """
+    errors = []
+    for bands in (8, 16, 32, 64):
+        points, faces = uv_sphere(bands)
+        found = vertex_normals(points, faces, weighting)
+        distance = dr.norm(found - points)
+        errors.append(float(dr.sqrt(dr.mean(dr.square(distance)))[0]))
+    orders = -np.diff(np.log2(errors))
+    print(weighting.value, "rms errors", errors, "orders", orders)
+    least = 1.85 if weighting is Weighting.ANGLE else 1.45
+    assert np.all(orders > least)
+    assert np.all(orders < least + 0.3)
+
+
+def cube_corner(cuts):
+    """Three square sides at the origin, seen from (1, 1, 1); that in z = 0 is cut into slices.
+
+    The corner touches ``cuts`` triangles of the side in the xy plane (a fan from the origin) and
+    one or two of each other side.
+    """
+    rim = [(1.0, t, 0.0) for t in np.linspace(0, 1, cuts)[:-1]] + [(1.0, 1.0, 0.0), (0, 1.0, 0.0)]
+    points = [(0.0, 0.0, 0.0), *rim, (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0)]
+    last = len(rim)
+    x, y, z, xz, yz = 1, last, last + 1, last + 2, last + 3
+    faces = [(0, i, i + 1) for i in range(1, last)]
+    faces += [(0, z, xz), (0, xz, x), (0, y, yz), (0, yz, z)]
+    return DOUBLE(np.array(points).T), Array3u(np.array(faces, np.uint32).T)
+
+
+def test_only_angles_are_indifferent_to_how_a_side_is_cut():
+    """All areas are equal, however many slices there are; the mean counts the slices."""
+    for cuts in (2, 3, 9):
+        points, faces = cube_corner(cuts)
+        for weighting in Weighting:
+            x, y, z = rows(vertex_normals(points, faces, weighting))[0]
+            assert y == pytest.approx(x)
+            share = cuts / 2 if weighting is Weighting.MEAN else 1
+            assert z / x == pytest.approx(share, rel=1e-14), (weighting, cuts)
+
+
+def test_areas_count_what_does_not_touch_the_vertex():
+    """A cut off the corner takes area from the faces around it, and leaves their angles alone."""
+    points = DOUBLE([0, 1, 0, 0, 0.25, 0], [0, 0, 1, 0, 0, 0.25], [0, 0, 0, 1, 0, 0])
+    whole = Array3u([0, 0, 0], [1, 2, 3], [2, 3, 1])
+    cut = Array3u([0, 4, 4, 0, 5, 0, 3], [4, 1, 2, 5, 2, 3, 1], [5, 2, 5, 3, 3, 4, 4])
+    for weighting, share in {Weighting.AREA: 1 / 4, Weighting.ANGLE: 1}.items():
+        x, y, z = rows(vertex_normals(points, whole, weighting))[0]
+        assert (y / x, z / x) == pytest.approx((1, 1))
+        x, y, z = rows(vertex_normals(points, cut, weighting))[0]
+        assert (y / x, z / x) == pytest.approx((1, share))
+
+
+def test_areas_count_in_proportion():
+    """Two faces at a right angle, of areas 1/2 and 3/2."""
+    points = DOUBLE([0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 3])
+    faces = Array3u([0, 0], [1, 2], [2, 3])
+    require_units(
+        vertex_normals(points, faces, "area"),
+        [(3, 0, 1), (0, 0, 1), (3, 0, 1), (1, 0, 0)] / np.sqrt([[10], [1], [10], [1]]),
+        1e-15,
+    )
+    np.testing.assert_allclose(
+        rows(vertex_normals(points, faces, "mean"))[0], (0.5**0.5, 0, 0.5**0.5), atol=1e-15
+    )
+
+
+@EVERY_TYPE
+@EVERY_WEIGHTING
+def test_a_vertex_with_no_face_has_no_normal(vector_type, weighting):
+    points = vector_type([0, 1, 0, 7], [0, 0, 1, 7], [0, 0, 0, 7])
+    found = vertex_normals(points, Array3u(0, 1, 2), weighting)
+    require_units(found, [(0, 0, 1)] * 3 + [(0, 0, 0)], 0)
+
+
+@EVERY_WEIGHTING
+def test_a_mesh_without_faces_has_no_normals(weighting):
+    faces = dr.zeros(Array3u, 0)
+    require_units(
+        vertex_normals(SINGLE([0, 1], [0, 0], [0, 0]), faces, weighting), [(0,) * 3] * 2, 0
+    )
+
+
+@EVERY_WEIGHTING
+def test_faces_without_area_count_nothing(weighting):
+    points = SINGLE([0, 1, 0, 2, 0.5], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0])
+    faces = Array3u([0, 0, 0, 1], [1, 1, 0, 1], [2, 3, 0, 1])  # a face, a line, and two points
+    found = vertex_normals(points, faces, weighting)
+    require_units(found, [(0, 0, 1)] * 3 + [(0, 0, 0)] * 2, 0)
+
+
+@EVERY_TYPE
+@EVERY_WEIGHTING
+@pytest.mark.parametrize("thickness", [1.0, 1e-3, 1e-5])
+def test_opposing_faces_leave_no_normal(vector_type, weighting, thickness):
+    """Both sides of a sheet, the back beginning with another vertex, down to a thin sliver."""
+    rng = np.random.default_rng(3)
+    corners = rng.normal(size=(3, 3)) @ np.diag([1, 1, 1])
+    corners[2] = corners[0] + 0.4 * (corners[1] - corners[0]) + thickness * corners[2]
+    found = vertex_normals(vector_type(corners.T), Array3u([0, 1], [1, 0], [2, 2]), weighting)
+    require_units(found, np.zeros((3, 3)), 0)
+
+
+@EVERY_TYPE
+def test_two_sides_of_a_sheet_cut_along_other_diagonals_leave_no_normal(vector_type):
+    """Their normals are not exact opposites, and their angles are not exactly equal."""
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        origin, right, up = rng.normal(size=(3, 3))
+        square = np.array([origin, origin + right, origin + right + up, origin + up])
+        faces = Array3u([0, 0, 1, 1], [1, 2, 0, 3], [2, 3, 3, 2])
+        found = vertex_normals(vector_type(square.T), faces, Weighting.ANGLE)
+        require_units(found, np.zeros((4, 3)), 0)
+
+
+def test_angles_of_slivers_keep_their_digits():
+    """Base 1, height h: the small angles are atan(2h), which acos would round to zero or 5e-4."""
+    for height in (1e-1, 1e-4, 1e-6):
+        h = np.float32(height).item()
+        first, second, third = corner_angles(SINGLE(0), SINGLE(1, 0, 0), SINGLE(0.5, h, 0))
+        assert float(first[0]) == pytest.approx(np.arctan(2 * h), rel=1e-6)
+        assert float(second[0]) == pytest.approx(np.arctan(2 * h), rel=1e-6)
+        assert float(third[0]) == pytest.approx(np.pi - 2 * np.arctan(2 * h), rel=1e-6)
+
+
+@settings(max_examples=50, deadline=None)
+@given(a=vectors, b=vectors, c=vectors)
+def test_angles_add_up_to_half_a_turn(a, b, c):
+    corners = [DOUBLE(*p) for p in (a, b, c)]
+    if float(relative_areas(*corners)[0]) > 0:
+        assert float(sum(corner_angles(*corners))[0]) == pytest.approx(np.pi, rel=1e-9)
+
+
+@EVERY_WEIGHTING
+@pytest.mark.parametrize("scale", [1e-25, 1e25])
+def test_the_size_of_a_mesh_does_not_matter(weighting, scale):
+    points, faces = uv_sphere(8, SINGLE)
+    found = vertex_normals(points * scale, faces, weighting)
+    require_units(found, rows(vertex_normals(points, faces, weighting)), 8 * rounding(SINGLE))
+
+
+def test_slivers_around_a_vertex_do_not_tilt_its_angle_weighted_normal():
+    """A fan in a plane, one face of it a needle of 1e-6: every normal is the plane's."""
+    points = SINGLE([0, 1, 1, 0], [0, 0, 1e-6, 1], [0, 0, 0, 0])
+    faces = Array3u([0, 0], [1, 2], [2, 3])
+    require_units(vertex_normals(points, faces, "angle"), [(0, 0, 1)] * 4, 0)
+
+
+def test_faces_with_vertices_that_do_not_exist_are_refused():
+    points = SINGLE([0, 1, 0], [0, 0, 1], [0, 0, 0])
+    with pytest.raises(InputError, match="vertex number 3 does not exist"):
+        vertex_normals(points, Array3u(0, 1, 3))
+
+
+def test_an_unknown_weighting_is_refused():
+    points = SINGLE([0, 1, 0], [0, 0, 1], [0, 0, 0])
+    with pytest.raises(InputError, match="choose one of mean, area, angle"):
+        vertex_normals(points, Array3u(0, 1, 2), "volume")
