@@ -103,8 +103,9 @@ def compare(scenes, output, **rendering):
 def report(output, **rendering):
     """Compare all built-in scenes and write one report."""
     from comparisons.scenes import SCENES
+    from heuristic import equations
 
-    _compare(tuple(SCENES), output, rendering)
+    _compare(tuple(SCENES), output, rendering, equations.index())
 
 
 @cli.command()
@@ -141,7 +142,7 @@ def main():
         sys.exit(error.exit_code)
 
 
-def _compare(names, folder, rendering):
+def _compare(names, folder, rendering, equations=()):
     _check_installation()
     from comparisons.compare import compare as run
     from reference.scene import set_variant
@@ -161,7 +162,7 @@ def _compare(names, folder, rendering):
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
-    output.write_page(folder, list(views.values()))
+    output.write_page(folder, list(views.values()), equations)
     share = (perf_counter() - begin) / len(views)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share

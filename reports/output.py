@@ -72,9 +72,9 @@ def write_scene(folder, name, comparison):
     }
 
 
-def write_page(folder, views):
-    """Write ``index.html`` for the scenes of a run."""
-    _write(folder / "index.html", page.render(views))
+def write_page(folder, views, equations=()):
+    """Write ``index.html`` for the scenes of a run, with the index of equations if it is given."""
+    _write(folder / "index.html", page.render(views, equations=equations))
 
 
 def rewrite_record(folder, name, data):

@@ -20,6 +20,7 @@ from urllib.parse import quote
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from comparisons.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
+from heuristic.equations import Entry
 from reports import images
 
 #: The page's heading.
@@ -43,8 +44,12 @@ class Legend:
     note: str
 
 
-def render(comparisons: Sequence[Mapping[str, Any]], title: str = TITLE) -> str:
-    """One HTML page of all scenes, in the order given.
+def render(
+    comparisons: Sequence[Mapping[str, Any]],
+    title: str = TITLE,
+    equations: Sequence[Entry] = (),
+) -> str:
+    """One HTML page of all scenes, in the order given, and the index of equations if there is one.
 
     Each comparison is a mapping with
 
@@ -69,7 +74,9 @@ def render(comparisons: Sequence[Mapping[str, Any]], title: str = TITLE) -> str:
         for number, comparison in enumerate(comparisons, 1)
     ]
     page = _environment().get_template("page.html.j2")
-    return page.render(title=title, scenes=scenes, metrics=METRICS, legends=legends())
+    return page.render(
+        title=title, scenes=scenes, metrics=METRICS, legends=legends(), equations=equations
+    )
 
 
 def legends() -> tuple[Legend, ...]:
