@@ -9,4 +9,19 @@ from heuristic.materials import Material  # noqa: E402
 from heuristic.shading import shade  # noqa: E402
 from heuristic.version import __version__  # noqa: E402
 
-__all__ = ["DirectionalLight", "Material", "PointLight", "SpotLight", "__version__", "shade"]
+__all__ = [
+    "DirectionalLight",
+    "Material",
+    "PointLight",
+    "SpotLight",
+    "__version__",
+    "register",
+    "shade",
+]
+
+
+def register():
+    """Make the Mitsuba plugins known for the current variant (:mod:`heuristic.plugins`)."""
+    from heuristic import plugins  # the kernel alone needs no Mitsuba
+
+    plugins.register()

@@ -35,6 +35,8 @@ def checked(name, value):
             f"{name} = {value!r} is no colour: give a number, RGB, or one value for each"
             " wavelength."
         )
+    if not components:
+        raise InputError(f"{name} = {value!r} is not allowed: give one value or more.")
     for component in components:
         if not (np.isfinite(component) and component >= 0):
             raise InputError(f"{name} = {value!r} is not allowed: give finite values of 0 or more.")

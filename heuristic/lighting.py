@@ -27,8 +27,8 @@ def sum_lights(position, normal, view, material, lights, visible=None):
         Tells which of the two sums are needed, and the form and exponent of the specular term.
     lights : sequence
         Any number. More than :data:`BLOCK` are evaluated in blocks, so that compile time, kernel
-        size and memory do not grow with their number; where evaluation is not possible, inside a
-        symbolic loop or call, they are unrolled.
+        size and memory do not grow with their number. They are unrolled where there is nothing to
+        evaluate (scalar arrays) or it is not possible (inside a symbolic loop or call).
     visible : callable, optional
         ``visible(toward, distance)`` returns a mask of the points that the light reaches.
 
@@ -41,7 +41,9 @@ def sum_lights(position, normal, view, material, lights, visible=None):
     has_specular = not colours.is_zero(material.k_s)
     if not (has_diffuse or has_specular):
         return None, None
-    in_blocks = len(lights) > BLOCK and not dr.flag(dr.JitFlag.SymbolicScope)
+    in_blocks = (
+        len(lights) > BLOCK and dr.is_jit_v(position) and not dr.flag(dr.JitFlag.SymbolicScope)
+    )
     blocks = _blocks(lights, type(position)) if in_blocks else [lights]
     diffuse = specular = None
     for block in blocks:

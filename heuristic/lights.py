@@ -4,6 +4,7 @@ Each light answers one question, ``illuminate(position)``: from which direction 
 intensity and over what distance does its light arrive? Occlusion is not its business.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, inf, isfinite, radians
 from numbers import Real
@@ -220,14 +221,14 @@ def _intensity(value):
 
 
 def _attenuation(value):
-    coefficients = tuple(value)
-    if len(coefficients) != 3:
-        raise InputError(f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2.")
-    if not all(isinstance(coefficient, Real) for coefficient in coefficients):
+    """Return three checked numbers; where one is a Dr.Jit value, none is looked at."""
+    coefficients = tuple(value) if isinstance(value, Sequence) else ()
+    if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
         return coefficients
-    if not all(isfinite(c) and c >= 0 for c in coefficients) or not any(coefficients):
+    are_numbers = all(isinstance(c, Real) and isfinite(c) and c >= 0 for c in coefficients)
+    if len(coefficients) != 3 or not are_numbers or not any(coefficients):
         raise InputError(
-            f"attenuation = {value!r} is not allowed: k0, k1, k2 are finite, 0 or more, and not all"
-            " 0."
+            f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
+            " more, and not all 0."
         )
     return coefficients

@@ -1,7 +1,10 @@
 """The material of the illumination model: coefficients, exponent, and the form of the lobe."""
 
 from dataclasses import dataclass
+from math import inf
 from numbers import Real
+
+import drjit as dr
 
 from heuristic import colours
 from heuristic.errors import InputError
@@ -21,9 +24,9 @@ class Material:
         Ambient, diffuse and specular reflection coefficients (8.2, 8.5, 8.8), physically in 0..1.
         Each is a number, RGB, one value for each wavelength, or a Dr.Jit array.
     n
-        Phong's exponent, 0 or more. A Python integer up to
-        :data:`heuristic.terms.LARGEST_LITERAL_EXPONENT` is compiled into the kernel, and a float or
-        a Dr.Jit array is not.
+        Phong's exponent, 0 or more. A plain number is compiled into the kernel, an integer up to
+        :data:`heuristic.terms.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a run-time
+        value.
     form
         ``phong`` for the chapters' ``(R.V)^n`` (8.9), ``blinn`` for ``(N.H)^n`` of Blinn (1977),
         which OpenGL's fixed pipeline and most engines use.
@@ -48,13 +51,14 @@ class Material:
     def __post_init__(self):
         for name in ("k_i", "k_a", "k_d", "k_s"):
             object.__setattr__(self, name, colours.checked(name, getattr(self, name)))
-        if isinstance(self.n, Real):
-            _check_exponent(self.n)
+        _check_exponent(self.n)
         check_form(self.form)
 
 
 def _check_exponent(n):
-    if not (n >= 0 and n < float("inf")):
+    if dr.is_array_v(n):
+        return
+    if not (isinstance(n, Real) and 0 <= n < inf):
         raise InputError(f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more.")
 
 

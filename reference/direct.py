@@ -33,8 +33,6 @@ def _define():
             si = self._first_surface(scene, ray, active)
             seen = active & (si.is_valid() | (not self.hide_emitters))
             colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
-            if self.hide_emitters:
-                colour = dr.select(si.is_valid(), colour, 0)
             hit = active & si.is_valid()
             context = mi.BSDFContext()
             bsdf = si.bsdf(ray)

@@ -24,7 +24,8 @@ class PassTimes:
     """Times of the passes of one half, in seconds.
 
     ``first`` is that of the first pass, which traces and compiles; ``compilation`` the part of it
-    that LLVM took. ``median`` is of the passes after the first (of the first where it is alone).
+    that LLVM took, next to nothing for kernels that Dr.Jit finds in its cache on disk. ``median``
+    is of the passes after the first (of the first where it is alone).
     """
 
     median: float
@@ -123,7 +124,6 @@ class Renderer:
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
-            # An opaque seed lets all passes share one kernel.
             image = mi.render(
                 self.scene,
                 integrator=self.integrator,

@@ -48,6 +48,10 @@ def define():
             self.scale = mi.Float(props.get("scale", 1.0))
             dr.make_opaque(self.scale)
 
+        def parameters_changed(self, keys=()):
+            """Make edited numbers opaque, so that a new value compiles nothing."""
+            dr.make_opaque(self.scale)
+
         def eval(self, si, active=True):
             return mi.Spectrum(0)
 
@@ -111,6 +115,7 @@ def define():
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
+            super().parameters_changed(keys)
             self.unattenuated = self.unattenuated and not {"k0", "k1", "k2"} & set(keys)
             dr.make_opaque(self.position, self.k0, self.k1, self.k2)
 
@@ -141,6 +146,10 @@ def define():
             cone = terms.spot_cone(cos_axis, dr.cos(dr.deg2rad(self.cutoff)))
             return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
 
+        def parameters_changed(self, keys=()):
+            super().parameters_changed(keys)
+            dr.make_opaque(self.direction, self.cutoff, self.exponent)
+
         def light(self, si, active=True):
             return SpotLight(
                 self.position,
@@ -170,6 +179,10 @@ def define():
             direction = -dr.normalize(self.direction)
             ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
             return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
+
+        def parameters_changed(self, keys=()):
+            super().parameters_changed(keys)
+            dr.make_opaque(self.direction)
 
         def light(self, si, active=True):
             """Return the kernel's form of this light."""

@@ -1,0 +1,1 @@
+"""The tests: unit, statistical and physical; the benchmarks beside them."""

@@ -1,0 +1,1 @@
+"""Benchmarks: they report times, and gate nothing. ``python -m tests.benchmarks [NAME]``."""

@@ -1,0 +1,218 @@
+"""The comparisons of the kernel with the oracle and with Mitsuba's ``direct``.
+
+Each raises AssertionError where the two differ. They stand apart from the tests because the tests
+of wrong kernels (`test_mutations`) run the very same ones.
+"""
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+import heuristic
+from heuristic import shading
+from tests import oracle
+
+POINTS = 20_000
+
+LIGHTS = (
+    oracle.Light("point", 0.6, position=(2.0, -1.5, 4.0)),
+    oracle.Light("point", 3.0, position=(-3.0, 2.0, 2.5), attenuation=(0.25, 0.5, 0.125)),
+    oracle.Light("point", 0.5, (-2.5, -2.5, -3.0), attenuation=(0.25, 0.0, 0.0625), clamped=True),
+    oracle.Light("directional", 0.4, direction=(1.0, 2.0, -2.0)),
+    oracle.Light("spot", 0.5, (4.0, 0.0, 3.0), (-1.0, 0.25, -0.75), cutoff=20.0),
+    oracle.Light(
+        "spot", 9.0, (0.0, 4.0, 0.0), (0.0, -1.0, 0.0), 75.0, exponent=2.5, attenuation=(0, 0, 1)
+    ),
+)
+COEFFICIENTS = {
+    "one": dict(k_i=0.05, k_a=0.3, k_d=0.5, k_s=0.7),
+    "rgb": dict(k_i=(0.0, 0.1, 0.0), k_a=(0.3, 0.2, 0.1), k_d=(0.5, 0.4, 0.1), k_s=0.7),
+    "five": dict(
+        k_i=0.05, k_a=(0.1, 0.2, 0.3, 0.2, 0.1), k_d=(0.5, 0.4, 0.3, 0.2, 0.1), k_s=(0.7,) * 5
+    ),
+}
+TINTS = {"one": 1.0, "rgb": (1.0, 0.5, 0.25), "five": (1.0, 0.5, 0.25, 0.5, 1.0)}
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points with normals and views, exact in single precision, that look every way."""
+
+    position: np.ndarray
+    normal: np.ndarray
+    view: np.ndarray
+
+
+def random_points(count=POINTS, seed=7):
+    """Draw points from a cube about the origin; normals and views of any direction and length."""
+    rng = np.random.default_rng(seed)
+    position = rng.uniform(-1, 1, (count, 3))
+    normal, view = rng.normal(size=(2, count, 3))
+    return Points(*(array.astype(np.float32) for array in (position, normal, view)))
+
+
+def tinted(lights, tint):
+    """Give lights a colour, each another where it has components."""
+    return [
+        oracle.Light(**{**vars(light), "intensity": _times(light.intensity, np.roll(tint, place))})
+        for place, light in enumerate(lights)
+    ]
+
+
+def _times(intensity, tint):
+    product = intensity * np.asarray(tint)
+    return tuple(map(float, product)) if product.ndim and product.size > 1 else float(product.sum())
+
+
+def kernel_light(light):
+    """Turn an oracle's light into the kernel's."""
+    if light.kind == "directional":
+        return heuristic.DirectionalLight(light.direction, light.intensity)
+    attenuation = {"attenuation": light.attenuation, "clamped": light.clamped}
+    if light.kind == "point":
+        return heuristic.PointLight(light.position, light.intensity, **attenuation)
+    return heuristic.SpotLight(
+        light.position,
+        light.direction,
+        light.intensity,
+        light.cutoff,
+        light.exponent,
+        **attenuation,
+    )
+
+
+def check_kernel(vector_type, tolerance, coefficients="rgb", n=9, opaque_n=False, lights=LIGHTS):
+    """Compare `heuristic.shade` with the oracle over random points, under every kind of light."""
+    points = random_points()
+    lights = tinted(lights, TINTS[coefficients])
+    values = COEFFICIENTS[coefficients]
+    ambient = 0.5
+    exponent = dr.opaque(dr.value_t(vector_type), n) if opaque_n else n
+    found = shading.shade(
+        *(vector_type(vectors.T) for vectors in (points.position, points.normal, points.view)),
+        heuristic.Material(**values, n=exponent),
+        [kernel_light(light) for light in lights],
+        ambient,
+    )
+    expected = oracle.shade(
+        points.position,
+        points.normal,
+        points.view,
+        oracle.Material(**values, n=n),
+        lights,
+        ambient,
+    )
+    edges = oracle.near_an_edge(points.position, points.normal, lights, 1e-5)
+    assert edges.mean() < 1e-3, "too many points were left out for the comparison to mean much"
+    oracle.require_close(as_rows(found), expected, absolute=tolerance, where=~edges)
+
+
+def as_rows(value):
+    """Return a Dr.Jit float or colour as an array (N, C)."""
+    array = np.array(value, float)
+    return array[:, None] if array.ndim == 1 else array.T
+
+
+# --- Scenes ----------------------------------------------------------------------------------
+
+
+def with_film(scene, resolution, spp):
+    """Give a scene dictionary a square film and the sampler that pairs are rendered with."""
+    sensor = dict(scene["sensor"])
+    sensor["film"] = {**sensor["film"], "width": resolution, "height": resolution}
+    sensor["sampler"] = {"type": "multijitter", "sample_count": spp}
+    return {**scene, "sensor": sensor}
+
+
+def render(scene, spp, seed, integrator=None):
+    """Render a scene dictionary to an array of double precision."""
+    return np.array(
+        mi.render(
+            mi.load_dict(scene, optimize=False),
+            integrator=mi.load_dict(integrator) if integrator else None,
+            spp=spp,
+            seed=seed,
+        ),
+        float,
+    )
+
+
+def check_figure(scene, resolution=96, seed=5, tolerance=1e-5):
+    """Compare the integrator ``heuristic`` with the oracle at the positions that it shaded.
+
+    One sample a pixel and a box filter, so that a pixel is one evaluation of 8.10.
+    """
+    scene = with_film(scene, resolution, 1)
+    aovs = {"type": "aov", "aovs": "P:position,N:sh_normal", "image": scene["integrator"]}
+    channels = render(scene, 1, seed, aovs)
+    colour, position, normal = np.split(channels.reshape(-1, 9), 3, axis=1)
+    hit = np.any(normal != 0, axis=1)
+    assert 0.2 < hit.mean() < 1, "the picture should hold both surface and background"
+    assert not colour[~hit].any(), "the background should be black"
+    material, lights, ambient, viewer = described(scene)
+    expected = oracle.shade(
+        position[hit], normal[hit], viewer - position[hit], material, lights, ambient
+    )
+    # Positions in single precision cannot tell the side of a horizon that they lie on.
+    edges = oracle.near_an_edge(position[hit], normal[hit], lights, 2e-6)
+    assert edges.mean() < 1e-3, "too many pixels were left out for the comparison to mean much"
+    expected = np.broadcast_to(expected, colour[hit].shape)
+    oracle.require_close(colour[hit], expected, absolute=tolerance, where=~edges)
+
+
+def described(scene):
+    """Read material, lights, ambient light and viewer out of a scene dictionary of one sphere."""
+    bsdf = scene["sphere"]["bsdf"]
+    material = oracle.Material(
+        **{name: _plain(bsdf.get(name, 0.0)) for name in ("k_i", "k_a", "k_d", "k_s")},
+        n=bsdf.get("n", 1.0),
+    )
+    lights = [
+        oracle.Light(
+            kind=value["type"].removeprefix("heuristic_"),
+            intensity=_plain(value.get("intensity", 1.0)),
+            position=value.get("position", (0, 0, 0)),
+            direction=value.get("direction", (0, 0, 1)),
+            cutoff=value.get("cutoff", 30.0),
+            exponent=value.get("exponent", 0.0),
+            attenuation=tuple(value.get(k, d) for k, d in (("k0", 1), ("k1", 0), ("k2", 0))),
+            clamped=value.get("clamped", False),
+        )
+        for value in scene.values()
+        if isinstance(value, dict) and value.get("type", "").startswith("heuristic_")
+    ]
+    ambient = _plain(scene["integrator"].get("ambient", 0.0))
+    viewer = np.array(scene["sensor"]["to_world"].matrix)[:3, 3]
+    return material, lights, ambient, viewer
+
+
+def check_against_direct(scene, resolution=96, spp=16, seed=3):
+    """Compare the integrator ``heuristic`` with the ``phong`` plugin under Mitsuba's ``direct``.
+
+    ``direct`` draws one emitter for each sample, so every light is rendered alone, and the sum
+    taken. Emission and ambient light join one of these renderings as a ``heuristic_glow``.
+    """
+    scene = with_film(scene, resolution, spp)
+    kernel = render(scene, spp, seed)
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0, "hide_emitters": False}
+    names = [name for name in scene if name.startswith("light")]
+    dark = {name: value for name, value in scene.items() if name not in (*names, "integrator")}
+    bsdf = scene["sphere"]["bsdf"]
+    glow = {"type": "heuristic_glow", "ambient": scene["integrator"].get("ambient", 0.0)}
+    glow |= {name: bsdf[name] for name in ("k_i", "k_a") if name in bsdf}
+    if names:
+        glow["sampling_weight"] = 0.0
+    total = 0.0
+    for number, name in enumerate(names or [None]):
+        lit = dict(dark) if name is None else {**dark, name: scene[name]}
+        if number == 0:
+            lit["sphere"] = {**dark["sphere"], "glow": glow}
+        total = total + render(lit, spp, seed, integrator)
+    assert kernel.max() > 0.1, "the picture should not be black"
+    oracle.require_close(kernel, total, relative=1e-5, absolute=2.0**-23)
+
+
+def _plain(value):
+    return value["value"] if isinstance(value, dict) else value

@@ -1,0 +1,61 @@
+"""What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
+
+import gc
+
+import heuristic  # noqa: F401  isort: skip
+
+import drjit as dr
+import mitsuba as mi
+import pytest
+
+from heuristic import plugins
+from reference import direct
+
+
+@pytest.fixture
+def variant(request):
+    """The Mitsuba variant that the test asks for by indirect parameter, RGB where it does not."""
+    yield from _in_variant(getattr(request, "param", "llvm_ad_rgb"))
+
+
+@pytest.fixture
+def rgb():
+    """The variant llvm_ad_rgb, with the project's plugins."""
+    yield from _in_variant("llvm_ad_rgb")
+
+
+@pytest.fixture
+def spectral():
+    """The variant llvm_ad_spectral, with the project's plugins."""
+    yield from _in_variant("llvm_ad_spectral")
+
+
+@pytest.fixture
+def kernel_history():
+    """A function that runs another and returns the kernels that it launched, oldest first."""
+
+    def kernels_of(run):
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            dr.eval(run())
+            dr.sync_thread()
+            return dr.kernel_history([dr.KernelType.JIT])
+
+    yield kernels_of
+    _clean_up()
+
+
+def _in_variant(name):
+    mi.set_variant(name)
+    plugins.register()
+    direct.register()
+    yield name
+    _clean_up()
+
+
+def _clean_up():
+    dr.sync_thread()
+    dr.set_flag(dr.JitFlag.KernelHistory, False)
+    dr.kernel_history_clear()
+    gc.collect()
+    dr.flush_malloc_cache()

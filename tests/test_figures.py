@@ -1,0 +1,122 @@
+"""The chapters' figures: kernel against oracle, and kernel against Mitsuba's ``direct``.
+
+The two ways that the model runs by share the terms and nothing else: frames, lights, visibility and
+sums are Mitsuba's in one and the kernel's in the other.
+"""
+
+import mitsuba as mi
+import pytest
+
+from comparisons.scenes import SCENES, THREE_LIGHTS, VIEWER_C
+from tests import checks
+
+FIGURES = [name for name in SCENES if name.startswith("fig-8")]
+
+
+def everything():
+    """What the figures lack: spots, parallel light, attenuation, colours, emission, back light."""
+    scene = SCENES["fig-8-11-n9"].make()
+    scene["sphere"]["bsdf"] |= {
+        "k_i": {"type": "rgb", "value": (0.02, 0.0, 0.05)},
+        "k_d": {"type": "rgb", "value": (0.5, 0.25, 0.75)},
+        "k_s": {"type": "rgb", "value": (0.7, 0.6, 0.5)},
+        "n": 5.5,
+    }
+    scene["light 2"] |= {"k0": 0.2, "k1": 0.1, "k2": 0.05}
+    scene["light 3"] |= {"k0": 0.1, "k1": 0.0, "k2": 0.05, "clamped": True}
+    scene["light 4"] = {
+        "type": "heuristic_spot",
+        "position": (-3, 2, 2),
+        "direction": (3, -2.2, -2),
+        "cutoff": 12.0,
+        "exponent": 20.0,
+        "intensity": {"type": "rgb", "value": (0.9, 0.9, 0.4)},
+    }
+    scene["light 5"] = {
+        "type": "heuristic_directional",
+        "direction": (-1, 0.5, -0.5),  # from behind: a highlight at the rim, cut by the horizon
+        "intensity": {"type": "rgb", "value": (0.2, 0.4, 0.8)},
+    }
+    return scene
+
+
+def test_all_fifteen_figures_are_there():
+    """8.5 to 8.7 and 8.8 in three pictures each, 8.9, and 8.11 in both readings."""
+    letters = [f"fig-8-{figure}{letter}" for figure in (5, 6, 7, 8) for letter in "abc"]
+    assert [*letters, "fig-8-9", "fig-8-11-n9", "fig-8-11-n3"] == FIGURES
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_kernel_agrees_with_the_oracle_everywhere(rgb, name):
+    checks.check_figure(SCENES[name].make())
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_kernel_agrees_with_mitsubas_direct_on_every_pixel(rgb, name):
+    checks.check_against_direct(SCENES[name].make())
+
+
+@pytest.mark.parametrize("name", ["fig-8-5c", "fig-8-8a", "fig-8-9", "fig-8-11-n3"])
+def test_so_it_does_on_spectra(spectral, name):
+    checks.check_against_direct(SCENES[name].make())
+
+
+def test_every_light_and_colour_agrees_with_the_oracle(rgb):
+    checks.check_figure(everything())
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+def test_every_light_and_colour_agrees_with_mitsubas_direct(variant):
+    checks.check_against_direct(everything())
+
+
+@pytest.mark.parametrize("twosided", [False, True])
+def test_a_surface_seen_from_behind_agrees_with_mitsubas_direct(rgb, twosided):
+    """One-sided it is black in both, two-sided it is lit from the viewer's side in both."""
+    scene = everything()
+    scene["sphere"] |= {"flip_normals": True}
+    scene["sphere"]["bsdf"] |= {"twosided": twosided, "k_i": 0.0, "k_a": 0.0}
+    if twosided:
+        checks.check_against_direct(scene)
+    else:
+        assert not checks.render(checks.with_film(scene, 32, 4), 4, 0).any()
+
+
+def several(form, normalised):
+    """Three materials on three shapes that stand in each other's light."""
+    scene = everything()
+    floor = mi.ScalarTransform4f().translate((0, 0, -1)).scale(6)
+    grey = {"type": "phong", "k_d": 0.5, "k_s": 0.2, "n": 2}
+    shiny = {"type": "phong", "k_s": 0.6, "n": 30, "form": form, "normalised": normalised}
+    scene["floor"] = {"type": "rectangle", "to_world": floor, "bsdf": grey}
+    scene["ball"] = {"type": "sphere", "center": (-1, -1, -0.6), "radius": 0.4, "bsdf": shiny}
+    scene["sphere"]["bsdf"] |= {"form": form, "normalised": normalised}
+    scene["integrator"] |= {"occlusion": True}
+    return scene
+
+
+@pytest.mark.parametrize("normalised", [False, True])
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+def test_several_materials_agree_with_mitsubas_direct(rgb, form, normalised):
+    """With shadow rays in both: Mitsuba's integrators know no light without them."""
+    checks.check_against_direct(several(form, normalised))
+
+
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+def test_both_forms_of_the_lobe_agree_with_mitsubas_direct(rgb, form):
+    scene = everything()
+    scene["sphere"]["bsdf"] |= {"form": form, "normalised": True}
+    checks.check_against_direct(scene)
+
+
+def test_the_figures_show_what_the_chapter_says(rgb):
+    """Unit sphere, white lights of intensity 1 without attenuation, the viewer at its place."""
+    scene = SCENES["fig-8-11-n9"].make()
+    _, lights, ambient, viewer = checks.described(scene)
+    assert [(light.position, light.intensity) for light in lights] == list(THREE_LIGHTS)
+    assert all(light.attenuation == (1, 0, 0) for light in lights)
+    assert ambient == 1
+    assert tuple(viewer) == VIEWER_C
+    sphere = mi.load_dict(scene).shapes()[0]
+    assert tuple(sphere.bbox().min) == (-1, -1, -1)
+    assert tuple(sphere.bbox().max) == (1, 1, 1)

@@ -1,0 +1,203 @@
+"""Physics against closed forms: what an exact pair must give, on both sides."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import Options, compare
+from comparisons.scenes import SCENES
+from reference import Source, halves, rendering
+from tests import checks
+
+ALBEDO = np.array([0.7, 0.45, 0.2])
+DIFFUSE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": tuple(ALBEDO)}}
+
+
+def look_at(origin, target=(0, 0, 0), up=(0, 0, 1)):
+    return mi.ScalarTransform4f().look_at(origin, target, up)
+
+
+def scene(shape, light, viewer=(-3, 0, 1), fov=40.0, size=48):
+    return {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "sensor": {
+            "type": "perspective",
+            "fov": fov,
+            "to_world": look_at(viewer),
+            "film": {
+                "type": "hdrfilm",
+                "width": size,
+                "height": size,
+                "rfilter": {"type": "box"},
+            },
+        },
+        "shape": shape,
+        "light": light,
+    }
+
+
+def plane():
+    return {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(3), "bsdf": DIFFUSE}
+
+
+def sphere():
+    return {"type": "sphere", "bsdf": DIFFUSE}
+
+
+def seen_by(half, spp, seed, integrator=None):
+    """Return the colour, position and normal that each pixel of a half saw."""
+    made = half.instantiate()
+    nested = mi.load_dict(integrator) if integrator else made.integrator()
+    integrator = mi.load_dict({"type": "aov", "aovs": "P:position,N:sh_normal", "image": nested})
+    image = np.array(mi.render(made, integrator=integrator, spp=spp, seed=seed), float)
+    return np.split(image.reshape(-1, 9), 3, axis=1)
+
+
+def both_halves(description, spp=1, seed=1):
+    """Yield colour, position and normal of the heuristic half, and of the direct reference."""
+    pair = halves.pair(Source("a closed form", description))
+    yield seen_by(pair.heuristic, spp, seed)
+    yield seen_by(pair.physical, spp, seed, {"type": "direct_all"})
+
+
+def test_a_diffuse_plane_under_a_point_light(rgb):
+    """``I cos(theta) rho / (pi d^2)`` at every point that is seen."""
+    light, intensity = np.array([1.0, -0.5, 2.0]), 40.0
+    description = scene(
+        plane(),
+        {"type": "point", "position": tuple(light), "intensity": intensity},
+        viewer=(0, -3, 5),
+    )
+    for colour, position, normal in both_halves(description):
+        hit = np.any(normal != 0, axis=1)
+        assert hit.mean() > 0.9
+        np.testing.assert_allclose(position[hit, 2], 0, atol=1e-6)
+        offset = light - position[hit]
+        distance = np.linalg.norm(offset, axis=1)
+        cosine = offset[:, 2] / distance
+        expected = (intensity * cosine / (np.pi * distance**2))[:, None] * ALBEDO
+        np.testing.assert_allclose(colour[hit], expected, rtol=2e-5)
+
+
+def test_a_diffuse_sphere_under_a_directional_light(rgb):
+    """``E cos(theta) rho / pi`` where the light arrives, 0 behind."""
+    travel, irradiance = np.array([2.0, 1.0, -1.0]), 2.5
+    description = scene(
+        sphere(), {"type": "directional", "direction": tuple(travel), "irradiance": irradiance}
+    )
+    toward = -travel / np.linalg.norm(travel)
+    for colour, _, normal in both_halves(description):
+        hit = np.any(normal != 0, axis=1)
+        cosine = np.maximum(normal[hit] @ toward, 0)
+        assert 0 < np.mean(cosine == 0) < 0.5
+        expected = irradiance / np.pi * cosine[:, None] * ALBEDO
+        np.testing.assert_allclose(colour[hit], expected, atol=2e-6)
+
+
+def test_a_diffuse_sphere_in_a_constant_environment(rgb):
+    """``rho L``: exactly for the heuristic, within its noise for the reference."""
+    radiance = 1.5
+    description = scene(sphere(), {"type": "constant", "radiance": radiance})
+    heuristic, reference = both_halves(description, spp=64)
+    normal = heuristic[2]
+    inside = np.linalg.norm(normal, axis=1) > 0.999  # of 64 samples none missed the sphere
+    np.testing.assert_allclose(
+        heuristic[0][inside], np.tile(radiance * ALBEDO, (inside.sum(), 1)), rtol=1e-5
+    )
+    pair = halves.pair(Source("a closed form", description))
+    renderer = rendering.Renderer(
+        pair.physical.instantiate(), mi.load_dict({"type": "direct_all"}), 16, "reference"
+    )
+    passes = np.array([np.array(renderer.render(seed)) for seed in range(8)], float)
+    mean = passes.reshape(8, -1, 3)[:, inside].mean(axis=1)  # each pass, over the sphere
+    error = mean.std(axis=0, ddof=1) / np.sqrt(8)
+    np.testing.assert_array_less(np.abs(mean.mean(axis=0) - radiance * ALBEDO), 4.5 * error + 1e-5)
+    assert np.all(error < 0.01 * radiance * ALBEDO)
+    assert np.abs(reference[0][inside].mean(axis=0) / (radiance * ALBEDO) - 1).max() < 0.02
+
+
+EXACT = {
+    "point": lambda: SCENES["lambert-sphere"].make(),
+    "directional": lambda: scene(
+        sphere(), {"type": "directional", "direction": (2, 1, -1), "irradiance": 2.5}
+    ),
+    "constant": lambda: scene(sphere(), {"type": "constant", "radiance": 0.8}),
+}
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_an_exact_pair_differs_by_the_noise_alone(rgb, name):
+    """ΔE2000 at its noise floor, and no pixel significant.
+
+    Under a point or parallel light the comparison has no noise: what is left is rounding, some
+    1e-4 of the least that can be seen. In the environment the mean over pixels may differ from the
+    floor, itself an estimate from the same number of pixels, by a tenth.
+    """
+    result = compare(Source(name, EXACT[name]()), Options(spp=64, resolution=(64, 64)))
+    metrics = result.data["metrics"]
+    mean, floor = metrics["dE2000"]["mean"], metrics["dE2000"]["noise_floor"]
+    assert metrics["significant"]["fraction"] == 0
+    assert not result.images.significant.any()
+    if name == "constant":
+        assert floor > 0.05
+        assert mean == pytest.approx(floor, rel=0.1)
+    else:
+        assert floor < 1e-3
+        assert mean < 1e-3
+
+
+def test_a_pair_that_is_not_exact_is_told_from_noise(rgb):
+    """The same test on figure 8.9, whose highlight no rough plastic has."""
+    result = compare(SCENES["fig-8-9"].source(), Options(spp=64, resolution=(64, 64)))
+    metrics = result.data["metrics"]
+    assert metrics["dE2000"]["mean"] > 1
+    assert metrics["dE2000"]["mean"] > 5 * metrics["dE2000"]["noise_floor"]
+    assert metrics["significant"]["fraction"] > 0.1
+
+
+def test_the_spot_of_an_area_light_is_right_in_the_far_field(rgb):
+    """The relative error falls as (size / distance)²: to a quarter when the distance doubles.
+
+    The lamp faces the plane slightly askew. Where the light is found the irradiance is compared
+    with Mitsuba's, averaged over its samples.
+    """
+    side = 1.0
+    errors = []
+    for distance in (2.0, 4.0, 8.0):
+        lamp = {
+            "type": "rectangle",
+            "to_world": look_at((0.3 * distance, 0, distance), (0, 0, 0), (0, 1, 0))
+            @ mi.ScalarTransform4f().scale(side / 2),
+            "emitter": {"type": "area", "radiance": 10.0},
+        }
+        description = scene(plane(), lamp, viewer=(0, -0.5, 1), fov=5.0, size=8)
+        pair = halves.pair(Source("a lamp", description))
+        heuristic = seen_by(pair.heuristic, 16, 0)[0].mean()
+        physical = seen_by(pair.physical, 16384, 0, {"type": "direct_all"})[0].mean()
+        errors.append(abs(heuristic / physical - 1))
+    errors = np.array(errors)
+    assert errors[0] > 0.01, "near by, the two should differ visibly"
+    np.testing.assert_allclose(errors[:-1] / errors[1:], 4, rtol=0.25)
+
+
+def test_white_diffuse_light_of_unit_intensity_has_the_value_1(rgb):
+    """The bridge between the units: irradiance pi on a white surface is radiance 1."""
+    description = scene(
+        plane() | {"bsdf": {"type": "diffuse", "reflectance": 1.0}},
+        {"type": "directional", "direction": (0, 0, -1), "irradiance": float(np.pi)},
+        viewer=(0, -0.5, 1),
+        fov=20.0,
+    )
+    for colour, _, _ in both_halves(description):
+        np.testing.assert_allclose(colour, 1, rtol=1e-5)
+
+
+def test_the_closed_forms_are_of_what_is_seen(rgb):
+    """The position AOV is the camera ray's meeting with the unit sphere, in closed form."""
+    description = checks.with_film(scene(sphere(), {"type": "constant"}), 32, 1)
+    made = mi.load_dict(description)
+    ray, _ = made.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(0.5, 0.5), mi.Point2f(0.5))
+    si = made.ray_intersect(ray)
+    viewer = np.array([-3.0, 0.0, 1.0])
+    np.testing.assert_allclose(np.array(si.p).ravel(), viewer / np.linalg.norm(viewer), atol=1e-5)

@@ -1,0 +1,315 @@
+"""Rendering in passes: sums, common camera rays, direct light, honest standard errors."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy import stats
+
+from comparisons.scenes import SCENES
+from heuristic.errors import NonFiniteError
+from reference import halves, rendering
+from tests import checks
+from tests.test_physics import look_at
+
+
+def scene(size=24, **lights):
+    """A diffuse sphere on a floor."""
+    return {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "fov": 40.0,
+            "to_world": look_at((0, -6, 3)),
+            "film": {
+                "type": "hdrfilm",
+                "width": size,
+                "height": size,
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "multijitter"},
+        },
+        "sphere": {
+            "type": "sphere",
+            "bsdf": {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4},
+        },
+        "floor": {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
+            "bsdf": {"type": "diffuse", "reflectance": 0.6},
+        },
+        **lights,
+    }
+
+
+POINT = {"type": "point", "position": (2, -2, 3), "intensity": 8.0}
+SECOND = {"type": "point", "position": (-3, -1, 2), "intensity": 5.0}
+CONSTANT = {"type": "constant", "radiance": 0.3}
+
+
+def lamp():
+    return {
+        "type": "rectangle",
+        "to_world": look_at((-2, 1, 3)) @ mi.ScalarTransform4f().scale(0.8),
+        "emitter": {"type": "area", "radiance": 6.0},
+    }
+
+
+def estimate(made, integrator, spp, passes, first_seed=0):
+    renderer = rendering.Renderer(made, integrator, spp, "a test")
+    total = rendering.Accumulator()
+    for seed in range(passes):
+        total.add(renderer.render(first_seed + seed))
+    return total.estimate()
+
+
+# --- Sums ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("passes", [2, 3, 16])
+def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
+    rng = np.random.default_rng(passes)
+    images = rng.exponential(size=(passes, 5, 7, 3)).astype(np.float32)
+    total = rendering.Accumulator()
+    for image in images:
+        total.add(mi.TensorXf(image))
+    found, images = total.estimate(), images.astype(float)
+    np.testing.assert_allclose(found.mean, images.mean(axis=0), rtol=1e-12)
+    error = images.std(axis=0, ddof=1) / np.sqrt(passes)
+    np.testing.assert_allclose(found.standard_error, error, rtol=1e-9)
+    signs = np.where(np.arange(passes) % 2, -1, 1)[:, None, None, None]
+    np.testing.assert_allclose(found.noise, (signs * images).mean(axis=0), atol=1e-12)
+    assert found.passes == passes
+
+
+def test_running_sums_keep_small_noise_on_a_large_level(rgb):
+    """A sum of squares less the square of the sum would lose it."""
+    rng = np.random.default_rng(1)
+    images = 1e4 + rng.normal(size=(50, 4, 4, 3)) * 1e-3
+    total = rendering.Accumulator()
+    for image in images:
+        total.add(mi.TensorXd(image))
+    error = images.std(axis=0, ddof=1) / np.sqrt(50)
+    np.testing.assert_allclose(total.estimate().standard_error, error, rtol=1e-6)
+
+
+def test_the_noise_image_has_the_spread_of_the_mean(rgb):
+    """Its root mean square is the standard error's, over many pixels."""
+    rng = np.random.default_rng(2)
+    total = rendering.Accumulator()
+    for _ in range(8):
+        total.add(mi.TensorXd(5 + rng.normal(size=(100, 100, 3))))
+    found = total.estimate()
+    assert np.sqrt(np.mean(found.noise**2)) == pytest.approx(1 / np.sqrt(8), rel=0.02)
+    assert np.sqrt(np.mean(found.standard_error**2)) == pytest.approx(1 / np.sqrt(8), rel=0.02)
+
+
+# --- Common random numbers -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["fig-8-9", "plastic-spheres"])
+@pytest.mark.parametrize("integrator", ["path", "direct_all", "direct"])
+def test_camera_rays_coincide_in_both_halves(rgb, name, integrator):
+    """Same sampler and seed: what the pixels see differs by exactly nothing."""
+    pair = halves.pair(SCENES[name].source(), resolution=(48, 48))
+
+    def positions(half, nested):
+        made = half.instantiate()
+        aov = mi.load_dict(
+            {"type": "aov", "aovs": "P:position", "image": nested or made.integrator()}
+        )
+        return np.array(mi.render(made, integrator=aov, spp=4, seed=9))[..., -3:]
+
+    heuristic = positions(pair.heuristic, None)
+    physical = positions(pair.physical, mi.load_dict({"type": integrator}))
+    assert heuristic.any()
+    np.testing.assert_array_equal(heuristic, physical)
+
+
+def test_another_seed_gives_other_camera_rays(rgb):
+    made = halves.pair(SCENES["fig-8-9"].source(), resolution=(32, 32)).heuristic.instantiate()
+    first, again, other = (np.array(mi.render(made, spp=4, seed=seed)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.any(first != other)
+
+
+# --- Direct light ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hide_emitters", [False, True])
+def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
+    """Point, area and constant light: in no pixel do the means differ by more than the noise.
+
+    Two-sided z-test on every pixel and channel, with Šidák's correction, so that a right
+    implementation fails once in a thousand seeds.
+    """
+    made = mi.load_dict(scene(point=POINT, lamp=lamp(), sky=CONSTANT))
+    passes = 32
+    ours, theirs = (
+        estimate(
+            made,
+            mi.load_dict({"type": plugin, "hide_emitters": hide_emitters}),
+            256,
+            passes,
+            first_seed,
+        )
+        for plugin, first_seed in (("direct_all", 0), ("direct", 1000))
+    )
+    difference = ours.mean - theirs.mean
+    error = np.hypot(ours.standard_error, theirs.standard_error)
+    noisy = error > 1e-6
+    assert noisy.mean() > 0.5
+    t = difference[noisy] / error[noisy]
+    each = 1 - (1 - 0.001) ** (1 / t.size)
+    assert np.abs(t).max() < stats.t.isf(each / 2, passes - 1)
+    assert abs(t.mean()) < 0.15  # and none of them leans to one side
+    np.testing.assert_allclose(ours.mean[~noisy], theirs.mean[~noisy], atol=1e-5)
+    # Asking every light at every sample is what it is for.
+    assert ours.standard_error.mean() < theirs.standard_error.mean()
+
+
+def test_hidden_emitters_are_not_seen(rgb):
+    made = mi.load_dict(scene(lamp=lamp(), sky=CONSTANT))
+    shown, hidden = (
+        np.array(
+            mi.render(
+                made,
+                integrator=mi.load_dict({"type": "direct_all", "hide_emitters": hide}),
+                spp=16,
+                seed=0,
+            )
+        )
+        for hide in (False, True)
+    )
+    assert np.allclose(shown[0, 0], 0.3)
+    assert not hidden[0, 0].any()
+
+
+def test_direct_light_of_several_points_has_no_noise(rgb):
+    """Seen through the same camera rays it is the sum of what each light gives alone."""
+    direct_all = mi.load_dict({"type": "direct_all"})
+
+    def picture(**lights):
+        made = mi.load_dict(scene(**lights))
+        return np.array(mi.render(made, integrator=direct_all, spp=4, seed=3), float)
+
+    together = picture(one=POINT, two=SECOND)
+    np.testing.assert_allclose(together, picture(one=POINT) + picture(two=SECOND), atol=1e-6)
+
+
+def test_direct_light_of_one_point_is_mitsubas_to_rounding(rgb):
+    made = mi.load_dict(scene(one=POINT))
+    ours, theirs = (
+        np.array(mi.render(made, integrator=mi.load_dict(integrator), spp=4, seed=3), float)
+        for integrator in (
+            {"type": "direct_all"},
+            {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+        )
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-7)
+
+
+def test_direct_light_is_paths_of_length_2(rgb):
+    made = mi.load_dict(scene(point=POINT, lamp=lamp()))
+    ours = estimate(made, mi.load_dict({"type": "direct_all"}), 64, 16)
+    path = estimate(made, mi.load_dict({"type": "path", "max_depth": 2}), 64, 16, 500)
+    difference = (ours.mean - path.mean).mean()
+    error = np.hypot(ours.standard_error, path.standard_error)
+    assert abs(difference) < 5 * np.sqrt(np.sum(error**2)) / error.size + 1e-6
+
+
+# --- Standard errors -------------------------------------------------------------------------
+
+
+def coverage(repetitions, passes=8):
+    """Return the share of pixels in which a 95 % interval of Student's t holds the truth."""
+    made = mi.load_dict(scene(lamp=lamp(), sky=CONSTANT))
+    integrator = mi.load_dict({"type": "direct_all"})
+    truth = estimate(made, integrator, 256, 64, 10_000)
+    shares = []
+    t = stats.t.ppf(0.975, passes - 1)
+    for repetition in range(repetitions):
+        found = estimate(made, integrator, 4, passes, 100 * repetition)
+        noisy = found.standard_error > 1e-6
+        off = np.abs(found.mean - truth.mean)
+        # The truth is an estimate too, of 512 times the samples.
+        shares.append(np.mean((off <= t * found.standard_error)[noisy]))
+    return np.mean(shares)
+
+
+def test_standard_errors_are_honest(rgb):
+    """95 % intervals hold the truth in 90 to 98 % of pixels, over 30 seeds."""
+    assert 0.90 < coverage(30) < 0.98
+
+
+@pytest.mark.slow
+def test_standard_errors_are_honest_over_100_seeds(rgb):
+    """95 % intervals hold the truth in 93 to 97 % of pixels."""
+    assert 0.93 < coverage(100, passes=16) < 0.97
+
+
+def test_the_mean_gets_better_as_it_says(rgb):
+    """Four times the passes halve the standard error."""
+    made = mi.load_dict(scene(lamp=lamp()))
+    integrator = mi.load_dict({"type": "direct_all"})
+    few, many = (estimate(made, integrator, 4, passes).standard_error for passes in (8, 32))
+    assert np.sqrt(np.mean(few**2) / np.mean(many**2)) == pytest.approx(2, rel=0.15)
+
+
+# --- Failures --------------------------------------------------------------------------------
+
+
+def broken_integrator(value, row, column):
+    """Make an integrator that is white but for one pixel of a film of 24 by 24."""
+
+    class Broken(mi.SamplingIntegrator):
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            sensor = scene.sensors()[0]
+            target, _ = sensor.sample_ray(
+                0.0, 0.5, mi.Point2f((column + 0.5) / 24, (row + 0.5) / 24), mi.Point2f(0.5)
+            )
+            near = dr.dot(target.d, ray.d) > np.cos(np.deg2rad(40 / 24 / 10))
+            return dr.select(near, mi.Spectrum(value), mi.Spectrum(1)), active, []
+
+    return Broken(mi.Properties())
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_pixel_that_is_no_number_is_an_error_that_names_it(rgb, value):
+    made = mi.load_dict(scene(point=POINT))
+    renderer = rendering.Renderer(made, broken_integrator(value, 5, 17), 256, "reference image")
+    with pytest.raises(
+        NonFiniteError, match=r"reference image, pass with seed 4: 1 pixels .* x = 17, y = 5"
+    ):
+        renderer.render(4)
+
+
+def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):
+    histories = []
+    history = dr.kernel_history
+
+    def recorded(*arguments):
+        histories.append(history(*arguments))
+        return histories[-1]
+
+    monkeypatch.setattr(dr, "kernel_history", recorded)
+    made = mi.load_dict(checks.with_film(SCENES["fig-8-9"].make(), 24, 4))
+    renderer = rendering.Renderer(made, None, 4, "heuristic image")
+    for seed in (0, 1, 123_457):
+        renderer.render(seed)
+    first, *others = [[kernel["hash"] for kernel in kernels] for kernels in histories]
+    assert first
+    assert others == [first, first]
+    assert all(kernel["cache_hit"] for kernels in histories[1:] for kernel in kernels)
+
+
+def test_times_are_of_all_passes(rgb):
+    made = mi.load_dict(checks.with_film(SCENES["fig-8-9"].make(), 24, 4))
+    renderer = rendering.Renderer(made, None, 4, "heuristic image")
+    for seed in range(5):
+        renderer.render(seed)
+    times = renderer.pass_times()
+    assert times.passes == 5
+    assert 0 < times.median < times.total
+    assert times.first < times.total
+    assert 0 <= times.compilation <= times.total

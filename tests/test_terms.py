@@ -1,0 +1,255 @@
+"""Each term of the model against its closed form, in single and double precision."""
+
+import drjit as dr
+import drjit.llvm.ad
+import drjit.scalar
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from heuristic import Material, PointLight, shade, terms, vectors
+from heuristic.convention import IRRADIANCE_PER_INTENSITY, RADIANCE_PER_IRRADIANCE
+
+Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
+Vector = drjit.scalar.Array3f64
+
+FLOATS = pytest.mark.parametrize("float_type", [Single, Double], ids=["single", "double"])
+COSINES = np.concatenate([np.linspace(-1, 1, 401), [1e-30, -1e-30, 1e-6, -1e-6]])
+
+bounded = settings(max_examples=200, deadline=None)
+components = st.floats(-10, 10, allow_nan=False)
+
+
+def step(float_type):
+    """One rounding step at 1."""
+    return 2.0**-23 if float_type is Single else 2.0**-52
+
+
+def require(found, expected, relative, absolute=0.0):
+    np.testing.assert_allclose(np.array(found), expected, rtol=relative, atol=absolute)
+
+
+@st.composite
+def directions(draw):
+    vector = np.array([draw(components) for _ in range(3)])
+    length = np.linalg.norm(vector)
+    assume(length > 1e-3)
+    return Vector(*(vector / length))
+
+
+# --- Emission, ambient and diffuse light -----------------------------------------------------
+
+
+def test_emission_is_its_coefficient():
+    assert terms.emission(0.3) == 0.3
+
+
+@FLOATS
+def test_ambient_is_the_product(float_type):
+    intensity = np.linspace(0, 2, 11)
+    require(terms.ambient(float_type(intensity), 0.3), 0.3 * intensity, 4 * step(float_type))
+
+
+@FLOATS
+def test_diffuse_is_the_cosine_and_nothing_at_or_below_the_horizon(float_type):
+    found = terms.diffuse(2.0, 0.5, float_type(COSINES))
+    require(found, np.where(COSINES > 0, COSINES, 0), 4 * step(float_type))
+    assert not np.array(found)[COSINES <= 0].any()
+    assert dr.all(terms.diffuse(2.0, 0.5, float_type(0.0)) == 0)
+
+
+def test_diffuse_light_is_the_same_from_everywhere():
+    """Lambert's law (8.3, 8.4): emission falls as cos b and so does the area that is seen."""
+    views = drjit.llvm.ad.Array3f(np.random.default_rng(1).normal(size=(3, 1000)))
+    found = shade(
+        drjit.llvm.ad.Array3f(0),
+        drjit.llvm.ad.Array3f(0, 0, 1),
+        views,
+        Material(k_d=0.5),
+        [PointLight((1, 0, 1), 1.0)],
+    )
+    assert np.unique(np.array(found)).size == 1
+    emission = 0.5 * np.cos(np.pi / 4)
+    view_angle = np.linspace(0, 1.5, 50)
+    power = emission * np.cos(view_angle)  # 8.3
+    apparent_area = np.cos(view_angle)  # 8.4
+    require(power / apparent_area, np.array(found).item(0), 1e-6)
+
+
+# --- Specular light --------------------------------------------------------------------------
+
+
+@FLOATS
+@pytest.mark.parametrize("n", [0, 1, 2, 3, 9, 64, 65, 1000, 0.5, 37.25])
+@pytest.mark.parametrize("opaque", [False, True], ids=["literal", "opaque"])
+def test_specular_is_the_power_and_nothing_where_the_lobe_ends(float_type, n, opaque):
+    """Within a few roundings of the base, which the power multiplies by ``n``."""
+    base = np.array(float_type(COSINES), float)  # as rounded to the type
+    exponent = dr.opaque(float_type, n) if opaque else n
+    found = np.array(terms.specular(1.5, 0.5, float_type(COSINES), exponent), float)
+    expected = np.zeros_like(base)
+    expected[base > 0] = 0.75 * base[base > 0] ** n
+    smallest = 1e-37 if float_type is Single else 1e-300  # below it, numbers lose digits
+    big = expected > smallest
+    tolerance = 8 * step(float_type) * max(n, 1)
+    # exp2(n log2 c) has the rounding of its exponent: |n log2 c| steps, up to 127 or 1023.
+    tolerance += 2 * step(float_type) * np.abs(np.log2(np.where(big, expected, 1)))
+    assert np.all(np.abs(found - expected)[big] <= (tolerance * expected)[big])
+    assert np.all(found[~big] <= 2 * smallest)
+    assert not found[base <= 0].any()
+
+
+@FLOATS
+@pytest.mark.parametrize("opaque", [False, True], ids=["literal", "opaque"])
+def test_exponent_zero_is_an_even_lobe_that_ends_at_a_right_angle(float_type, opaque):
+    """The limit of small ``n``; ``0 ** 0`` neither counts as 1 nor becomes NaN."""
+    n = dr.opaque(float_type, 0) if opaque else 0
+    found = terms.power(float_type([-1, -0.5, 0, 1e-20, 0.5, 1]), n)
+    np.testing.assert_array_equal(np.array(found), [0, 0, 0, 1, 1, 1])
+
+
+@FLOATS
+def test_a_large_exponent_tends_to_the_perfect_mirror(float_type):
+    """8.8 becomes 8.7: on the axis nothing changes, off it the ratio falls to 0."""
+    angles = np.deg2rad([0, 0.5, 1, 5, 30])
+    exponents = [1, 10, 100, 1e3, 1e4, 1e5, 1e6]
+    lobe = np.array(
+        [
+            np.array(terms.power(float_type(np.cos(angles)), dr.opaque(float_type, n)))
+            for n in exponents
+        ]
+    )
+    on_axis, off_axis = lobe[:, :1], lobe[:, 1:]
+    assert np.all(on_axis == 1)
+    assert np.all(np.diff(off_axis, axis=0) <= 0)
+    assert np.all(off_axis[-1] / on_axis[-1] < 1e-15)
+
+
+@bounded
+@given(directions(), directions(), st.floats(0, 200))
+def test_the_lobe_is_never_more_than_the_light(normal, toward, n):
+    cosine = dr.dot(normal, toward)
+    value = terms.specular(1.0, 1.0, cosine, n)
+    assert 0 <= value <= 1 + 1e-12 * (n + 1)
+
+
+# --- Vectors ---------------------------------------------------------------------------------
+
+
+@bounded
+@given(directions(), directions())
+def test_the_mirror_vector_has_equal_angles_one_plane_and_unit_length(normal, toward):
+    """The three demands from which 6.28-6.31 derive it."""
+    mirrored = vectors.mirror_vector(normal, toward, dr.dot(normal, toward))
+    assert abs(dr.dot(mirrored, normal) - dr.dot(toward, normal)) < 1e-14
+    assert abs(dr.dot(dr.cross(toward, normal), mirrored)) < 1e-14
+    assert abs(dr.norm(mirrored) - 1) < 1e-14
+    # Of the two directions that satisfy them, it is the one on the other side of the normal.
+    across = dr.cross(normal, toward)
+    np.testing.assert_allclose(dr.cross(normal, mirrored), -np.array(across), atol=1e-14)
+
+
+def test_the_mirror_vector_of_the_normal_is_the_normal():
+    normal = Vector(0, 0.6, 0.8)
+    np.testing.assert_allclose(vectors.mirror_vector(normal, normal, 1.0), normal, atol=1e-15)
+
+
+@FLOATS
+def test_light_and_view_vectors_point_away_with_unit_length(float_type):
+    vector_type = drjit.llvm.ad.Array3f if float_type is Single else drjit.llvm.ad.Array3f64
+    rng = np.random.default_rng(2)
+    position, light = (
+        rng.normal(size=(3, 500)).astype(np.float32).astype(float) * scale for scale in (1, 8)
+    )
+    toward, distance = vectors.light_vector(vector_type(light), vector_type(position))
+    length = np.linalg.norm(light - position, axis=0)
+    tolerance = 8 * step(float_type)
+    require(distance, length, tolerance)
+    require(toward, (light - position) / length, tolerance, tolerance)
+    require(
+        vectors.view_vector(vector_type(light), vector_type(position)),
+        (light - position) / length,
+        tolerance,
+        tolerance,
+    )
+
+
+def test_directions_that_do_not_exist_are_zero():
+    here = drjit.llvm.ad.Array3f(1, 2, 3)
+    toward, distance = vectors.light_vector(here, here)
+    for vector in (toward, vectors.view_vector(here, here), vectors.normalise(here * 0)):
+        np.testing.assert_array_equal(np.array(vector), np.zeros((3, 1)))
+    assert dr.all(distance == 0)
+
+
+# --- Attenuation and cone --------------------------------------------------------------------
+
+
+@FLOATS
+@pytest.mark.parametrize(
+    "coefficients", [(1, 0, 0), (0, 0, 1), (0, 1, 0), (0.25, 0.5, 0.125), (2, 0, 0)], ids=str
+)
+def test_attenuation_is_the_inverse_of_the_polynomial(float_type, coefficients):
+    distance = np.array([0.25, 0.5, 1, 2, 3.75, 100, 1e4])
+    k0, k1, k2 = coefficients
+    denominator = k0 + k1 * distance + k2 * distance**2
+    tolerance = 8 * step(float_type)
+    require(terms.attenuation(float_type(distance), *coefficients), 1 / denominator, tolerance)
+    require(
+        terms.clamped_attenuation(float_type(distance), *coefficients),
+        np.minimum(1 / denominator, 1),
+        tolerance,
+    )
+
+
+@FLOATS
+def test_attenuation_on_the_light_itself(float_type):
+    """Where the polynomial is 0 the open form gives nothing, and the clamped one its limit 1."""
+    assert dr.all(terms.attenuation(float_type(0), 0, 0, 1) == 0)
+    assert dr.all(terms.clamped_attenuation(float_type(0), 0, 0, 1) == 1)
+    assert dr.all(terms.attenuation(float_type(0), 0.5, 0, 1) == 2)
+
+
+@bounded
+@given(st.floats(0, 1e6), st.floats(0, 1e6), *[st.floats(0, 10)] * 3)
+def test_clamped_attenuation_stays_within_0_and_1_and_never_rises(near, farther, c1, c2, c3):
+    """The text at 8.6 wants ``0 <= f_att <= 1``."""
+    assume(c1 + c2 + c3 > 0)
+    first = terms.clamped_attenuation(near, c1, c2, c3)
+    second = terms.clamped_attenuation(near + farther, c1, c2, c3)
+    assert 0 <= second <= first <= 1
+
+
+@FLOATS
+def test_the_cone_holds_its_edge_and_nothing_beyond(float_type):
+    """6.2 says ``>=``: a point at exactly the cutoff is lit."""
+    edge = float_type(0.75)
+    inside = np.array(terms.spot_cone(float_type([1, 0.7501, 0.75, 0.7499, 0, -1]), edge))
+    np.testing.assert_array_equal(inside, [1, 1, 1, 0, 0, 0])
+
+
+@FLOATS
+def test_the_fall_off_is_a_power_of_the_cosine_about_the_axis(float_type):
+    cosine = np.array([1, 0.5, 0.25, 0, -0.5])
+    require(
+        terms.spot_falloff(float_type(cosine), 2.5),
+        np.maximum(cosine, 0) ** 2.5,
+        16 * step(float_type),
+    )
+
+
+# --- The convention --------------------------------------------------------------------------
+
+
+def test_a_white_surface_that_faces_unit_light_has_the_value_1():
+    found = shade(
+        Vector(0, 0, 0),
+        Vector(0, 0, 1),
+        Vector(1, 0, 1),
+        Material(k_d=1),
+        [PointLight((0, 0, 5), 1)],
+    )
+    assert found == 1
+    product = IRRADIANCE_PER_INTENSITY * RADIANCE_PER_IRRADIANCE
+    assert product == pytest.approx(1, abs=1e-15)
