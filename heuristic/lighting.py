@@ -10,10 +10,10 @@ import numpy as np
 from heuristic import colours, terms, vectors
 from heuristic.lights import UNATTENUATED, is_number, is_unattenuated
 
-BLOCK = 8
+BLOCK = 16
 """Lights in one kernel. More are summed block after block by the same kernel, each light costing
-what it costs unrolled; a loop inside the kernel would fetch each parameter for each pixel anew, and
-take twice as long or more. Larger blocks compile longer and gain nothing (see the benchmarks)."""
+about what it costs unrolled; a loop inside the kernel would fetch each parameter for each pixel
+anew, and take twice as long. Larger blocks compile longer and gain little (see the benchmarks)."""
 
 
 def sum_lights(position, normal, view, material, lights, visible=None):
@@ -47,6 +47,8 @@ def sum_lights(position, normal, view, material, lights, visible=None):
     blocks = _blocks(lights, type(position)) if in_blocks else [lights]
     diffuse = specular = None
     for block in blocks:
+        if diffuse is not None or specular is not None:
+            dr.eval(diffuse, specular)  # the last block's sums stay open, for the caller's kernel
         for light in block:
             arrival = light.illuminate(position)
             cos_incidence = dr.dot(normal, arrival.toward)
@@ -59,8 +61,6 @@ def sum_lights(position, normal, view, material, lights, visible=None):
             if has_specular:
                 cosine = _lobe_cosine(material, normal, arrival.toward, view, cos_incidence)
                 specular = _add(specular, terms.specular(intensity, 1, cosine, material.n))
-        if in_blocks:
-            dr.eval(diffuse, specular)
     return diffuse, specular
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from comparisons.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
 from heuristic.equations import Entry
@@ -145,6 +146,15 @@ def percent(value: float) -> str:
     return f"{number(100 * value)} %"
 
 
+def code_spans(text: str) -> Markup:
+    """A docstring's ````code```` as HTML, everything else escaped."""
+    parts = text.split("``")
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if place % 2 else part
+        for place, part in enumerate(parts)
+    )
+
+
 def about_noise(metric: Mapping[str, float]) -> bool:
     """Whether a metric's mean is about what its noise floor gives (see `NOISE_MARGIN`)."""
     return metric["noise_floor"] > 0 and metric["mean"] <= NOISE_MARGIN * metric["noise_floor"]
@@ -175,7 +185,13 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    environment.filters.update(number=number, parameter=parameter, seconds=seconds, percent=percent)
+    environment.filters.update(
+        number=number,
+        parameter=parameter,
+        seconds=seconds,
+        percent=percent,
+        code_spans=code_spans,
+    )
     environment.tests["about_noise"] = about_noise
     environment.globals.update(
         marked=images.css_colour(images.MARKED),

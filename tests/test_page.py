@@ -11,6 +11,7 @@ import pytest
 
 import reports
 from comparisons.metrics import METRICS, Viewing
+from heuristic.equations import Entry
 from reports import images, page
 
 SCHEMA = json.loads(
@@ -255,3 +256,16 @@ def test_the_package_holds_its_templates():
     folder = Path(reports.__path__[0])
     for name in ("page.html.j2", "scene.html.j2", "macros.html.j2", "page.css", "page.js"):
         assert (folder / "templates" / name).is_file()
+
+
+def test_the_index_of_equations_is_printed_with_code_and_escaped(record, pictures):
+    entries = [
+        Entry("8.5", "heuristic.terms.diffuse", "``I = k_d`` for ``N.L > 0``."),
+        Entry("8.7", None, HOSTILE),
+    ]
+    view = {"record": record, "images": pictures}
+    html = page.render([view], equations=entries)
+    assert "<code>I = k_d</code> for <code>N.L &gt; 0</code>." in html
+    assert "heuristic.terms.diffuse" in html
+    assert HOSTILE not in html
+    assert "Equations" not in page.render([view])

@@ -18,7 +18,7 @@ import drjit as dr
 from drjit.llvm import Array3f
 
 POINTS = 1 << 20
-COUNTS = (1, 8, 10, 100, 1_000, 10_000)
+COUNTS = (1, 10, 16, 17, 100, 1_000, 10_000)
 UNROLLED = 8
 """Lights of the row that the others are held against: a single kernel without blocks."""
 
