@@ -14,10 +14,12 @@ from comparisons.significance import significance
 from comparisons.spaces import DEFAULT_VIEWING, Viewing
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference import halves, plan, rendering
+from reference import halves
 from reference.gbuffer import gbuffer
-from reference.halves import SAMPLER
+from reference.halves import Pair
 from reference.pairing import Convention
+from reference.plan import Plan, plan
+from reference.rendering import Accumulator, Estimate, Renderer, physical_integrator, variant
 
 LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
@@ -34,8 +36,8 @@ class Options:
     seed
         Seed of the first pass; pass ``i`` has ``seed + i`` in both halves.
     spp
-        Samples a pixel in all. They are split into an even number of passes: 16 where there are
-        enough for 4 a pass, at least 2.
+        Samples a pixel in all, in place of the plan's. They are split into the plan's number of
+        passes, or fewer where that leaves less than 4 a pass, at least 2.
     resolution
         ``(width, height)`` in place of the film's own.
     convention
@@ -47,6 +49,8 @@ class Options:
     heuristic_variant
         Variant of the heuristic half where it is not the current one, as for RGB shading against a
         spectral reference.
+    everything
+        Switch off all pruning, in the kernel and in the reference.
 
     Raises
     ------
@@ -55,16 +59,17 @@ class Options:
     """
 
     seed: int = 0
-    spp: int = 256
+    spp: int | None = None
     resolution: tuple[int, int] | None = None
     convention: Convention = Convention.MATCHED
     interpolation: Interpolation = Interpolation.PHONG
     tessellation: int | None = None
     viewing: Viewing = DEFAULT_VIEWING
     heuristic_variant: str | None = None
+    everything: bool = False
 
     def __post_init__(self):
-        if self.spp < 2:
+        if self.spp is not None and self.spp < 2:
             raise InputError(
                 f"spp = {self.spp} is not allowed: the noise needs at least 2 samples."
             )
@@ -76,15 +81,49 @@ class Options:
                 f"resolution {width}x{height} is not allowed: width and height are at least 1."
             )
 
-    @property
-    def passes(self):
-        """Number of independent passes."""
-        return max(2, min(16, self.spp // 4 // 2 * 2))
 
-    @property
-    def spp_of_a_pass(self):
-        """Samples a pixel in each pass."""
-        return max(1, self.spp // self.passes)
+@dataclass(frozen=True)
+class Prepared:
+    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half."""
+
+    pair: Pair
+    plan: Plan
+    scene: object
+    heuristic: Renderer
+    reference: Renderer
+    passes: int
+    planning_seconds: float
+
+
+def prepare(source, options=None):
+    """Pair and plan a scene in the current variant, and make both halves ready to render.
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired.
+    """
+    options = options or Options()
+    pair = _pair(source, options)
+    physical = pair.physical.instantiate()
+    begin = perf_counter()
+    chosen = plan(pair, physical, options.interpolation, options.everything)
+    planning = perf_counter() - begin
+    # The sampler is part of the plan, and a scene is made with its sampler.
+    physical = halves.with_sampler(pair.physical, chosen.sampler).instantiate()
+    begin = perf_counter()
+    integrator = physical_integrator(chosen, physical, pair.hide_emitters)
+    planning += perf_counter() - begin
+    passes, spp = _passes(options.spp or chosen.spp, chosen.passes)
+    return Prepared(
+        pair=pair,
+        plan=chosen,
+        scene=physical,
+        heuristic=_heuristic_renderer(source, pair, chosen, spp, options),
+        reference=Renderer(physical, integrator, spp, "reference image"),
+        passes=passes,
+        planning_seconds=planning,
+    )
 
 
 def compare(source, options=None, progress=None, command=""):
@@ -113,19 +152,15 @@ def compare(source, options=None, progress=None, command=""):
         When a rendering holds a NaN or an infinity.
     """
     options = options or Options()
-    progress = progress or _silent
     stages = _Stages()
-    pair = _pair(source, options)
-    chosen = plan.plan(pair)
-    physical = pair.physical.instantiate()
-    integrator = rendering.physical_integrator(chosen, pair.hide_emitters)
-    reference = rendering.Renderer(physical, integrator, options.spp_of_a_pass, "reference image")
-    heuristic = _heuristic_renderer(source, pair, options)
-    stages.done("scene and pairing")
-    estimates = _render(heuristic, reference, options, progress)
+    ready = prepare(source, options)
+    heuristic, reference = ready.heuristic, ready.reference
+    stages.done("scene and pairing", ready.planning_seconds)
+    stages.seconds["planning"] = ready.planning_seconds
+    estimates = _render(ready, options.seed, progress or _silent)
     stages.done("sums of passes", sum(heuristic.times) + sum(reference.times))
-    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
-    surface = gbuffer(physical, width, height)
+    width, height = (int(side) for side in ready.scene.sensors()[0].film().crop_size())
+    surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
     metrics, images = _measure(estimates, surface, options)
     stages.done("metrics")
@@ -137,24 +172,28 @@ def compare(source, options=None, progress=None, command=""):
         "interpolation": options.interpolation.value,
         "seed": options.seed,
         "resolution": [width, height],
-        "plan": record.plan_data(
-            chosen, options.spp_of_a_pass * options.passes, options.passes, SAMPLER
-        ),
+        "plan": record.plan_data(ready.plan, reference.spp * ready.passes, ready.passes),
         "viewing": options.viewing.record(),
         "metrics": metrics,
         "pixels": {"counted": int(images.counted.sum()), "total": width * height},
-        "pairing": record.pairing_data(pair),
+        "pairing": record.pairing_data(ready.pair),
         "time": {
             "heuristic": record.times_data(heuristic.pass_times()),
             "reference": record.times_data(reference.pass_times()),
             "stages": stages.seconds,
         },
         "unrepresentable": [],
-        "warnings": list(pair.warnings),
+        "warnings": list(ready.pair.warnings),
         "versions": record.versions(),
         "command": command,
     }
     return Comparison(data, images)
+
+
+def _passes(spp, wanted):
+    """Return the number of passes, which is even, and the samples a pixel of each."""
+    passes = max(2, min(wanted, spp // 4 // 2 * 2))
+    return passes, max(1, spp // passes)
 
 
 def _pair(source, options):
@@ -164,35 +203,36 @@ def _pair(source, options):
         options.resolution,
         options.interpolation,
         options.tessellation,
+        prune=not options.everything,
     )
 
 
-def _heuristic_renderer(source, pair, options):
+def _heuristic_renderer(source, pair, chosen, spp, options):
     """Make the heuristic half ready to render, in its own variant if it has one."""
-    with rendering.variant(options.heuristic_variant or mi.variant()):
+    with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = _pair(source, options)
-        scene = pair.heuristic.instantiate()
-        return rendering.Renderer(scene, None, options.spp_of_a_pass, "heuristic image")
+        scene = halves.with_sampler(pair.heuristic, chosen.sampler).instantiate()
+        return Renderer(scene, None, spp, "heuristic image")
 
 
 @dataclass(frozen=True)
 class _Estimates:
-    heuristic: rendering.Estimate
-    reference: rendering.Estimate
-    difference: rendering.Estimate
+    heuristic: Estimate
+    reference: Estimate
+    difference: Estimate
 
 
-def _render(heuristic, reference, options, progress):
+def _render(ready, seed, progress):
     """Render the passes of both halves in turn, so that a drift of the machine hits both."""
-    sums = [rendering.Accumulator() for _ in range(3)]
-    for number in range(options.passes):
-        progress("rendering", number, options.passes)
-        images = [half.render(options.seed + number) for half in (heuristic, reference)]
+    sums = [Accumulator() for _ in range(3)]
+    for number in range(ready.passes):
+        progress("rendering", number, ready.passes)
+        images = [half.render(seed + number) for half in (ready.heuristic, ready.reference)]
         images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
         for total, image in zip(sums, images, strict=True):
             total.add(image)
-    progress("rendering", options.passes, options.passes)
+    progress("rendering", ready.passes, ready.passes)
     return _Estimates(*(total.estimate() for total in sums))
 
 

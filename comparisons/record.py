@@ -63,15 +63,25 @@ def pairing_data(pair):
     }
 
 
-def plan_data(plan, spp, passes, sampler):
-    """Return a plan as plain data."""
+def plan_data(plan, spp, passes):
+    """Return a plan as plain data, with the samples and passes that were rendered."""
     return {
-        "effects": [asdict(effect) for effect in plan.effects],
+        "effects": [
+            {
+                "name": decision.effect.label,
+                "called_for": decision.called_for,
+                "rule": f"{decision.rule}: {decision.evidence}",
+            }
+            for decision in plan.decisions
+        ],
+        "kernel_terms": list(plan.kernel_terms),
         "integrator": plan.integrator,
         "max_depth": plan.max_depth,
+        "shadows": plan.shadows,
+        "tabulated_environment": plan.tabulate_environment,
         "spp": spp,
         "passes": passes,
-        "sampler": sampler,
+        "sampler": plan.sampler,
     }
 
 

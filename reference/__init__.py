@@ -9,7 +9,8 @@ if mi.variant() is None:
 
 from reference.halves import Pair, pair
 from reference.pairing import Convention
+from reference.plan import Plan, plan
 from reference.rendering import Estimate, PassTimes
 from reference.scene import Source
 
-__all__ = ["Convention", "Estimate", "Pair", "PassTimes", "Source", "pair"]
+__all__ = ["Convention", "Estimate", "Pair", "PassTimes", "Plan", "Source", "pair", "plan"]

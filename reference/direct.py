@@ -9,6 +9,7 @@ and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mits
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``hide_emitters``   boolean (false)     as of Mitsuba's ``direct``
+``shadows``         boolean (true)      trace shadow rays; off only where nothing can be hidden
 ==================  ==================  ===========================================================
 """
 
@@ -29,6 +30,13 @@ def _define():
     class DirectAllIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
 
+        def __init__(self, props):
+            super().__init__(props)
+            self.shadows = props.get("shadows", True)
+            self.environment_albedo = None
+            """An :class:`reference.environment.AlbedoTable` in place of sampling the environment,
+            for a scene of one BSDF that nothing hides from it; set after construction."""
+
         def sample(self, scene, sampler, ray, medium=None, active=True):
             si = self._first_surface(scene, ray, active)
             seen = active & (si.is_valid() | (not self.hide_emitters))
@@ -39,11 +47,16 @@ def _define():
             extended = []
             for emitter in scene.emitters():
                 if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
-                    colour += _from_emitter(scene, si, bsdf, context, emitter, mi.Point2f(0.5), hit)
+                    colour += self._from_emitter(
+                        scene, si, bsdf, context, emitter, mi.Point2f(0.5), hit
+                    )
+                elif emitter.is_environment() and self.environment_albedo is not None:
+                    albedo = self.environment_albedo.at(si.wi.z)
+                    colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
                 else:
                     extended.append(emitter)
             for emitter in extended:
-                colour += _from_emitter(
+                colour += self._from_emitter(
                     scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
                 )
             if extended:
@@ -60,21 +73,22 @@ def _define():
                 pi[skip] = beyond
             return pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
 
+        def _from_emitter(self, scene, si, bsdf, context, emitter, sample, active):
+            """One sample of an emitter, weighted against sampling the BSDF if that can find it."""
+            ds, weight = emitter.sample_direction(si, sample, active)
+            active = active & (ds.pdf > 0)
+            if self.shadows:
+                active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
+            wo = si.to_local(ds.d)
+            if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
+                return dr.select(active, bsdf.eval(context, si, wo, active) * weight, 0)
+            value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
+            return dr.select(active, value * weight * ds.pdf / (ds.pdf + bsdf_pdf), 0)
+
         def to_string(self):
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
 
     mi.register_integrator("direct_all", DirectAllIntegrator)
-
-
-def _from_emitter(scene, si, bsdf, context, emitter, sample, active):
-    """One sample of an emitter, weighted against sampling the BSDF where that can find it too."""
-    ds, weight = emitter.sample_direction(si, sample, active)
-    active = active & (ds.pdf > 0)
-    active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
-    wo = si.to_local(ds.d)
-    value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
-    share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
-    return dr.select(active, value * weight * share, 0)
 
 
 def _from_bsdf(scene, si, bsdf, context, sampler, active):

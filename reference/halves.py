@@ -25,9 +25,6 @@ BSDF, EMITTER, FILM, INTEGRATOR, SENSOR, SHAPE = (
     for kind in ("BSDF", "Emitter", "Film", "Integrator", "Sensor", "Shape")
 )
 
-SAMPLER = "multijitter"
-"""The stock sampler of least noise for its time on the scenes measured; see the benchmarks."""
-
 
 @dataclass(frozen=True)
 class Pair:
@@ -65,6 +62,7 @@ def pair(
     resolution=None,
     interpolation=Interpolation.PHONG,
     tessellation=None,
+    prune=True,
 ):
     """Derive both halves of a scene, for the current variant.
 
@@ -81,6 +79,8 @@ def pair(
     tessellation : int, optional
         How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 where it is not given;
         given, it makes meshes for PHONG too.
+    prune
+        Whether the kernel leaves out the terms that no material has.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def pair(
     given_physical = bsdfs.to_heuristic(heuristic, convention)
     lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    _set_integrator(heuristic, ambient, settings.hide_emitters, interpolation)
+    _set_integrator(heuristic, ambient, settings.hide_emitters, interpolation, prune)
     if interpolation is not Interpolation.PHONG or tessellation is not None:
         meshing.replace_shapes(
             heuristic, geometry(), tessellation or meshes.RESOLUTION, interpolation
@@ -134,8 +134,18 @@ class _Settings:
     max_depth: int
 
 
+def with_sampler(graph, plugin):
+    """Return a copy of a graph whose sensors have a sampler of their own, of the given kind."""
+    copy = graph.copy()
+    for sensor in copy.nodes(SENSOR):
+        for key, _ in copy.children(sensor, mi.ObjectType.Sampler):
+            copy.detach(sensor, key)
+        copy.attach(sensor, "sampler", copy.add(mi.ObjectType.Sampler, properties(plugin)))
+    return copy
+
+
 def _prepare(graph, resolution):
-    """Check the graph, and fill in what both halves need: ids, BSDFs, film and sampler."""
+    """Check the graph, and fill in what both halves need: ids, BSDFs and film."""
     bsdfs.give_default(graph)
     bsdfs.check(graph)
     emitters.check(graph)
@@ -147,10 +157,6 @@ def _prepare(graph, resolution):
         raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
     for sensor in sensors:
         _prepare_film(graph, sensor, resolution)
-        for key, _ in graph.children(sensor, mi.ObjectType.Sampler):
-            graph.detach(sensor, key)
-        sampler = graph.add(mi.ObjectType.Sampler, properties(SAMPLER))
-        graph.attach(sensor, "sampler", sampler)
 
 
 def _prepare_film(graph, sensor, resolution):
@@ -189,8 +195,13 @@ def _integrator_settings(graph):
     return settings
 
 
-def _set_integrator(graph, ambient, hide_emitters, interpolation):
-    props = properties("heuristic", hide_emitters=hide_emitters, interpolation=interpolation.value)
+def _set_integrator(graph, ambient, hide_emitters, interpolation, prune):
+    props = properties(
+        "heuristic",
+        hide_emitters=hide_emitters,
+        interpolation=interpolation.value,
+        prune=prune,
+    )
     if ambient is not None:
         props["ambient"] = ambient
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))

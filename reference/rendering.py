@@ -17,6 +17,7 @@ import numpy as np
 
 from heuristic.errors import NonFiniteError
 from reference import direct
+from reference.environment import AlbedoTable
 
 
 @dataclass(frozen=True)
@@ -162,13 +163,18 @@ def variant(name):
         yield
 
 
-def physical_integrator(plan, hide_emitters):
-    """Make the integrator that a plan names."""
+def physical_integrator(plan, scene, hide_emitters):
+    """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
-    description = {"type": plan.integrator, "hide_emitters": hide_emitters}
     if plan.integrator == "path":
-        description["max_depth"] = plan.max_depth
-    return mi.load_dict(description)
+        description = {"type": "path", "hide_emitters": hide_emitters, "max_depth": plan.max_depth}
+        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
+    integrator = mi.load_dict(
+        {"type": plan.integrator, "hide_emitters": hide_emitters, "shadows": plan.shadows}
+    )
+    if plan.tabulate_environment:
+        integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
+    return integrator
 
 
 def _require_finite(image, label, seed):

@@ -107,7 +107,9 @@ class Graph:
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
-        return Graph(self.name, self.config, Parser.ParserState(self.state))
+        copy = Graph(self.name, self.config, Parser.ParserState(self.state))
+        copy.folders = list(self.folders)
+        return copy
 
     def instantiate(self):
         """Make the Mitsuba scene, without merging shapes.

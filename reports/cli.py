@@ -5,6 +5,7 @@ message on standard error, never a traceback. Mitsuba and colour-science are imp
 commands that need them, so that ``--help`` and usage errors answer at once.
 """
 
+import json
 import shlex
 import sys
 from pathlib import Path
@@ -16,6 +17,9 @@ from heuristic.errors import FotismosError, InputError
 from heuristic.version import __version__
 
 START = perf_counter()
+VERIFIED_AT = (128, 128)
+"""Resolution at which a report verifies its plans."""
+
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
 
@@ -49,8 +53,8 @@ def _rendering_options(command):
                      " a spectral reference. [default: the scene's own, else that of --variant]"),
         click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
                      help="Seed of the first pass."),
-        click.option("--spp", default=256, show_default=True, type=click.IntRange(min=2),
-                     help="Samples a pixel, over all passes."),
+        click.option("--spp", type=click.IntRange(min=2),
+                     help="Samples a pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=Resolution(),
                      help="Width and height in place of the film's own."),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
@@ -59,6 +63,8 @@ def _rendering_options(command):
         click.option("--tessellation", type=click.IntRange(min=1), metavar="N",
                      help="Mesh the shapes of the heuristic half: N edges a quarter turn or a"
                      " straight side. [default: the scene's own, else 16 for flat and gouraud]"),
+        click.option("--everything", is_flag=True,
+                     help="Switch off all pruning: simulate what no proof says is not needed."),
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
@@ -101,11 +107,51 @@ def compare(scenes, output, **rendering):
 @_output_option("out/report")
 @_rendering_options
 def report(output, **rendering):
-    """Compare all built-in scenes and write one report."""
+    """Compare all built-in scenes, verify their plans, and write one report."""
     from comparisons.scenes import SCENES
     from heuristic import equations
 
-    _compare(tuple(SCENES), output, rendering, equations.index())
+    names = tuple(SCENES)
+    _check_installation()
+    verifications = [] if rendering["everything"] else _verify(names, rendering)
+    _compare(names, output, rendering, equations.index(), verifications)
+
+
+@cli.command()
+@click.argument("scene", metavar="SCENE")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
+@_rendering_options
+def plan(scene, as_json, verify, **rendering):
+    r"""Say which effects a scene calls for, by which rule, and what will be simulated.
+
+    \b
+    Examples:
+      fotismos plan cornell-box
+      fotismos plan --verify fig-8-9 --resolution 128x128
+    """
+    _check_installation()
+    from reference.scene import set_variant
+    from reports import planning, progress
+
+    source, chosen = _job(scene, rendering)
+    set_variant(chosen["variant"])
+    options = _options(chosen)
+    if verify:
+        from comparisons.verification import verify as run
+
+        with progress.shown() as bar:
+            data = run(source, options, bar.of(source.name)).data()
+        lines = planning.verification_lines([data])
+    else:
+        from comparisons.compare import prepare
+
+        data = planning.data(source.name, prepare(source, options), chosen["variant"])
+        lines = planning.lines(data)
+    if as_json:
+        lines = [json.dumps(data, indent=2, ensure_ascii=False)]
+    for line in lines:
+        click.echo(line)
 
 
 @cli.command()
@@ -142,7 +188,22 @@ def main():
         sys.exit(error.exit_code)
 
 
-def _compare(names, folder, rendering, equations=()):
+def _verify(names, rendering):
+    """Hold the plan of each scene against everything simulated, at a small size."""
+    from comparisons.verification import verify
+    from reference.scene import set_variant
+    from reports import progress
+
+    with progress.shown() as bar:
+        results = []
+        for source, chosen in (_job(name, rendering) for name in names):
+            set_variant(chosen["variant"])
+            options = _options(chosen | {"resolution": VERIFIED_AT, "spp": None})
+            results.append(verify(source, options, bar.of(source.name)).data())
+    return results
+
+
+def _compare(names, folder, rendering, equations=(), verifications=()):
     _check_installation()
     from comparisons.compare import compare as run
     from reference.scene import set_variant
@@ -162,7 +223,7 @@ def _compare(names, folder, rendering, equations=()):
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
-    output.write_page(folder, list(views.values()), equations)
+    output.write_page(folder, list(views.values()), equations, verifications)
     share = (perf_counter() - begin) / len(views)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share
@@ -223,6 +284,7 @@ def _options(rendering):
         heuristic_variant=rendering["heuristic_variant"],
         interpolation=Interpolation(rendering["interpolation"]),
         tessellation=rendering["tessellation"],
+        everything=rendering["everything"],
     )
 
 
@@ -231,7 +293,9 @@ def _command(source, rendering):
     scene = source.name if callable(source.content) else str(source.content)
     words = ["fotismos", "compare", scene]
     for key, value in rendering.items():
-        if value is not None:
+        if value is True:
+            words.append(f"--{key.replace('_', '-')}")
+        elif value not in (None, False):
             text = "x".join(map(str, value)) if key == "resolution" else str(value)
             words += [f"--{key.replace('_', '-')}", text]
     return shlex.join(words)

@@ -72,9 +72,12 @@ def write_scene(folder, name, comparison):
     }
 
 
-def write_page(folder, views, equations=()):
-    """Write ``index.html`` for the scenes of a run, with the index of equations if it is given."""
-    _write(folder / "index.html", page.render(views, equations=equations))
+def write_page(folder, views, equations=(), verifications=()):
+    """Write ``index.html`` for the scenes of a run, and what else a report shows."""
+    _write(
+        folder / "index.html",
+        page.render(views, equations=equations, verifications=verifications),
+    )
 
 
 def rewrite_record(folder, name, data):

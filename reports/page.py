@@ -49,8 +49,9 @@ def render(
     comparisons: Sequence[Mapping[str, Any]],
     title: str = TITLE,
     equations: Sequence[Entry] = (),
+    verifications: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """One HTML page of all scenes, in the order given, and the index of equations if there is one.
+    """One HTML page of all scenes, in the order given.
 
     Each comparison is a mapping with
 
@@ -61,6 +62,9 @@ def render(
         "significant". `reports.images.pictures` makes them. A missing one is left out.
     files (optional)
         Paths relative to the page by label, shown as links.
+
+    `equations` is the index of `heuristic.equations`, `verifications` the data of
+    `comparisons.verification`; each is a section of its own, left out where it is empty.
     """
     scenes = [
         {
@@ -76,7 +80,12 @@ def render(
     ]
     page = _environment().get_template("page.html.j2")
     return page.render(
-        title=title, scenes=scenes, metrics=METRICS, legends=legends(), equations=equations
+        title=title,
+        scenes=scenes,
+        metrics=METRICS,
+        legends=legends(),
+        equations=equations,
+        verifications=verifications,
     )
 
 

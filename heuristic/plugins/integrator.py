@@ -9,6 +9,7 @@ Parameter           Type (default)      Meaning
                                         faces of meshes (:mod:`heuristic.plugins.interpolated`)
 ``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
                                         chapters' model does not
+``prune``           boolean (true)      trace only the terms that some material of the scene has
 ``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
                                         nothing
 ==================  ==================  ===========================================================
@@ -30,6 +31,7 @@ from heuristic.interpolation import Interpolation
 from heuristic.materials import Material
 from heuristic.plugins.interpolated import interpolating
 from heuristic.plugins.lights import FAR
+from heuristic.plugins.phong import COEFFICIENTS
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.shading import shade
 
@@ -44,6 +46,7 @@ def define():
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
             self.occlusion = props.get("occlusion", False)
+            self.prune = props.get("prune", True)
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
@@ -71,7 +74,7 @@ def define():
             ambient = self.ambient_at(si, active)
             visible = self.visibility(scene, si, active)
             colour = mi.Spectrum(0)
-            for material, is_here in SceneMaterials(scene).at(si, active):
+            for material, is_here in SceneMaterials(scene, self.prune).at(si, active):
                 value = shade(si.p, normal, view, material, lights, ambient, visible)
                 colour += dr.select(is_here, value, 0)
             return colour
@@ -82,7 +85,8 @@ def define():
 
         def ambient_at(self, si, active):
             """Return ``I_a``, a plain 0 where there is none."""
-            return self.ambient.eval(si, active) if may_be_nonzero(self.ambient) else 0
+            is_there = may_be_nonzero(self.ambient) or not self.prune
+            return self.ambient.eval(si, active) if is_there else 0
 
         def visibility(self, scene, si, active):
             """Return the shadow test for :func:`heuristic.shade`, None where there is none."""
@@ -124,7 +128,8 @@ class SceneMaterials:
         For a shape whose BSDF is no ``phong``.
     """
 
-    def __init__(self, scene):
+    def __init__(self, scene, prune=True):
+        self.prune = prune
         numbers = {}
         places = {}
         for shape in scene.shapes():
@@ -146,8 +151,9 @@ class SceneMaterials:
         the kernel's code; the mask tells where it holds.
         """
         if len(self.bsdfs) == 1:
-            return [(self.bsdfs[0].material(si, active), True)]
+            return [(self.bsdfs[0].material(si, active, self.prune), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+        present = present if self.prune else list(COEFFICIENTS)
         readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
         *values, n, is_blinn = dr.switch(self._index(si, active), readers, si, active)
         forms = sorted({bsdf.form for bsdf in self.bsdfs})

@@ -32,6 +32,8 @@ from heuristic.errors import InputError
 from heuristic.materials import Material, check_form
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
 
+COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
+
 
 def define():
     """Create the class for the current variant and register it."""
@@ -61,10 +63,11 @@ def define():
             self.m_flags = self.m_components[0] | self.m_components[1]
             self.parameters_changed()
 
-        def material(self, si, active=True):
+        def material(self, si, active=True, prune=True):
             """Return the coefficients at a surface interaction; absent terms are plain zeros."""
             coefficients = {
-                name: getattr(self, name).eval(si, active) for name in self.present if name != "n"
+                name: getattr(self, name).eval(si, active)
+                for name in (self.present if prune else COEFFICIENTS)
             }
             return Material(**coefficients, n=self.n, form=self.form, normalised=self.normalised)
 

@@ -1,0 +1,165 @@
+"""Pruning shown to be right, and what it saves: a scene as planned against everything simulated.
+
+Both references are rendered in turn, pass by pass. The difference is held against the noise of both
+sides, and the times are compared at equal noise: the variance of an independent mean falls with the
+time spent, so that ``variance x time`` is what a method costs.
+"""
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from comparisons.compare import LEVEL, Options, prepare
+from comparisons.significance import significance
+from reference import halves
+from reference.gbuffer import gbuffer
+from reference.rendering import Accumulator, Renderer, variant
+
+OUTLIERS = 0.001
+"""Share of pixels of largest variance that the noise of a side is measured without."""
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A planned scene against everything simulated.
+
+    Attributes
+    ----------
+    scene, planned, everything
+        Name, and a word on each reference.
+    significant
+        Pixels that differ by more than the noise of both sides and float32 rounding.
+    pixels
+        Pixels compared: those whose centre sees a surface.
+    largest
+        Largest difference of the two means, linear.
+    heuristic_largest
+        Largest difference of the two heuristic images; the kernels differ in terms that are 0.
+    planned_s, everything_s
+        Time of a pass, median.
+    planned_noise, everything_noise
+        Root mean square standard error of one pass over the pixels, less outliers.
+    gain
+        ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
+        planned reference reaches the same noise.
+    planning_s
+        Time that planning took, tables included.
+    saved_s
+        Time that the plan saves at the noise of all its own passes: what everything would take for
+        that noise, less what the plan takes.
+    """
+
+    scene: str
+    planned: str
+    everything: str
+    significant: int
+    pixels: int
+    largest: float
+    heuristic_largest: float
+    planned_s: float
+    everything_s: float
+    planned_noise: float
+    everything_noise: float
+    gain: float
+    planning_s: float
+    saved_s: float
+
+    def data(self):
+        """Return plain data."""
+        return asdict(self)
+
+
+def verify(source, options=None, progress=None):
+    """Render a scene as planned and with everything, and compare.
+
+    Parameters
+    ----------
+    source, options, progress
+        As of :func:`comparisons.compare.compare`. Samples are those of the everything-on side where
+        they are given; the plan's own otherwise.
+
+    Returns
+    -------
+    Verification
+    """
+    options = options or Options()
+    sides = [prepare(source, replace(options, everything=choice)) for choice in (False, True)]
+    passes = max(side.passes for side in sides)
+    sums = [Accumulator() for _ in sides]
+    for number in range(passes):
+        if progress:
+            progress("verifying", number, passes)
+        for side, total in zip(sides, sums, strict=True):
+            # Other seeds for the other side: equal ones would hide noise that both share.
+            shift = 0 if side is sides[0] else 1_000_000
+            total.add(side.reference.render(options.seed + shift + number))
+    estimates = [total.estimate() for total in sums]
+    return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed))
+
+
+def _kernel_difference(sides, seed):
+    """Return the largest difference that the terms left out of the kernel make, with equal rays."""
+    planned, everything = sides
+    graph = halves.with_sampler(everything.pair.heuristic, planned.plan.sampler)
+    with variant(planned.heuristic.variant):
+        whole = Renderer(graph.instantiate(), None, planned.heuristic.spp, "heuristic image")
+    images = [np.array(renderer.render(seed)) for renderer in (planned.heuristic, whole)]
+    return float(np.abs(images[0] - images[1]).max())
+
+
+def _summarise(name, sides, estimates, kernel_difference):
+    scene = sides[0].scene
+    width, height = (int(side) for side in scene.sensors()[0].film().crop_size())
+    counted = gbuffer(scene, width, height).hit
+    difference = estimates[0].mean - estimates[1].mean
+    error = np.hypot(estimates[0].standard_error, estimates[1].standard_error)
+    marked = significance(
+        difference,
+        error,
+        estimates[0].passes,
+        max(int(counted.sum()), 1),
+        LEVEL,
+        magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
+    )
+    times = [side.reference.pass_times().median for side in sides]
+    noises = _noises([estimate.standard_error[counted] for estimate in estimates])
+    noises = [noise * np.sqrt(estimates[0].passes) for noise in noises]
+    # A plan without any noise left would divide by zero; below rounding there is nothing to gain.
+    costs = [time * max(noise, 1e-7) ** 2 for time, noise in zip(times, noises, strict=True)]
+    gain = costs[1] / costs[0]
+    planned_total = times[0] * sides[0].passes
+    return Verification(
+        scene=name,
+        planned=_word(sides[0].plan),
+        everything=_word(sides[1].plan),
+        significant=int((marked & counted).sum()),
+        pixels=int(counted.sum()),
+        largest=float(np.abs(difference).max()),
+        heuristic_largest=kernel_difference,
+        planned_s=times[0],
+        everything_s=times[1],
+        planned_noise=noises[0],
+        everything_noise=noises[1],
+        gain=gain,
+        planning_s=sides[0].planning_seconds,
+        saved_s=planned_total * (gain - 1),
+    )
+
+
+def _noises(errors):
+    """Return the root mean square of each side's standard errors, (M, 3), outliers left out.
+
+    A pixel with a firefly has nearly all of the variance of an image, and which side it fell to is
+    chance; those in the top :data:`OUTLIERS` of either side do not count for either.
+    """
+    variances = [np.mean(error**2, axis=-1) for error in errors]
+    limits = [np.quantile(v, 1 - OUTLIERS) if v.size else 0.0 for v in variances]
+    kept = np.logical_and(*(v <= limit for v, limit in zip(variances, limits, strict=True)))
+    return [float(np.sqrt(v[kept].mean())) if kept.any() else 0.0 for v in variances]
+
+
+def _word(plan):
+    depth = "" if plan.integrator == "direct_all" else f" {plan.max_depth}"
+    extra = "" if plan.shadows else ", no shadow rays"
+    extra += ", tabulated environment" if plan.tabulate_environment else ""
+    return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

@@ -1,0 +1,47 @@
+"""A constant environment on an unoccluded surface, without Monte Carlo in the image.
+
+Where nothing stands between a surface and a constant environment of radiance ``L``, the reflected
+radiance is ``L a(mu)``: the albedo of the BSDF for the view direction of cosine ``mu``, a function
+of one variable for an isotropic BSDF. It is tabulated once, by Mitsuba's own sampling of the BSDF
+on a rank-1 lattice, and looked up at each camera ray.
+"""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+NODES = 256
+SAMPLES = 8192
+LATTICE = (1, 3547, 1663)
+"""Generator of the rank-1 lattice (Korobov) that the BSDF is sampled on."""
+
+
+class AlbedoTable:
+    """The albedo of a uniform, isotropic BSDF over the cosine of the view direction, RGB.
+
+    Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most.
+    """
+
+    def __init__(self, bsdf):
+        mu = np.linspace(1e-3, 1, NODES) ** 2
+        index = np.arange(SAMPLES)
+        lattice = (np.outer(LATTICE, index) / SAMPLES + 0.5 / SAMPLES) % 1
+        grid_mu = mi.Float(np.repeat(mu, SAMPLES))
+        points = [mi.Float(np.tile(row, NODES)) for row in lattice]
+        si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
+        si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
+        _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))
+        # Thousands of equal terms lose four digits in single precision.
+        means = [
+            mi.Float(dr.block_sum(mi.Float64(channel), SAMPLES) / SAMPLES) for channel in weight
+        ]
+        self.table = dr.ravel(mi.Color3f(*means))
+        dr.eval(self.table)
+
+    def at(self, mu):
+        """Interpolate linearly at cosines ``mu``; 0 below the horizon."""
+        place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
+        place = dr.clip(place, 0, NODES - 1)
+        below = dr.minimum(mi.UInt32(place), NODES - 2)
+        low, high = (dr.gather(mi.Color3f, self.table, below + i) for i in (0, 1))
+        return dr.select(mu > 0, dr.lerp(low, high, place - mi.Float(below)), 0)
