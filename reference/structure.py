@@ -41,8 +41,8 @@ class ShapeFacts:
     low, high
         Corners of its bounding box, (3,) each.
     convex
-        No point of its outside sees another of its points, and its shading normals are those of
-        its surface.
+        No point of the side that reflects sees another of its points (for closed shapes, from
+        outside), and its shading normals are those of its surface.
     plane
         ``(point, normal)`` of a flat shape that reflects on the side of its normal alone, else
         None.
@@ -160,12 +160,16 @@ def _geometry(shape, twosided):
         plane = np.array(sample.p)[:, 0], np.array(sample.n)[:, 0]
         return True, None if twosided else plane
     if shape.is_mesh():
-        return _is_convex(shape), None
+        # The back of an open mesh may see itself; only one-sided BSDFs keep it black.
+        return not twosided and _is_convex(shape), None
     return False, None
 
 
 def _is_convex(mesh):
-    """Tell whether all vertices lie behind all faces, and shading normals are the faces' own."""
+    """Tell whether all vertices lie behind all faces, and shading normals are the faces' own.
+
+    A bowl whose faces look inward has all vertices before them, and is not convex in this sense.
+    """
     if mesh.vertex_count() * mesh.face_count() > LARGEST_MESH:
         return False
     points = np.array(meshes.positions(mesh), float).T
@@ -178,9 +182,7 @@ def _is_convex(mesh):
     normal /= length[:, None]
     size = np.ptp(points, axis=0).max()
     height = np.einsum("fi,vi->fv", normal, points) - np.einsum("fi,fi->f", normal, a)[:, None]
-    outward = height.max() <= ROUNDING * size
-    inward = height.min() >= -ROUNDING * size
-    if not (outward or inward):
+    if height.max() > ROUNDING * size:
         return False
     if mesh.has_vertex_normals() and not mesh.has_face_normals():
         shading = np.array(meshes.normals(mesh), float).T[faces]

@@ -1,0 +1,260 @@
+"""Planning: what is left out is not there. Scenes on which a careless rule would prune wrongly."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import Options, prepare
+from comparisons.scenes import SCENES
+from comparisons.verification import verify
+from heuristic.errors import InputError
+from reference.effects import Effect
+from reference.environment import AlbedoTable
+from reference.scene import Source
+from reference.structure import examine
+
+WHITE = {"type": "diffuse", "reflectance": 0.7}
+BLACK = {"type": "diffuse", "reflectance": 0.0}
+
+
+def transform():
+    return mi.ScalarTransform4f()
+
+
+def scene(viewer=(0, -6, 3), target=(0, 0, 0), size=48, **parts):
+    return {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "sensor": {
+            "type": "perspective",
+            "fov": 40.0,
+            "to_world": transform().look_at(viewer, target, (0, 0, 1)),
+            "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}},
+        },
+        **parts,
+    }
+
+
+def ball(center=(0, 0, 0), radius=1.0, bsdf=WHITE, **more):
+    return {"type": "sphere", "center": center, "radius": radius, "bsdf": bsdf, **more}
+
+
+def floor(height=-1.0, bsdf=WHITE):
+    to_world = transform().translate((0, 0, height)).scale(5)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": bsdf}
+
+
+def lamp(position, intensity=40.0):
+    return {"type": "point", "position": position, "intensity": intensity}
+
+
+def mesh(vertices, faces, path):
+    """Write a triangle mesh to a PLY file, faces without vertex normals."""
+    vertices, faces = np.asarray(vertices, float), np.asarray(faces, int)
+    header = (
+        f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
+        f"property float y\nproperty float z\nelement face {len(faces)}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    lines = [" ".join(f"{x:.9g}" for x in vertex) for vertex in vertices]
+    lines += ["3 " + " ".join(map(str, face)) for face in faces]
+    path.write_text(header + "\n".join(lines) + "\n", encoding="ascii")
+    return {"type": "ply", "filename": str(path), "face_normals": True, "bsdf": WHITE}
+
+
+def dented_octahedron(depth):
+    """An octahedron whose upper front face is split at its centre, which is pushed in."""
+    points = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    a, b, c = (np.array(points[i], float) for i in (3, 0, 4))
+    middle = (a + b + c) / 3
+    points.append(tuple(middle * (1 - depth)))
+    return points, [*faces, (3, 0, 6), (0, 4, 6), (4, 3, 6)]
+
+
+def bowl(rings=8, sides=16):
+    """The inside of a lower half sphere, faces turned to its centre."""
+    points = [(0, 0, -1)]
+    for ring in range(1, rings + 1):
+        t = np.pi / 2 * ring / rings
+        for side in range(sides):
+            p = 2 * np.pi * side / sides
+            points.append((np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), -np.cos(t)))
+    at = lambda ring, side: 1 + (ring - 1) * sides + side % sides  # noqa: E731 a table in one line
+    faces = [(0, at(1, s), at(1, s + 1)) for s in range(sides)]
+    for ring in range(1, rings):
+        for s in range(sides):
+            a, b, c, d = at(ring, s), at(ring + 1, s), at(ring + 1, s + 1), at(ring, s + 1)
+            faces += [(a, b, c), (a, c, d)]
+    return points, faces
+
+
+MIRROR = {"type": "roughplastic", "alpha": 0.02, "diffuse_reflectance": 0.0, "int_ior": 3.0}
+ADVERSARIAL = {
+    "two spheres that shadow each other": lambda tmp: scene(
+        one=ball((-1.2, 0, 0)), two=ball((1.2, 0, 0)), light=lamp((-8, 0, 0.5), 300.0)
+    ),
+    "a concave bowl": lambda tmp: scene(
+        viewer=(0, -3, 4), bowl=mesh(*bowl(), tmp / "bowl.ply"), light=lamp((1.5, 0, 2), 20.0)
+    ),
+    "an occluder smaller than a pixel": lambda tmp: scene(
+        floor=floor(0.0), dust=ball((0, 0, 2.999), 0.0005), light=lamp((0, 0, 3))
+    ),
+    "a light inside an object": lambda tmp: scene(
+        shell=ball((0, 0, 0), 0.8), floor=floor(), light=lamp((0, 0, 0)), sky={
+            "type": "constant", "radiance": 0.2
+        }
+    ),
+    "an emissive neighbour": lambda tmp: scene(
+        object=ball((-1, 0, 0), 0.8),
+        glowing=ball((1, 0, 0), 0.8, emitter={"type": "area", "radiance": 2.0}),
+    ),
+    "a mirror behind the camera": lambda tmp: scene(
+        object=ball(),
+        mirror={
+            "type": "rectangle",
+            "to_world": transform().look_at((0, -8, 4), (0, 0, 0), (0, 0, 1)).scale(3),
+            "bsdf": MIRROR,
+        },
+        light=lamp((-3, 2, 4)),
+    ),
+    "a mesh that is almost convex": lambda tmp: scene(
+        viewer=(2.5, -2.5, 2),
+        thing=mesh(*dented_octahedron(0.15), tmp / "dented.ply"),
+        light=lamp((0.2, -3, 3)),
+    ),
+    "a black room with one coloured wall": lambda tmp: scene(
+        viewer=(0, -3.9, 0),
+        object=ball((0.8, 0, 0), 0.7),
+        floor=floor(-2.0, BLACK),
+        wall={
+            "type": "rectangle",
+            "to_world": transform().translate((-2, 0, 0)).rotate((0, 1, 0), 90).scale(3),
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.9, 0.1, 0.1)}},
+        },
+        light=lamp((-1, -1, 1.5), 10.0),
+    ),
+    "a light at the horizon": lambda tmp: scene(floor=floor(0.0), light=lamp((2, 0, 0.0))),
+    "a camera inside a sphere": lambda tmp: scene(
+        viewer=(0, 0, 0.3),
+        target=(1, 0, 0),
+        room={
+            "type": "sphere", "radius": 2.0, "flip_normals": True, "bsdf": WHITE
+        },
+        light=lamp((0.5, 0.5, 0.5), 5.0),
+    ),
+}  # fmt: skip
+CHEAP = {"a light at the horizon"}
+
+
+@pytest.mark.parametrize("name", ADVERSARIAL)
+def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
+    source = Source("adversarial", ADVERSARIAL[name](tmp_path))
+    ready = prepare(source)
+    if name in CHEAP:
+        assert ready.plan.integrator == "direct_all"
+    else:
+        assert ready.plan.calls_for(Effect.OCCLUSION) or ready.plan.calls_for(
+            Effect.INTERREFLECTION
+        )
+    result = verify(source, Options(spp=512))
+    assert result.significant == 0
+    assert result.heuristic_largest < 1e-6
+
+
+def test_light_through_glass_is_not_planned_at_all_yet(rgb):
+    pane = {"type": "rectangle", "bsdf": {"type": "dielectric"}}
+    with pytest.raises(InputError, match="dielectric"):
+        prepare(Source("glass", scene(object=ball(), pane=pane, light=lamp((0, 0, 5)))))
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if "lamp" not in name])
+def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
+    mi.set_variant(SCENES[name].variant)
+    result = verify(SCENES[name].source(), Options(resolution=(48, 48)))
+    assert result.significant == 0
+    assert result.heuristic_largest < 1e-6
+
+
+def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
+    """The verification can fail: with shadows left out it marks the shadow."""
+    monkeypatch.setattr("reference.rules.occlusion", lambda structure: (False, "wrong"))
+    monkeypatch.setattr("reference.rules.interreflection", lambda structure: (False, "wrong"))
+    parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
+    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
+
+
+def facts(parts):
+    ready = prepare(Source("facts", scene(**parts, light=lamp((0, 0, 5)))))
+    structure = examine(ready.pair.physical, ready.scene)
+    return {shape.name: shape for shape in structure.shapes}
+
+
+@pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (-0.1, True), (1e-3, False)])
+def test_a_dent_makes_a_mesh_concave_and_a_tip_does_not(rgb, tmp_path, depth, convex):
+    thing = mesh(*dented_octahedron(depth), tmp_path / "thing.ply")
+    assert facts({"thing": thing})["thing"].convex is convex
+
+
+def test_which_shapes_are_convex(rgb, tmp_path):
+    found = facts(
+        {
+            "ball": ball(),
+            "floor": floor(),
+            "cube": {"type": "cube", "bsdf": WHITE},
+            "bowl": mesh(*bowl(), tmp_path / "bowl.ply"),
+            "tube": {"type": "cylinder", "bsdf": WHITE},
+        }
+    )
+    convex = {name: shape.convex for name, shape in found.items()}
+    assert convex == {"ball": True, "floor": True, "cube": True, "bowl": False, "tube": False}
+    assert found["floor"].plane is not None
+    assert not found["floor"].may_face(found["floor"])
+
+
+def test_what_lies_behind_a_one_sided_wall_does_not_face_it(rgb):
+    below, above = ball((0, 0, -3), 0.5), ball((0, 0, 3), 0.5)
+    found = facts({"floor": floor(0.0), "below": below, "above": above})
+    assert not found["floor"].may_face(found["below"])
+    assert found["floor"].may_face(found["above"])
+
+
+def test_a_figure_is_planned_without_random_numbers(rgb):
+    plan = prepare(SCENES["fig-8-9"].source()).plan
+    assert (plan.integrator, plan.max_depth, plan.shadows) == ("direct_all", 2, False)
+    assert plan.tabulate_environment
+    assert plan.kernel_terms == ("k_a", "k_d", "k_s")
+    assert [decision.effect for decision in plan.decisions] == list(Effect)
+
+
+def test_everything_is_what_a_user_types_without_thinking(rgb):
+    plan = prepare(SCENES["fig-8-9"].source(), Options(everything=True)).plan
+    assert (plan.integrator, plan.max_depth, plan.sampler) == ("path", -1, "independent")
+    assert all(decision.called_for for decision in plan.decisions)
+    assert plan.kernel_terms == ("k_i", "k_a", "k_d", "k_s")
+
+
+def test_the_scenes_own_depth_is_kept(rgb):
+    parts = {"one": ball(), "floor": floor(), "light": lamp((0, -3, 4))}
+    description = scene(**parts) | {"integrator": {"type": "path", "max_depth": 3}}
+    for everything in (False, True):
+        plan = prepare(Source("depth", description), Options(everything=everything)).plan
+        assert plan.max_depth == 3
+    direct = description | {"integrator": {"type": "path", "max_depth": 2}}
+    assert prepare(Source("depth", direct)).plan.integrator == "direct_all"
+
+
+def test_the_table_of_the_environment_agrees_with_sampling(rgb):
+    """The albedo over view angles against plain Monte Carlo of another size and generator."""
+    bsdf = mi.load_dict({"type": "roughplastic", "alpha": 0.3, "int_ior": 2.0})
+    table = AlbedoTable(bsdf)
+    for mu in (1.0, 0.6, 0.2, 0.05):
+        count = 1_000_000
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        si.wi = mi.Vector3f((1 - mu**2) ** 0.5, 0, mu)
+        rng = mi.PCG32(count)
+        point = mi.Point2f(rng.next_float32(), rng.next_float32())
+        weight = np.array(bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), point)[1][0], float)
+        error = weight.std() / count**0.5
+        assert abs(np.array(table.at(mi.Float(mu)))[0, 0] - weight.mean()) < 5 * error + 2e-4
