@@ -159,7 +159,7 @@ def _noises(errors):
 
 
 def _word(plan):
-    depth = "" if plan.integrator == "direct_all" else f" {plan.max_depth}"
+    depth = "" if plan.max_depth == 2 else f" {plan.max_depth}"
     extra = "" if plan.shadows else ", no shadow rays"
     extra += ", tabulated environment" if plan.tabulate_environment else ""
     return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

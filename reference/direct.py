@@ -1,5 +1,7 @@
 """The integrator plugin ``direct_all``: direct light from every emitter at every sample.
 
+Indirect light is added where it is asked for.
+
 Mitsuba's ``direct`` picks one emitter at random for each sample, so that two point lights already
 make noise. This one asks each emitter in turn: point, spot and directional lights, which need no
 random number, are then exact at each camera ray, and only what has an extent is sampled, by emitter
@@ -10,11 +12,15 @@ Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``hide_emitters``   boolean (false)     as of Mitsuba's ``direct``
 ``shadows``         boolean (true)      trace shadow rays; off only where nothing can be hidden
+``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
+                                        adds indirect light (:mod:`reference.indirect`)
 ==================  ==================  ===========================================================
 """
 
 import drjit as dr
 import mitsuba as mi
+
+from reference.indirect import indirect_light
 
 _registered = set()
 
@@ -33,6 +39,7 @@ def _define():
         def __init__(self, props):
             super().__init__(props)
             self.shadows = props.get("shadows", True)
+            self.max_depth = props.get("max_depth", 2)
             self.environment_albedo = None
             """An :class:`reference.environment.AlbedoTable` in place of sampling the environment,
             for a scene of one BSDF that nothing hides from it; set after construction."""
@@ -61,6 +68,8 @@ def _define():
                 )
             if extended:
                 colour += _from_bsdf(scene, si, bsdf, context, sampler, hit)
+            if self.max_depth != 2:
+                colour += indirect_light(scene, sampler, si, bsdf, self.max_depth, hit)
             environment = scene.environment() is not None and not self.hide_emitters
             return colour, active if environment else hit, []
 

@@ -1,14 +1,18 @@
 """The cheapest reference that is right, chosen by what a scene calls for.
 
-=====================================  ============================================================
-What the scene calls for               What is simulated
-=====================================  ============================================================
-neither occlusion nor interreflection  ``direct_all`` without shadow rays; a constant environment
-                                       from a table of the BSDF's albedo where there is one BSDF
-no interreflection                     ``direct_all``: points and directions exactly, the rest
-                                       sampled
-interreflection                        ``path``, as deep as the scene allows
-=====================================  ============================================================
+======================================  ===========================================================
+What the scene calls for                What is simulated
+======================================  ===========================================================
+neither occlusion nor interreflection   ``direct_all`` without shadow rays; a constant environment
+                                        from a table of the BSDF's albedo where there is one BSDF
+no interreflection                      ``direct_all``: points and directions exactly, the rest
+                                        sampled
+interreflection between diffuse         ``direct_all`` with the indirect part sampled, and that
+surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 times as efficient as
+                                        ``path``, which picks one of them for each sample)
+interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
+                                        their noise decides, and it is the faster
+======================================  ===========================================================
 
 All take the sampler of least noise for its time. Where no light needs random numbers, only the
 pixel filter is left to sample; the same samples are then better in few passes of many, within which
@@ -22,17 +26,19 @@ import mitsuba as mi
 from heuristic.interpolation import Interpolation
 from reference import rules, values
 from reference.effects import Decision, Effect
+from reference.indirect import RR_DEPTH
 from reference.structure import BSDF, EMITTER, examine
 
 SAMPLER = "multijitter"
 """Of the stock samplers the one of least noise for its time, on figures and the Cornell box alike:
 at 64 samples a pixel, 10 times the efficiency of ``independent`` there (``stratified`` 5 times)."""
 
-STOCK_SAMPLER = "independent"
-RR_DEPTH = 3
-"""Ending paths two reflections sooner than Mitsuba's 5 saves a sixth of the time and adds a tenth of
-the variance, on the Cornell box and on glossy spheres alike; the mean stays the same."""
+SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 
+EXACT_LIGHTS = ("point", "spot", "directional")
+"""Lights that need no random number."""
+
+STOCK_SAMPLER = "independent"
 SPP = 256
 PASSES, DETERMINISTIC_PASSES = 16, 4
 
@@ -96,14 +102,16 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     occlusion, interreflection = rules.occlusion(structure), rules.interreflection(structure)
     decisions = _decisions(pair, structure, interpolation, occlusion, interreflection)
     terms = tuple(name for name in ("k_i", "k_a", "k_d", "k_s") if _present(pair.heuristic, name))
+    exact = [light for light in structure.lights if light.kind in EXACT_LIGHTS]
+    if interreflection[0] and pair.max_depth != 2 and len(exact) > 1 and _diffuse(pair.physical):
+        return Plan(decisions, terms, "direct_all", pair.max_depth, SAMPLER, SPP, PASSES)
     if interreflection[0] and pair.max_depth != 2:
         return Plan(decisions, terms, "path", pair.max_depth, SAMPLER, SPP, PASSES, RR_DEPTH)
     tabulated = not occlusion[0] and _can_tabulate(pair.physical)
     random = [
         light
         for light in structure.lights
-        if light.kind not in ("point", "spot", "directional")
-        and not (tabulated and light.kind == "constant")
+        if light.kind not in EXACT_LIGHTS and not (tabulated and light.kind == "constant")
     ]
     passes = PASSES if random or mi.is_spectral else DETERMINISTIC_PASSES
     return Plan(
@@ -116,6 +124,21 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
         passes,
         shadows=occlusion[0],
         tabulate_environment=tabulated,
+    )
+
+
+def wants_spectra(graph):
+    """Tell whether a scene holds spectra that three numbers cannot stand for.
+
+    Those are tabulated spectra and black bodies; uniform values, RGB and Mitsuba's own daylight
+    (``d65``), which RGB values are relative to, are not.
+    """
+    if any(graph.plugin(i) in SPECTRAL_TEXTURES for i in graph.nodes(mi.ObjectType.Texture)):
+        return True
+    return any(
+        hasattr(value, "is_uniform") and not value.is_uniform()
+        for index in graph.nodes_in_use()
+        for _, value in graph.props(index).items()
     )
 
 
@@ -193,9 +216,14 @@ def _spots(graph):
     return any(graph.plugin(index) == "heuristic_spot" for index in graph.nodes(EMITTER))
 
 
+def _diffuse(graph):
+    return all(graph.plugin(index) in ("diffuse", "twosided") for index in graph.nodes(BSDF))
+
+
 def _can_tabulate(graph):
     """Tell whether the environment can be tabulated: one plain BSDF, one constant light, RGB."""
     shapes = graph.nodes(mi.ObjectType.Shape)
-    environments = [i for i in graph.nodes(EMITTER) if graph.plugin(i) == "constant"]
+    extended = [graph.plugin(i) for i in graph.nodes(EMITTER)]
+    extended = [plugin for plugin in extended if plugin not in EXACT_LIGHTS]
     textures = graph.nodes(mi.ObjectType.Texture)
-    return len(shapes) == 1 and len(environments) == 1 and not textures and mi.is_rgb
+    return len(shapes) == 1 and extended == ["constant"] and not textures and mi.is_rgb

@@ -170,7 +170,12 @@ def physical_integrator(plan, scene, hide_emitters):
         description = {"type": "path", "hide_emitters": hide_emitters, "max_depth": plan.max_depth}
         return mi.load_dict(description | {"rr_depth": plan.rr_depth})
     integrator = mi.load_dict(
-        {"type": plan.integrator, "hide_emitters": hide_emitters, "shadows": plan.shadows}
+        {
+            "type": plan.integrator,
+            "hide_emitters": hide_emitters,
+            "shadows": plan.shadows,
+            "max_depth": plan.max_depth,
+        }
     )
     if plan.tabulate_environment:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())

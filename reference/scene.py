@@ -132,7 +132,7 @@ class Graph:
 
     def nodes(self, kind):
         """Return the indices of the nodes of a kind (``mitsuba.ObjectType``) that are in use."""
-        return [index for index in self._reachable() if self.kind(index) == kind]
+        return [index for index in self.nodes_in_use() if self.kind(index) == kind]
 
     def kind(self, index):
         """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
@@ -194,7 +194,8 @@ class Graph:
         node.type, node.props = self.kind(index), props
         self.state.nodes[index] = node
 
-    def _reachable(self):
+    def nodes_in_use(self):
+        """Return the indices of all nodes that the scene refers to, directly or not."""
         seen, queue = set(), [0]
         while queue:
             index = queue.pop()

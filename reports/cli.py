@@ -47,7 +47,8 @@ def cli():
 def _rendering_options(command):
     options = (
         click.option("--variant", type=click.Choice(VARIANTS),
-                     help="Mitsuba variant. [default: the scene's own, else llvm_ad_rgb]"),
+                     help="Mitsuba variant. [default: llvm_ad_rgb, or llvm_ad_spectral for a scene"
+                     " with tabulated spectra]"),
         click.option("--heuristic-variant", type=click.Choice(VARIANTS),
                      help="Variant of the heuristic half, where it is another: RGB shading against"
                      " a spectral reference. [default: the scene's own, else that of --variant]"),
@@ -245,6 +246,7 @@ def _job(name, rendering):
     All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
     """
     from comparisons.scenes import Scene, builtin
+    from reference.plan import wants_spectra
     from reference.scene import Source
 
     path = Path(name)
@@ -254,7 +256,9 @@ def _job(name, rendering):
                 f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
                 " built-in scene; `fotismos scenes` lists them."
             )
-        scene, source = Scene(path.stem, "", dict), Source(path.stem, path)
+        source = Source(path.stem, path)
+        spectral = rendering["variant"] is None and wants_spectra(source.parse())
+        scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
     else:
         scene = builtin(name)
         source = scene.source()

@@ -172,6 +172,43 @@ def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypat
     assert sorted(path.name for path in out.iterdir()) == ["index.html", "my-scene"]
 
 
+def test_plan_prints_a_table_and_json(run):
+    code, printed, _ = run("plan", "fig-8-9")
+    assert code == 0
+    for word in (
+        "occlusion",
+        "only sphere reflects",
+        "direct_all, no shadow rays",
+        "k_a, k_d, k_s",
+    ):
+        assert word in printed
+    code, printed, _ = run("plan", "fig-8-9", "--json", "--everything")
+    data = json.loads(printed)
+    assert data["integrator"] == "path"
+    assert len(data["effects"]) == 14
+    assert all(effect["called_for"] for effect in data["effects"])
+
+
+def test_plan_verifies(run):
+    words = ("plan", "--verify", "fig-8-6a", "--resolution", "32x32")
+    code, printed, _ = run(*words, "--json")
+    assert code == 0
+    assert json.loads(printed)["significant"] == 0
+    code, printed, _ = run(*words)
+    assert "faster" in printed
+
+
+def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
+    spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
+    path = tmp_path / "scene.xml"
+    path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum), encoding="utf-8")
+    asked = ("--variant", "llvm_ad_rgb")
+    for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
+        run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
+        record = json.loads((tmp_path / "out/scene/comparison.json").read_text(encoding="utf-8"))
+        assert record["variant"] == variant
+
+
 def test_scenes_lists_every_figure(run):
     code, printed, _ = run("scenes")
     assert code == 0

@@ -11,6 +11,7 @@ from comparisons.verification import verify
 from heuristic.errors import InputError
 from reference.effects import Effect
 from reference.environment import AlbedoTable
+from reference.plan import wants_spectra
 from reference.scene import Source
 from reference.structure import examine
 
@@ -226,6 +227,33 @@ def test_a_figure_is_planned_without_random_numbers(rgb):
     assert plan.tabulate_environment
     assert plan.kernel_terms == ("k_a", "k_d", "k_s")
     assert [decision.effect for decision in plan.decisions] == list(Effect)
+
+
+def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled(rgb):
+    parts = {"ball": ball(), "floor": floor(), "one": lamp((-3, -2, 4)), "two": lamp((3, -3, 3))}
+    source = Source("split", scene(**parts))
+    plan = prepare(source).plan
+    assert (plan.integrator, plan.max_depth) == ("direct_all", -1)
+    result = verify(source, Options(spp=512))
+    assert result.significant == 0
+    assert result.gain > 2
+    glossy = parts | {"ball": ball(bsdf={"type": "roughplastic"})}
+    assert prepare(Source("glossy", scene(**glossy))).plan.integrator == "path"
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "wanted"),
+    [
+        ({"type": "rgb", "value": (1, 0.5, 0.2)}, False),
+        (0.5, False),
+        ({"type": "d65"}, False),
+        ({"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}, True),
+        ({"type": "blackbody", "temperature": 3000.0}, True),
+    ],
+)
+def test_spectra_are_called_for_where_three_numbers_are_too_few(rgb, spectrum, wanted):
+    light = {"type": "point", "intensity": spectrum}
+    assert wants_spectra(Source("spectra", scene(object=ball(), light=light)).parse()) is wanted
 
 
 def test_everything_is_what_a_user_types_without_thinking(rgb):

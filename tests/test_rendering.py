@@ -136,24 +136,15 @@ def test_another_seed_gives_other_camera_rays(rgb):
 # --- Direct light ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("hide_emitters", [False, True])
-def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
-    """Point, area and constant light: in no pixel do the means differ by more than the noise.
+def check_same_means(made, ours, theirs, passes):
+    """Compare two integrators: in no pixel do the means differ by more than the noise.
 
-    Two-sided z-test on every pixel and channel, with Šidák's correction, so that a right
+    Two-sided t-test on every pixel and channel, with Šidák's correction, so that a right
     implementation fails once in a thousand seeds.
     """
-    made = mi.load_dict(scene(point=POINT, lamp=lamp(), sky=CONSTANT))
-    passes = 32
     ours, theirs = (
-        estimate(
-            made,
-            mi.load_dict({"type": plugin, "hide_emitters": hide_emitters}),
-            256,
-            passes,
-            first_seed,
-        )
-        for plugin, first_seed in (("direct_all", 0), ("direct", 1000))
+        estimate(made, mi.load_dict(description), 256, passes, first_seed)
+        for description, first_seed in ((ours, 0), (theirs, 1000))
     )
     difference = ours.mean - theirs.mean
     error = np.hypot(ours.standard_error, theirs.standard_error)
@@ -164,8 +155,26 @@ def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
     assert np.abs(t).max() < stats.t.isf(each / 2, passes - 1)
     assert abs(t.mean()) < 0.15  # and none of them leans to one side
     np.testing.assert_allclose(ours.mean[~noisy], theirs.mean[~noisy], atol=1e-5)
-    # Asking every light at every sample is what it is for.
+    return ours, theirs
+
+
+@pytest.mark.parametrize("hide_emitters", [False, True])
+def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
+    """Point, area and constant light, each at every sample, which is less noise for the same."""
+    made = mi.load_dict(scene(one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
+    integrators = (
+        {"type": kind, "hide_emitters": hide_emitters} for kind in ("direct_all", "direct")
+    )
+    ours, theirs = check_same_means(made, *integrators, passes=32)
     assert ours.standard_error.mean() < theirs.standard_error.mean()
+
+
+@pytest.mark.parametrize("max_depth", [3, -1])
+def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
+    """Between a sphere and a floor, of points, a lamp and the sky."""
+    made = mi.load_dict(scene(one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
+    integrators = ({"type": kind, "max_depth": max_depth} for kind in ("direct_all", "path"))
+    check_same_means(made, *integrators, passes=32)
 
 
 def test_hidden_emitters_are_not_seen(rgb):

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights
+from tests.benchmarks import kernel, lights, terms
 
-BENCHMARKS = {"kernel": kernel.run, "lights": lights.run}
+BENCHMARKS = {"kernel": kernel.run, "lights": lights.run, "terms": terms.run}
 
 
 @click.command()

@@ -1,0 +1,231 @@
+"""The hard cases: where the textbook's formulas break in single precision.
+
+Each is judged alike: the exact value, the naive evaluation in single precision, ours, and a bound
+on the error that ours keeps and the naive one does not. Tests demand both of every case; the
+report prints them. Further cases are in `comparisons.hard_surfaces` (triangles and normals, sums,
+colours).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import drjit as dr
+import numpy as np
+from drjit.llvm import Array3f, Float
+
+import heuristic
+from comparisons import textbook
+from comparisons.textbook import Setting
+
+ABSENT = 1e-3
+"""Values below this share of the largest are judged by their absolute error: the bound of the issue
+of highlights holds where they exceed a thousandth."""
+
+POINTS = 2001
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A case: its name and group, what is hard about it, and the bound on the relative error.
+
+    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
+    """
+
+    name: str
+    group: str
+    hard: str
+    bound: float
+    naive: Callable
+    ours: Callable
+    exact: Callable
+    setting: Setting | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case and its two errors; infinite for a NaN, an infinity, or light where there is none."""
+
+    case: HardCase
+    naive_error: float
+    our_error: float
+
+    @property
+    def holds(self):
+        """Whether ours keeps the bound."""
+        return self.our_error <= self.case.bound
+
+
+def evaluate(case):
+    """Return the :class:`Outcome` of a case."""
+    exact = np.asarray(case.exact(), np.longdouble)
+    return Outcome(case, error(case.naive(), exact), error(case.ours(), exact))
+
+
+def error(found, exact):
+    """Return the largest error, relative to the exact value or to a thousandth of the largest."""
+    found = np.asarray(found, np.longdouble)
+    if found.shape != exact.shape:
+        raise ValueError(f"shapes {found.shape} and {exact.shape}")
+    if not np.isfinite(found).all():
+        return np.inf
+    scale = np.maximum(np.abs(exact), ABSENT * np.abs(exact).max())
+    difference = np.abs(found - exact)
+    if not scale.all():
+        return np.inf if difference.any() else 0.0
+    return float((difference / scale).max())
+
+
+def by_kernel(setting):
+    """Evaluate `heuristic.shade` at a setting, in single precision: an array (N,)."""
+    s = setting.rounded()
+    count = max(np.size(getattr(s, name)) // 3 for name in ("position", "normal", "view", "light"))
+    count = max(count, np.size(s.n), np.size(s.intensity))
+
+    def vector(value):
+        return Array3f(np.ascontiguousarray(np.broadcast_to(value, (count, 3)).T))
+
+    light = vector(s.light)
+    intensity = Float(np.broadcast_to(s.intensity, count).copy())
+    attenuation = tuple(map(float, s.attenuation))
+    if s.direction is None:
+        lamp = heuristic.PointLight(light, intensity, attenuation)
+    else:
+        direction = tuple(map(float, s.direction))
+        lamp = heuristic.SpotLight(
+            light, direction, intensity, float(s.cutoff), float(s.m), attenuation
+        )
+    n = Float(np.broadcast_to(s.n, count).copy())
+    material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=n)
+    arrays = (vector(s.position), vector(s.normal), vector(s.view))
+    dr.eval(arrays, n, light, intensity)
+    value = heuristic.shade(*arrays, material, [lamp])
+    return np.array(value + dr.zeros(Float, count))
+
+
+def shaded(name, group, hard, bound, setting):
+    """Make a case of a setting."""
+    setting = setting.rounded()
+    return HardCase(
+        name,
+        group,
+        hard,
+        bound,
+        lambda: textbook.shade(setting, textbook.NAIVE),
+        lambda: by_kernel(setting),
+        lambda: textbook.shade_exactly(setting),
+        setting,
+    )
+
+
+def _turned(angle, about=(0.6, 0.0, 0.8)):
+    """Return directions at angles from one, within a plane."""
+    axis, side = np.array(about), np.array((0.8, 0.0, -0.6))
+    angle = np.atleast_1d(angle)[:, None]
+    return np.cos(angle) * axis + np.sin(angle) * side
+
+
+def highlight(n, points=POINTS):
+    """Return a setting across a highlight, from its middle to where it is a thousandth."""
+    width = np.sqrt(2 * np.log(1e3) / n)
+    return Setting(
+        normal=(0.1, 0.2, 0.9), light=(1.0, 2.0, 4.0), k_s=1.0, n=n,
+        view=_mirrored((1.0, 2.0, 4.0), (0.1, 0.2, 0.9), np.linspace(0, width, points)),
+    )  # fmt: skip
+
+
+def _mirrored(light, normal, angle):
+    """Return views at angles from the mirror image of a light about a normal."""
+    light, normal = (np.float32(v).astype(float) for v in (light, normal))
+    light, normal = light / np.linalg.norm(light), normal / np.linalg.norm(normal)
+    mirrored = 2 * (light @ normal) * normal - light
+    side = np.cross(mirrored, (0.3, 0.5, -0.8))
+    side /= np.linalg.norm(side)
+    return np.cos(angle)[:, None] * mirrored + np.sin(angle)[:, None] * side
+
+
+_HIGHLIGHT = highlight(1e6)
+_GRAZING = np.logspace(-7, -4, POINTS)
+_AT_END = _mirrored((1.0, 2.0, 4.0), (0.1, 0.2, 0.9), np.pi / 2 - np.logspace(-6.5, -2, POINTS))
+_FLAT = Setting(k_d=1.0)
+_SPOT = Setting(k_d=1.0, light=(0.0, 0.0, 2.0), direction=(0.0, 0.0, -1.0))
+
+
+def _under_a_spot(angle, **changes):
+    """Points of a plane at angles from the axis of a spot above it, whose normals face it."""
+    angle = np.atleast_1d(angle)
+    place = np.stack([2 * np.tan(angle), 0 * angle, 0 * angle], axis=1)
+    return replace(_SPOT, position=place, normal=(0.0, 0.0, 1.0), **changes)
+
+
+CASES = (
+    shaded("exponent 0 at the lobe's end", "exponents",
+           "R·V is 0, and so is n: a power gives 0⁰ = 1, where the lobe has ended.", 2e-4,
+           Setting(k_s=1.0, n=0.0, view=(1.0, 0.0, 0.0))),
+    shaded("exponent 1/2, R·V just above 0", "exponents",
+           "The scalar product cancels to a few digits, whose root is still visible.", 2e-4,
+           replace(_HIGHLIGHT, n=0.5, view=_AT_END)),
+    shaded("exponent 1e-3, R·V just above 0", "exponents",
+           "The lobe is almost even and ends at once; the sign of R·V is all that matters.", 2e-4,
+           replace(_HIGHLIGHT, n=1e-3, view=_mirrored((1.0, 2.0, 4.0), (0.1, 0.2, 0.9),
+                   np.pi / 2 - np.logspace(-7.5, -4, POINTS)))),
+    shaded("exponent 1e5", "exponents",
+           "The power multiplies the rounding of R·V near 1 by n.", 2e-4, highlight(1e5)),
+    shaded("exponent 1e6", "exponents",
+           "The same; already rounding N, L and V turns the highlight visibly.", 2e-4,
+           _HIGHLIGHT),
+    shaded("exponent 123456.78", "exponents", "A large exponent that is no integer.", 2e-4,
+           highlight(123456.78)),
+    shaded("exponent 1e7 in the mirror direction", "exponents",
+           "R·V rounds to just over 1 or just under, and the power makes it 3.3 or 0.3.", 2e-4,
+           replace(highlight(1e7), normal=_turned(np.linspace(0, 1, POINTS)), light=(0.0, 0.0, 4.0),
+                   view=[_mirrored((0.0, 0.0, 4.0), v, np.zeros(1))[0]
+                         for v in _turned(np.linspace(0, 1, POINTS))], n=1e4)),
+    shaded("a light on the surface", "geometry", "d = 0: no direction, and 0 / 0.", 2e-4,
+           replace(_FLAT, light=(0.0, 0.0, 0.0))),
+    shaded("a light at a distance of 1e-20", "geometry", "d² vanishes: 1e-40 is no normal float.",
+           1e-5, replace(_FLAT, light=(0.6e-20, 0.0, 0.8e-20))),
+    shaded("a light at a distance of 1e20", "geometry", "d² is 1e40, beyond single precision.",
+           1e-5, replace(_FLAT, light=(0.6e20, 0.0, 0.8e20))),
+    shaded("a viewer on the surface", "geometry", "No view direction: 0 / 0.", 2e-4,
+           Setting(k_s=1.0, n=9.5, view=(0.0, 0.0, 0.0))),
+    shaded("grazing light and view", "geometry",
+           "Both within 1e-7 to 1e-4 radians of the surface: rounding decides on the horizon.",
+           2e-4, Setting(k_s=1.0, n=100.5, normal=(0.3, 0.4, 0.866),
+                         light=_mirrored((0.3, 0.4, 0.866), (0.3, 0.4, 0.866), np.pi/2 - _GRAZING),
+                         view=-_mirrored((0.3, 0.4, 0.866), (0.3, 0.4, 0.866), np.pi/2 + _GRAZING))),
+    shaded("normals of length 1e-30", "geometry", "Their square vanishes.", 1e-5,
+           replace(_FLAT, normal=(0.6e-30, 0.0, 0.8e-30))),
+    shaded("normals of length 1e30", "geometry", "Their square is beyond single precision.", 1e-5,
+           replace(_FLAT, normal=(0.6e30, 0.0, 0.8e30))),
+    shaded("a normal of zero", "geometry", "Interpolated normals can cancel: 0 / 0.", 1e-5,
+           replace(_FLAT, normal=(0.0, 0.0, 0.0))),
+    shaded("a scene of size 1e-6, n = 1e5", "geometry", "A sharp highlight in a tiny scene.", 2e-4,
+           replace(highlight(1e5), light=(1e-6, 2e-6, 4e-6))),
+    shaded("a scene of size 1e6, n = 1e5", "geometry", "A sharp highlight in a huge scene.", 2e-4,
+           replace(highlight(1e5), light=(1e6, 2e6, 4e6))),
+    shaded("far from the origin, n = 1e5", "geometry",
+           "Light and point 1e6 away: their difference is exact, and all the rest rounds.", 2e-4,
+           replace(highlight(1e5), position=(1e6, 1e6, 1e6), light=(1e6 + 1, 1e6 + 2, 1e6 + 4))),
+    shaded("intensity 1e-30 at a distance of 1e-20", "lights",
+           "1/d² overflows, and the intensity brings it back to 1e10.", 1e-5,
+           replace(_FLAT, light=(0.0, 0.0, 1e-20), intensity=1e-30, attenuation=(0.0, 0.0, 1.0))),
+    shaded("intensity 1e30 at a distance of 1e20", "lights",
+           "1/d² vanishes, and the intensity brings it back to 1e-10.", 1e-5,
+           replace(_FLAT, light=(0.0, 0.0, 1e20), intensity=1e30, attenuation=(0.0, 0.0, 1.0))),
+    shaded("a spot with m = 1e5", "lights", "The power multiplies the rounding of the cosine by m.",
+           1e-3, _under_a_spot(np.linspace(0, 0.01, POINTS), m=1e5, cutoff=30.0)),
+    shaded("a cutoff of 1e-4 degrees", "lights",
+           "The cosine of the cutoff rounds to 1, and with it those of points far outside.", 1e-5,
+           _under_a_spot(np.deg2rad(1e-4) * np.array([0, 0.2, 0.5, 0.8, 1.2, 2, 10, 50, 150]),
+                         cutoff=1e-4)),
+    shaded("a cutoff of 179.99 degrees", "lights",
+           "The cosine rounds to -1, and the dark needle behind the light disappears.", 1e-5,
+           replace(_SPOT, direction=(0.0, 0.0, 1.0), cutoff=179.99,
+                   position=[(2 * np.deg2rad(0.01) * f, 0, 0) for f in (0, 0.3, 0.8, 1.2, 3)])),
+    shaded("a point exactly on the cone", "lights",
+           "6.2 says ≥: coordinates on the cone are lit, whatever their roundings say.", 1e-5,
+           replace(_SPOT, cutoff=45.0, light=(0.0, 0.0, 1.0),
+                   position=[(np.cos(a), np.sin(a), 0) for a in np.linspace(0, 6, 1)]
+                            + [(0.6, 0.8, 0), (0.8, -0.6, 0), (-0.28, 0.96, 0)])),
+)  # fmt: skip
+"""The cases of the kernel."""

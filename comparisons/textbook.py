@@ -1,0 +1,100 @@
+"""The illumination model as a textbook prints it, in NumPy, of any precision.
+
+In single precision it is the naive form that the hard cases break. In extended precision
+(:data:`EXACT`; on machines without it, double) the same lines are exact enough to judge by, since
+the inputs are of single precision. Nothing here is shared with the kernel.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+NAIVE, EXACT = np.float32, np.longdouble
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Points, each with its own light; vectors are (N, 3) or (3,), numbers (N,) or single.
+
+    ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``.
+    """
+
+    position: object = (0.0, 0.0, 0.0)
+    normal: object = (0.0, 0.0, 1.0)
+    view: object = (0.0, 0.0, 1.0)
+    light: object = (0.0, 0.0, 1.0)
+    intensity: object = 1.0
+    attenuation: tuple = (1.0, 0.0, 0.0)
+    k_d: float = 0.0
+    k_s: float = 0.0
+    n: object = 1.0
+    direction: object = None
+    cutoff: float = 90.0
+    m: float = 0.0
+
+    def rounded(self):
+        """Return the setting with all numbers rounded to single precision."""
+        names = ("position", "normal", "view", "light", "intensity", "n", "k_d", "k_s", "direction")
+        names += ("cutoff", "m", "attenuation")
+        values = {name: getattr(self, name) for name in names}
+        return replace(
+            self, **{k: np.float32(v) if v is not None else None for k, v in values.items()}
+        )
+
+
+def shade(setting, dtype):
+    """Equation 8.10 for one light, without any precaution: an array (N,) of a precision."""
+    s = setting
+    with np.errstate(all="ignore"):
+        normal, view = (_unit(_of(vector, dtype)) for vector in (s.normal, s.view))
+        offset = _of(s.light, dtype) - _of(s.position, dtype)
+        distance = np.sqrt(_dot(offset, offset))
+        toward = offset / distance[..., None]
+        cosine = _dot(normal, toward)
+        mirrored = 2 * normal * cosine[..., None] - toward
+        lobe = np.maximum(_dot(mirrored, view), 0) ** _of(s.n, dtype)
+        k0, k1, k2 = (dtype(k) for k in s.attenuation)
+        arriving = _of(s.intensity, dtype) / (k0 + k1 * distance + k2 * distance**2)
+        if s.direction is not None:
+            cos_axis = -_dot(toward, _unit(_of(s.direction, dtype)))
+            inside = cos_axis >= np.cos(np.deg2rad(dtype(s.cutoff)))
+            arriving = np.where(inside, arriving * np.maximum(cos_axis, 0) ** dtype(s.m), 0)
+        reflected = dtype(s.k_d) * np.maximum(cosine, 0) + dtype(s.k_s) * lobe
+        return np.atleast_1d(np.where(cosine <= 0, 0, arriving * reflected))
+
+
+def shade_exactly(setting):
+    """The same in extended precision, with what the equations leave out where they are undefined.
+
+    A direction that does not exist receives no light, and the lobe ends where ``R.V <= 0``, for
+    ``n = 0`` too.
+    """
+    value = shade(setting, EXACT)
+    s = setting
+    normal, view = (_unit(_of(vector, EXACT)) for vector in (s.normal, s.view))
+    toward = _unit(_of(s.light, EXACT) - _of(s.position, EXACT))
+    mirrored = 2 * normal * _dot(normal, toward)[..., None] - toward
+    if s.k_d == 0:
+        value = np.where(_dot(mirrored, view) > 0, value, 0)
+    exists = ~(np.isnan(toward).any(-1) | np.isnan(normal).any(-1) | np.isnan(view).any(-1))
+    return np.where(exists, value, 0)
+
+
+def triangle_normal(p0, p1, p2, dtype):
+    """Equation 6.19 as printed."""
+    p0, p1, p2 = (_of(p, dtype) for p in (p0, p1, p2))
+    with np.errstate(all="ignore"):
+        return _unit(np.cross(p1 - p0, p2 - p0))
+
+
+def _of(value, dtype):
+    return np.asarray(value).astype(dtype)
+
+
+def _dot(a, b):
+    return (a * b).sum(-1)
+
+
+def _unit(vector):
+    with np.errstate(all="ignore"):
+        return vector / np.sqrt(_dot(vector, vector))[..., None]
