@@ -13,7 +13,7 @@ from comparisons.compare import LEVEL, Options, prepare
 from comparisons.significance import significance
 from reference import halves
 from reference.gbuffer import gbuffer
-from reference.rendering import Accumulator, Renderer, variant
+from reference.rendering import Accumulator, Renderer
 
 OUTLIERS = 0.001
 """Share of pixels of largest variance that the noise of a side is measured without."""
@@ -99,11 +99,11 @@ def verify(source, options=None, progress=None):
 
 def _kernel_difference(sides, seed):
     """Return the largest difference that the terms left out of the kernel make, with equal rays."""
-    planned, everything = sides
-    graph = halves.with_sampler(everything.pair.heuristic, planned.plan.sampler)
-    with variant(planned.heuristic.variant):
-        whole = Renderer(graph.instantiate(), None, planned.heuristic.spp, "heuristic image")
-    images = [np.array(renderer.render(seed)) for renderer in (planned.heuristic, whole)]
+    sampler, spp = sides[0].plan.sampler, sides[0].heuristic.spp
+    images = []
+    for side in sides:
+        scene = halves.with_sampler(side.pair.heuristic, sampler).instantiate()
+        images.append(np.array(Renderer(scene, None, spp, "heuristic image").render(seed)))
     return float(np.abs(images[0] - images[1]).max())
 
 
