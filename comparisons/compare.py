@@ -9,15 +9,12 @@ import numpy as np
 
 from comparisons import record, statistics
 from comparisons.metrics import METRICS
+from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.significance import significance
-from comparisons.spaces import DEFAULT_VIEWING, Viewing
-from heuristic.errors import InputError
-from heuristic.interpolation import Interpolation
 from reference import halves
 from reference.gbuffer import gbuffer
 from reference.halves import Pair
-from reference.pairing import Convention
 from reference.plan import Plan, plan
 from reference.rendering import Accumulator, Estimate, Renderer, physical_integrator, variant
 
@@ -25,61 +22,6 @@ LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Options:
-    """What can be chosen about a comparison.
-
-    Parameters
-    ----------
-    seed
-        Seed of the first pass; pass ``i`` has ``seed + i`` in both halves.
-    spp
-        Samples a pixel in all, in place of the plan's. They are split into the plan's number of
-        passes, or fewer where that leaves less than 4 a pass, at least 2.
-    resolution
-        ``(width, height)`` in place of the film's own.
-    convention
-        How roughplastic and phong are paired.
-    interpolation, tessellation
-        How the heuristic half shades its surfaces, and how fine the meshes for it are.
-    viewing
-        How linear values are looked at.
-    heuristic_variant
-        Variant of the heuristic half where it is not the current one, as for RGB shading against a
-        spectral reference.
-    everything
-        Switch off all pruning, in the kernel and in the reference.
-
-    Raises
-    ------
-    InputError
-        For fewer than 2 samples, a negative seed, or a resolution below 1.
-    """
-
-    seed: int = 0
-    spp: int | None = None
-    resolution: tuple[int, int] | None = None
-    convention: Convention = Convention.MATCHED
-    interpolation: Interpolation = Interpolation.PHONG
-    tessellation: int | None = None
-    viewing: Viewing = DEFAULT_VIEWING
-    heuristic_variant: str | None = None
-    everything: bool = False
-
-    def __post_init__(self):
-        if self.spp is not None and self.spp < 2:
-            raise InputError(
-                f"spp = {self.spp} is not allowed: the noise needs at least 2 samples."
-            )
-        if self.seed < 0:
-            raise InputError(f"seed = {self.seed} is not allowed: give 0 or more.")
-        if self.resolution is not None and min(self.resolution) < 1:
-            width, height = self.resolution
-            raise InputError(
-                f"resolution {width}x{height} is not allowed: width and height are at least 1."
-            )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,135 @@
+"""From the words of a command to scenes and options."""
+
+import shlex
+from pathlib import Path
+
+import click
+
+from heuristic.errors import InputError
+
+VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+
+
+class Resolution(click.ParamType):
+    """``WIDTHxHEIGHT``, as two positive integers."""
+
+    name = "WxH"
+
+    def convert(self, value, param, ctx):
+        """Parse the text, or fail with what is allowed."""
+        if isinstance(value, tuple):
+            return value
+        width, separator, height = value.lower().partition("x")
+        if not (separator and width.isdecimal() and height.isdecimal()):
+            self.fail(f"{value!r} is no resolution; write it like 512x512.", param, ctx)
+        return int(width), int(height)
+
+
+def rendering_options(command):
+    """Add the options that all commands which render have in common."""
+    options = (
+        click.option("--variant", type=click.Choice(VARIANTS),
+                     help="Mitsuba variant. [default: llvm_ad_rgb, or llvm_ad_spectral for a scene"
+                     " with tabulated spectra]"),
+        click.option("--heuristic-variant", type=click.Choice(VARIANTS),
+                     help="Variant of the heuristic half, where it is another: RGB shading against"
+                     " a spectral reference. [default: the scene's own, else that of --variant]"),
+        click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
+                     help="Seed of the first pass."),
+        click.option("--spp", type=click.IntRange(min=2),
+                     help="Samples a pixel, over all passes. [default: the plan's]"),
+        click.option("--resolution", type=Resolution(),
+                     help="Width and height in place of the film's own."),
+        click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
+                     help="Shading of polygons in the heuristic half. [default: the scene's own,"
+                     " else phong]"),
+        click.option("--tessellation", type=click.IntRange(min=1), metavar="N",
+                     help="Mesh the shapes of the heuristic half: N edges a quarter turn or a"
+                     " straight side. [default: the scene's own, else 16 for flat and gouraud]"),
+        click.option("--everything", is_flag=True,
+                     help="Switch off all pruning: simulate what is not called for, too."),
+        click.option("--pairing", default="matched", show_default=True,
+                     type=click.Choice(["literal", "matched"]),
+                     help="How roughplastic and phong are paired."),
+    )  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def check_installation():
+    """See that LLVM is usable, before anything compiles.
+
+    Raises
+    ------
+    InstallationError
+        Saying what was found, what is needed and how to get it.
+    """
+    from heuristic import backend
+
+    backend.check()
+
+
+def job(name, rendering):
+    """Find a scene, and complete the options with what it asks for.
+
+    All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
+    """
+    from comparisons.scenes import Scene, builtin
+    from reference.plan import wants_spectra
+    from reference.scene import Source
+
+    path = Path(name)
+    if path.suffix == ".xml" or path.exists():
+        if not path.is_file():
+            raise InputError(
+                f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
+                " built-in scene; `fotismos scenes` lists them."
+            )
+        source = Source(path.stem, path)
+        spectral = rendering["variant"] is None and wants_spectra(source.parse())
+        scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
+    else:
+        scene = builtin(name)
+        source = scene.source()
+    own = {
+        "variant": scene.variant,
+        "heuristic_variant": scene.heuristic_variant,
+        "interpolation": scene.interpolation,
+        "tessellation": scene.tessellation,
+    }
+    if rendering["variant"] is not None:
+        own["heuristic_variant"] = None  # who names the variant means both halves
+    chosen = {key: value for key, value in rendering.items() if value is not None}
+    return source, dict.fromkeys(rendering) | own | chosen
+
+
+def options(rendering):
+    """Turn the command's options into those of a comparison."""
+    from comparisons.compare import Options
+    from heuristic.interpolation import Interpolation
+    from reference.pairing import Convention
+
+    return Options(
+        seed=rendering["seed"],
+        spp=rendering["spp"],
+        resolution=rendering["resolution"],
+        convention=Convention(rendering["pairing"]),
+        heuristic_variant=rendering["heuristic_variant"],
+        interpolation=Interpolation(rendering["interpolation"]),
+        tessellation=rendering["tessellation"],
+        everything=rendering["everything"],
+    )
+
+
+def command(source, rendering):
+    """Return the command that repeats one comparison."""
+    scene = source.name if callable(source.content) else str(source.content)
+    words = ["fotismos", "compare", scene]
+    for key, value in rendering.items():
+        if value is True:
+            words.append(f"--{key.replace('_', '-')}")
+        elif value not in (None, False):
+            text = "x".join(map(str, value)) if key == "resolution" else str(value)
+            words += [f"--{key.replace('_', '-')}", text]
+    return shlex.join(words)
