@@ -7,7 +7,7 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 
-from comparisons import record, statistics
+from comparisons import record, reference_limits, statistics
 from comparisons.metrics import METRICS
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
@@ -106,6 +106,13 @@ def compare(source, options=None, progress=None, command=""):
     stages.done("geometry")
     metrics, images = _measure(estimates, surface, options)
     stages.done("metrics")
+    limits = reference_limits.find(
+        reference_limits.of_scene(ready.scene, width, height),
+        estimates.reference.mean,
+        estimates.reference.standard_error,
+        images.counted,
+    )
+    stages.done("limits of the reference")
 
     data = {
         "scene": source.name,
@@ -118,6 +125,7 @@ def compare(source, options=None, progress=None, command=""):
         "viewing": options.viewing.record(),
         "metrics": metrics,
         "pixels": {"counted": int(images.counted.sum()), "total": width * height},
+        "limits": limits.data(),
         "pairing": record.pairing_data(ready.pair),
         "time": {
             "heuristic": record.times_data(heuristic.pass_times()),

@@ -13,7 +13,7 @@ from enum import Enum
 
 import drjit as dr
 
-from heuristic import vectors
+from heuristic import normals, vectors
 
 
 class Interpolation(Enum):
@@ -64,7 +64,10 @@ def barycentric_coordinates(point, p0, p1, p2):
     Of a point outside the triangle's plane they are those of its foot. A triangle without area has
     none; the weights are then ``1, 0, 0``.
     """
-    edge_1, edge_2, offset = p1 - p0, p2 - p0, point - p0
+    # Over the largest component: the fourth power of a length would leave the type's range.
+    (edge_1, _, back), largest = normals.scaled_edges(p0, p1, p2)
+    edge_2 = -back
+    offset = (point - p0) / dr.select(largest > 0, largest, 1)
     product = dr.cross(edge_1, edge_2)
     squared = dr.squared_norm(product)
     inverse = dr.select(squared > 0, dr.rcp(squared), 0)

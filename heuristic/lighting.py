@@ -7,8 +7,9 @@ from numbers import Real
 import drjit as dr
 import numpy as np
 
-from heuristic import colours, terms, vectors
-from heuristic.lights import UNATTENUATED, is_number, is_unattenuated
+from heuristic import colours, lobes, numerics, terms, vectors
+from heuristic.lights import UNATTENUATED, is_unattenuated
+from heuristic.numerics import is_number
 
 BLOCK = 16
 """Lights in one kernel. More are summed block after block by the same kernel, each light costing
@@ -22,7 +23,7 @@ def sum_lights(position, normal, view, material, lights, visible=None):
     Parameters
     ----------
     position, normal, view
-        As of :func:`heuristic.shade`, normalised.
+        As of :func:`heuristic.shade`: normals and views of any length.
     material : Material
         Tells which of the two sums are needed, and the form and exponent of the specular term.
     lights : sequence
@@ -44,11 +45,14 @@ def sum_lights(position, normal, view, material, lights, visible=None):
     in_blocks = (
         len(lights) > BLOCK and dr.is_jit_v(position) and not dr.flag(dr.JitFlag.SymbolicScope)
     )
-    blocks = _blocks(lights, type(position)) if in_blocks else [lights]
-    diffuse = specular = None
+    blocks = _blocks(lights, type(position)) if in_blocks else _portions(lights)
+    lobe = lobes.lobe(material, normal, view) if has_specular else None
+    normal = vectors.normalise(normal)
+    sums = {}
     for block in blocks:
-        if diffuse is not None or specular is not None:
-            dr.eval(diffuse, specular)  # the last block's sums stay open, for the caller's kernel
+        if in_blocks and sums:
+            dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
+        parts = {}
         for light in block:
             arrival = light.illuminate(position)
             cos_incidence = dr.dot(normal, arrival.toward)
@@ -57,24 +61,29 @@ def sum_lights(position, normal, view, material, lights, visible=None):
                 seen = visible(arrival.toward, arrival.distance)
                 intensity = dr.select(seen, intensity, 0)
             if has_diffuse:
-                diffuse = _add(diffuse, terms.diffuse(intensity, 1, cos_incidence))
+                _add(parts, "diffuse", terms.diffuse(intensity, 1, cos_incidence))
             if has_specular:
-                cosine = _lobe_cosine(material, normal, arrival.toward, view, cos_incidence)
-                specular = _add(specular, terms.specular(intensity, 1, cosine, material.n))
-    return diffuse, specular
+                cosine = lobe(light, position, arrival.toward, cos_incidence)
+                _add(parts, "specular", terms.specular(intensity, 1, cosine, material.n))
+        for name, part in parts.items():
+            # A sum of thousands would lose what is smaller than its last digit (Neumaier).
+            sums[name] = numerics.add(*sums[name], part) if name in sums else (part, 0)
+    return tuple(_summed(sums.get(name)) for name in ("diffuse", "specular"))
 
 
-def _lobe_cosine(material, normal, toward, view, cos_incidence):
-    """Return ``R.V`` or ``N.H``, of which the lobe is a power; 0 for lights below the horizon."""
-    if material.form == "blinn":
-        cosine = dr.dot(normal, vectors.half_vector(toward, view))
-    else:
-        cosine = dr.dot(vectors.mirror_vector(normal, toward, cos_incidence), view)
-    return dr.select(cos_incidence > 0, cosine, 0)
+def _summed(pair):
+    if pair is None or isinstance(pair[1], int):
+        return pair and pair[0]
+    return numerics.summed(*pair)
 
 
-def _add(total, term):
-    return term if total is None else total + term
+def _add(parts, name, term):
+    parts[name] = parts[name] + term if name in parts else term
+
+
+def _portions(lights):
+    """Split lights into blocks as they are."""
+    return [lights[begin : begin + BLOCK] for begin in range(0, len(lights), BLOCK)]
 
 
 def _blocks(lights, vector_type):

@@ -6,14 +6,15 @@ intensity and over what distance does its light arrive? Occlusion is not its bus
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, inf, isfinite, radians
+from math import inf, isfinite
 from numbers import Real
 from typing import NamedTuple
 
 import drjit as dr
 
-from heuristic import colours, terms, vectors
+from heuristic import colours, numerics, terms, vectors
 from heuristic.errors import InputError
+from heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)
@@ -55,6 +56,10 @@ class DirectionalLight:
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
         return Arrival(toward, colours.as_array(self.intensity, vector_type), inf)
+
+    def wide_toward(self, position):
+        """Return ``L`` in double precision, as a vector and its inverse length."""
+        return -numerics.wide_unit(type(position)(self.direction)), 1
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,11 @@ class PointLight:
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         intensity = colours.as_array(self.intensity, vector_type)
-        return _attenuated(toward, intensity, distance, self)
+        return _attenuated(toward, intensity, distance, self, position)
+
+    def wide_toward(self, position):
+        """Return ``L`` in double precision, as a vector and its inverse length."""
+        return vectors.wide_light_vector(type(position)(self.position), position)
 
 
 @dataclass(frozen=True)
@@ -157,22 +166,18 @@ class SpotLight:
         """
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
-        cos_axis = -dr.dot(vectors.normalise(vector_type(self.direction)), toward)
-        cone = terms.spot_cone(cos_axis, self._cos_cutoff())
+        axis = vectors.normalise(vector_type(self.direction))
+        cos_axis = vectors.chord_cosine(axis, -toward)
+        cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
         if not is_number(self.exponent, 0):
-            cone *= terms.spot_falloff(cos_axis, self.exponent)
+            cosine = cos_axis.value if numerics.is_moderate(self.exponent) else cos_axis
+            cone *= terms.spot_falloff(cosine, self.exponent)
         intensity = colours.as_array(self.intensity, vector_type)
-        return _attenuated(toward, intensity * cone, distance, self)
+        return _attenuated(toward, intensity * cone, distance, self, position)
 
-    def _cos_cutoff(self):
-        if isinstance(self.cutoff, Real):
-            return cos(radians(self.cutoff))
-        return dr.cos(dr.deg2rad(self.cutoff))
-
-
-def is_number(value, number):
-    """Tell whether a value is a plain number and that number; Dr.Jit arrays are not looked at."""
-    return isinstance(value, Real) and value == number
+    def wide_toward(self, position):
+        """Return ``L`` in double precision, as a vector and its inverse length."""
+        return vectors.wide_light_vector(type(position)(self.position), position)
 
 
 def is_unattenuated(coefficients):
@@ -180,10 +185,11 @@ def is_unattenuated(coefficients):
     return all(map(is_number, coefficients, UNATTENUATED))
 
 
-def _attenuated(toward, intensity, distance, light):
+def _attenuated(toward, intensity, distance, light, position):
     if not is_unattenuated(light.attenuation):
         law = terms.clamped_attenuation if light.clamped else terms.attenuation
-        intensity = intensity * law(distance, *light.attenuation)
+        inverse = vectors.inverse_distance(type(position)(light.position), position)
+        intensity = law(distance, *light.attenuation, intensity, inverse)
     return Arrival(toward, intensity, distance)
 
 

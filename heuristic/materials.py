@@ -6,7 +6,7 @@ from numbers import Real
 
 import drjit as dr
 
-from heuristic import colours
+from heuristic import colours, numerics
 from heuristic.errors import InputError
 
 FORMS = ("phong", "blinn")
@@ -25,14 +25,18 @@ class Material:
         Each is a number, RGB, one value for each wavelength, or a Dr.Jit array.
     n
         Phong's exponent, 0 or more. A plain number is compiled into the kernel, an integer up to
-        :data:`heuristic.terms.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a run-time
-        value.
+        :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a
+        run-time value.
     form
         ``phong`` for the chapters' ``(R.V)^n`` (8.9), ``blinn`` for ``(N.H)^n`` of Blinn (1977),
         which OpenGL's fixed pipeline and most engines use.
     normalised
         Scale the lobe by :func:`heuristic.terms.normalisation`, so that ``k_s`` is its albedo at
         normal incidence. The chapters' model does not.
+    n_is_moderate
+        Whether a Dr.Jit ``n`` is known to lie within
+        :data:`heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double
+        precision. Of plain numbers it is seen.
 
     Raises
     ------
@@ -47,12 +51,15 @@ class Material:
     n: float = 1
     form: str = "phong"
     normalised: bool = False
+    n_is_moderate: bool = False
 
     def __post_init__(self):
         for name in ("k_i", "k_a", "k_d", "k_s"):
             object.__setattr__(self, name, colours.checked(name, getattr(self, name)))
         _check_exponent(self.n)
         check_form(self.form)
+        if numerics.is_moderate(self.n):
+            object.__setattr__(self, "n_is_moderate", True)
 
 
 def _check_exponent(n):

@@ -2,7 +2,7 @@
 
 import drjit as dr
 
-from heuristic import colours, terms, vectors
+from heuristic import colours, terms
 from heuristic.lighting import sum_lights
 
 
@@ -57,9 +57,7 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
     if lights:
         if material.normalised:
             k_s = k_s * terms.normalisation(material.form, material.n)
-        diffuse, specular = sum_lights(
-            position, vectors.normalise(normal), vectors.normalise(view), material, lights, visible
-        )
+        diffuse, specular = sum_lights(position, normal, view, material, lights, visible)
         present += [
             coefficient * term
             for coefficient, term in ((k_d, diffuse), (k_s, specular))

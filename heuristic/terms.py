@@ -11,6 +11,9 @@ from numbers import Real
 
 import drjit as dr
 
+from heuristic import numerics
+from heuristic.numerics import power
+
 
 def emission(k_i):
     """Equation 8.1: ``I = k_i``, independent of geometry and never attenuated."""
@@ -28,15 +31,16 @@ def diffuse(intensity, k_d, cos_incidence):
     8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
     Lambert's law (8.3, 8.4) is why no view angle appears.
     """
-    return intensity * k_d * dr.maximum(cos_incidence, 0)
+    return intensity * k_d * numerics.at_least(cos_incidence, 0)
 
 
 def specular(intensity, k_s, cos_reflection, n):
     """Equations 8.8, 8.9, 6.8-6.10: ``I = I_p k_s (R.V)^n``.
 
     6.10 is the same for an ``intensity`` that is already attenuated. The limit of large ``n`` is
-    the perfect mirror of 8.7. The caller sees to the horizon (``N.L > 0``); the lobe itself ends
-    where ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
+    the perfect mirror of 8.7. ``cos_reflection`` is a float or, for large ``n``, a
+    :class:`heuristic.numerics.Cosine`. The caller sees to the horizon (``N.L > 0``); the lobe
+    itself ends where ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
     """
     return intensity * k_s * power(cos_reflection, n)
 
@@ -56,44 +60,80 @@ def normalisation(form, n):
     return (n + 2) / 2
 
 
-LARGEST_LITERAL_EXPONENT = 64
-"""Up to here an integer exponent is multiplied out: at most 11 products, and an error of
-``n`` rounding steps, against the logarithm, exponential and branch of a general power."""
+def attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
+    """Equation 6.1: ``I = I_0 / (k0 + k1 d + k2 d^2)``: constant, linear and quadratic parts.
 
+    Without an ``intensity`` it is ``f_att``; ``inverse`` is ``1 / d`` where the caller has it at
+    hand. ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation.
+    Where the denominator is 0 (on a light of inverse-square type) the result is 0: no direction
+    exists there, so nothing is lit.
 
-def power(cosine, n):
-    """Return ``cosine ** n`` where the cosine is positive, and 0 elsewhere.
-
-    A Python integer up to :data:`LARGEST_LITERAL_EXPONENT` becomes products in the compiled kernel,
-    three times faster than the general power. Give a Dr.Jit array where values change often: any
-    plain number is compiled in, and each value anew.
+    Neither ``d^2`` nor ``f_att`` need lie in the type's range, if only the result does: see
+    :func:`attenuation_root`. A result beyond the range is the largest float, since an infinite one
+    would become NaN at the horizon.
     """
-    lobe = cosine > 0
-    if isinstance(n, int) and n <= LARGEST_LITERAL_EXPONENT:
-        return dr.select(lobe, dr.power(cosine, n), 0)
-    return dr.select(lobe, dr.exp2(n * dr.log2(dr.select(lobe, cosine, 1))), 0)
+    root = _representable(attenuation_root(distance, k0, k1, k2, inverse))
+    return _representable(intensity * root * root)
 
 
-def attenuation(distance, k0, k1, k2):
-    """Equation 6.1: ``f_att = 1 / (k0 + k1 d + k2 d^2)``: constant, linear and quadratic parts.
-
-    ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation. Where
-    the denominator is 0 (on a light of inverse-square type) the factor is 0: no direction exists
-    there, so nothing is lit.
-    """
-    denominator = k0 + distance * (k1 + distance * k2)
-    return dr.select(denominator > 0, dr.rcp(denominator), 0)
-
-
-def clamped_attenuation(distance, c1, c2, c3):
+def clamped_attenuation(distance, c1, c2, c3, intensity=1, inverse=None):
     """Text at 8.6: ``f_att = min(1 / (c1 + c2 d + c3 d^2), 1)``, so that ``0 <= f_att <= 1``."""
-    denominator = c1 + distance * (c2 + distance * c3)
-    return dr.select(denominator > 1, dr.rcp(denominator), 1)
+    root = numerics.at_most(attenuation_root(distance, c1, c2, c3, inverse, at_zero=1), 1)
+    return intensity * root * root
+
+
+def attenuation_root(distance, k0, k1, k2, inverse=None, at_zero=0):
+    """Return ``1 / sqrt(k0 + k1 d + k2 d^2)``, and ``at_zero`` where the denominator is 0.
+
+    Its product with an intensity, and that with it once more, stay between numbers that exist.
+    With ``u = 1 / d`` the denominator is ``d^2 (k2 + k1 u + k0 u^2)``, which is taken where ``k2
+    d^2`` is the largest of the three. Of the products with ``k0``, ``k1`` and ``k2`` that with
+    ``k1`` alone must lie in the type's range.
+    """
+    float_type = type(distance)
+    if numerics.is_number(k2, 0):
+        return _inverse_root(float_type(k0 + distance * k1), at_zero)
+    is_away = distance >= numerics.smallest(distance)
+    if inverse is None:
+        inverse = 1 / dr.select(is_away, distance, 1)
+    if numerics.is_number(k0, 0) and numerics.is_number(k1, 0):
+        return dr.select(is_away, inverse * _inverse_root(float_type(k2), at_zero), at_zero)
+    first, last = float_type(k0), float_type(k2)
+    is_far = last * distance >= numerics.at_least(first * inverse, float_type(k1))
+    is_far &= is_away & (last > 0)
+    place = dr.select(is_far, inverse, distance)
+    first, last = dr.select(is_far, last, first), dr.select(is_far, first, last)
+    root = _inverse_root(first + place * (k1 + place * last), at_zero)
+    return root * dr.select(is_far, inverse, 1)
+
+
+def _representable(value):
+    return numerics.at_most(value, numerics.largest(value))
+
+
+def _inverse_root(value, at_zero):
+    is_positive = value > 0
+    return dr.select(is_positive, dr.rsqrt(dr.select(is_positive, value, 1)), at_zero)
 
 
 def spot_cone(cos_axis, cos_cutoff):
-    """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it."""
-    return dr.select(cos_axis >= cos_cutoff, 1.0, 0.0)
+    """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it.
+
+    Both are cosines, or both :class:`heuristic.numerics.Cosine` with supplement; these compare by
+    what is left to 1 or -1, whichever is nearer to the cutoff, and let in what lies on the edge to
+    within :data:`EDGE_STEPS` rounding steps.
+    """
+    if not isinstance(cos_axis, numerics.Cosine):
+        return dr.select(cos_axis >= cos_cutoff, 1.0, 0.0)
+    margin = EDGE_STEPS * numerics.epsilon(cos_axis.value)
+    is_narrow = cos_axis.complement <= cos_cutoff.complement * (1 + margin)
+    is_wide = cos_axis.supplement >= cos_cutoff.supplement * (1 - margin)
+    return dr.select(dr.select(cos_cutoff.value >= 0, is_narrow, is_wide), 1.0, 0.0)
+
+
+EDGE_STEPS = 8
+"""A point whose coordinates lie exactly on a cone is lit, as 6.2 has it, whatever the rounding of
+directions and cutoff."""
 
 
 def spot_falloff(cos_axis, m):

@@ -67,7 +67,7 @@ def report(output, **rendering):
     names = tuple(SCENES)
     jobs.check_installation()
     verifications = [] if rendering["everything"] else _verify(names, rendering)
-    _compare(names, output, rendering, equations.index(), verifications)
+    _compare(names, output, rendering, equations.index(), verifications, with_hard_cases=True)
 
 
 @cli.command()
@@ -156,11 +156,12 @@ def _verify(names, rendering):
     return results
 
 
-def _compare(names, folder, rendering, equations=(), verifications=()):
+def _compare(names, folder, rendering, equations=(), verifications=(), with_hard_cases=False):
     jobs.check_installation()
+    from comparisons import hard_record
     from comparisons.compare import compare as run
     from reference.scene import set_variant
-    from reports import output, progress
+    from reports import hard_cases, output, progress
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
@@ -178,7 +179,8 @@ def _compare(names, folder, rendering, equations=(), verifications=()):
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
-    output.write_page(folder, list(views.values()), equations, verifications)
+    shown = hard_cases.view(hard_record.collect()) if with_hard_cases else None
+    output.write_page(folder, list(views.values()), equations, verifications, shown)
     share = (perf_counter() - begin) / len(views)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share

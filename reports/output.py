@@ -72,11 +72,11 @@ def write_scene(folder, name, comparison):
     }
 
 
-def write_page(folder, views, equations=(), verifications=()):
+def write_page(folder, views, equations=(), verifications=(), hard_cases=None):
     """Write ``index.html`` for the scenes of a run, and what else a report shows."""
     _write(
         folder / "index.html",
-        page.render(views, equations=equations, verifications=verifications),
+        page.render(views, equations=equations, verifications=verifications, hard_cases=hard_cases),
     )
 
 

@@ -50,6 +50,7 @@ def render(
     title: str = TITLE,
     equations: Sequence[Entry] = (),
     verifications: Sequence[Mapping[str, Any]] = (),
+    hard_cases: Mapping[str, Any] | None = None,
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
@@ -64,7 +65,8 @@ def render(
         Paths relative to the page by label, shown as links.
 
     `equations` is the index of `heuristic.equations`, `verifications` the data of
-    `comparisons.verification`; each is a section of its own, left out where it is empty.
+    `comparisons.verification`, `hard_cases` what `reports.hard_cases.view` returns; each is a
+    section of its own, left out where it is empty.
     """
     scenes = [
         {
@@ -85,6 +87,7 @@ def render(
         metrics=METRICS,
         legends=legends(),
         equations=equations,
+        hard_cases=hard_cases,
         verifications=verifications,
     )
 

@@ -78,7 +78,10 @@ def with_half_vector(monkeypatch):
 
 
 def without_attenuation(monkeypatch):
-    monkeypatch.setattr(terms, "attenuation", lambda distance, k0, k1, k2: 1)
+    def wrong(distance, k0, k1, k2, intensity=1, inverse=None):
+        return intensity
+
+    monkeypatch.setattr(terms, "attenuation", wrong)
 
 
 def without_clamp(monkeypatch):

@@ -4,6 +4,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from scipy import stats
 
 from comparisons.scenes import SCENES
 from tests import checks
@@ -148,6 +149,133 @@ def test_the_density_integrates_to_the_share_of_samples_above_the_horizon(rgb, v
     )
     share = np.mean(np.array(bs.pdf) > 0)
     assert abs(share - total) < 5 * np.sqrt(0.25 / 100_000) + 2e-3
+
+
+# --- Hard cases ------------------------------------------------------------------------------
+
+EXPONENTS = [0, 1e-3, 0.5, 1e3, 1e5]
+GRAZING = [0, 60, 85, 89.5]
+# Blinn's lobe at 89.5 degrees is a hundred times narrower across than along: too narrow for cells.
+VIEWS = [("phong", degrees) for degrees in GRAZING] + [("blinn", d) for d in GRAZING[:3]]
+CASES_OF_CHI2 = len(EXPONENTS) * len(VIEWS)
+
+
+@pytest.mark.parametrize(("form", "degrees"), VIEWS)
+@pytest.mark.parametrize("n", EXPONENTS)
+def test_samples_of_any_exponent_follow_the_density(rgb, n, form, degrees):
+    """The cells are those of a patch about the lobe, as fine for n = 1e5 as for 0."""
+    observed, expected = patch_counts(form, n, degrees)
+    assert observed.sum() > 0.2 * DRAWN
+    level = 1 - (1 - 0.01) ** (1 / CASES_OF_CHI2)
+    assert probability(observed, expected) > level
+
+
+@pytest.mark.parametrize("n", [20, 1e3, 1e5])
+def test_a_density_of_another_exponent_is_found_out(rgb, n):
+    observed, _ = patch_counts("phong", n, 60)
+    _, expected = patch_counts("phong", n, 60, density_n=1.2 * n)
+    assert probability(observed, expected) < 1e-6
+
+
+def probability(observed, expected):
+    """Return the chance of a worse fit; cells of few samples, and all that is outside, are one."""
+    large = expected > 5
+    found = np.append(observed[large], DRAWN - observed[large].sum())
+    wanted = np.append(expected[large], DRAWN - expected[large].sum())
+    if wanted[-1] < 5:
+        found, wanted = found[:-1], wanted[:-1]
+    return stats.chi2.sf(np.sum((found - wanted) ** 2 / wanted), len(wanted) - 1)
+
+
+def lobe_frame(degrees):
+    """Return the mirror image of a direction, and two more axes; (3,) each."""
+    wi = np.float32(direction(degrees, 30)).astype(float)
+    mirrored = wi * [-1, -1, 1]
+    side = np.cross(mirrored, [0.3, 0.5, -0.8])
+    side /= np.linalg.norm(side)
+    return wi, mirrored, side, np.cross(mirrored, side)
+
+
+BINS, DRAWN = 24, 100_000
+
+
+def radius_to_angle(n, place):
+    """Return the angle from the lobe's axis below which a share ``place`` of it lies."""
+    return 2 * np.arcsin(np.sqrt(-np.expm1(np.log1p(-place) / (n + 1)) / 2))
+
+
+def patch_counts(form, n, degrees, density_n=None):
+    """Return samples in cells about the lobe's axis, and the integral of the density there.
+
+    The cells divide the lobe of ``n`` evenly in its two random numbers: azimuth, and the share of
+    the lobe within an angle. For ``blinn``, whose lobe is about the normal, the axis is the same
+    and the exponent a quarter, as its half vector turns half as fast.
+    """
+    wi, axis, side, up = lobe_frame(degrees)
+    bsdf = mi.load_dict(phong(k_s=0.9, n=n, form=form))
+    of_density = bsdf if density_n is None else mi.load_dict(phong(k_s=0.9, n=density_n))
+    width = n / 4 if form == "blinn" else n
+    u = np.random.default_rng(5).random((3, DRAWN))
+    bs, _ = bsdf.sample(mi.BSDFContext(), interaction(wi, DRAWN), mi.Float(u[0]), mi.Point2f(u[1:]))
+    wo = np.array(bs.wo, float)[:, np.array(bs.pdf) > 0]
+    chord = np.sqrt(np.sum((wo - axis[:, None]) ** 2, axis=0))
+    cosine = 1 - chord**2 / 2
+    place = -np.expm1((width + 1) * np.log(np.maximum(cosine, 1e-300)))
+    azimuth = np.arctan2(up @ wo, side @ wo) / (2 * np.pi) % 1
+    inside = cosine > 0
+    observed, *_ = np.histogram2d(place[inside], azimuth[inside], bins=BINS, range=[(0, 1), (0, 1)])
+    fine = 32  # midpoints in each cell, along each side
+    s, t = ((np.arange(BINS * fine) + 0.5) / (BINS * fine) for _ in range(2))
+    s, t = (grid.ravel() for grid in np.meshgrid(s, t, indexing="ij"))
+    angle, phi = radius_to_angle(width, s), 2 * np.pi * t
+    directions = np.cos(angle) * axis[:, None] + np.sin(angle) * (
+        np.cos(phi) * side[:, None] + np.sin(phi) * up[:, None]
+    )
+    density = np.array(
+        of_density.pdf(mi.BSDFContext(), interaction(wi, len(s)), mi.Vector3f(directions)), float
+    )
+    # d(omega) = 2 pi ds dt / ((width + 1) cos^width)
+    solid = 2 * np.pi / ((width + 1) * np.cos(angle) ** width) / len(s)
+    cells = (density * solid).reshape(BINS, fine, BINS, fine).sum(axis=(1, 3))
+    return observed, cells * DRAWN
+
+
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+@pytest.mark.parametrize("degrees", GRAZING)
+@pytest.mark.parametrize("n", [*EXPONENTS, 1e6, 1e7])
+def test_weight_is_value_over_density_for_any_exponent(rgb, n, degrees, form):
+    """``2 k_s / (n + 1)`` for ``phong``, to the bound of the power; and nothing is NaN."""
+    bsdf = mi.load_dict(phong(k_s=0.9, n=n, form=form))
+    rng = mi.PCG32(50_000)
+    bs, weight = bsdf.sample(
+        mi.BSDFContext(), interaction(direction(degrees), 50_000), rng.next_float32(),
+        mi.Point2f(rng.next_float32(), rng.next_float32()),
+    )  # fmt: skip
+    density, weight = np.array(bs.pdf, float), np.array(weight, float)[0]
+    assert np.isfinite(density).all()
+    assert np.isfinite(weight).all()
+    drawn = density > 0
+    assert drawn.mean() > 0.2
+    assert not weight[~drawn].any()
+    assert np.abs(np.linalg.norm(np.array(bs.wo, float), axis=0) - 1).max() < 4e-7
+    if form == "phong":
+        np.testing.assert_allclose(weight[drawn], 2 * 0.9 / (n + 1), rtol=1e-5)
+
+
+@pytest.mark.parametrize("n", [1e3, 1e5, 1e7])
+def test_samples_of_a_sharp_lobe_are_as_wide_as_it(rgb, n):
+    """The mean of ``1 - R.V`` is ``1 / (n + 2)``; from ``u^(1/(n + 1))`` it would be rounded."""
+    count = 200_000
+    wi = np.float32(direction(35)).astype(float)
+    rng = np.random.default_rng(3)
+    sample = mi.Point2f(rng.random((2, count)))
+    bs, _ = mi.load_dict(phong(k_s=0.9, n=n)).sample(
+        mi.BSDFContext(), interaction(wi, count), mi.Float(0.5), sample
+    )
+    wo = np.array(bs.wo, float)
+    mirrored = wi * [-1, -1, 1] / np.linalg.norm(wi)
+    complement = np.sum((wo / np.linalg.norm(wo, axis=0) - mirrored[:, None]) ** 2, axis=0) / 2
+    assert complement.mean() * (n + 2) == pytest.approx(1, abs=5 / np.sqrt(count) + 2e-3)
 
 
 # --- Values ----------------------------------------------------------------------------------

@@ -77,3 +77,24 @@ def test_spots_pair_both_ways(rgb, name):
     # On the axis both fall-offs are 1, so that the factor pi between the two is all there is.
     assert heuristic == pytest.approx(physical, rel=1e-5)
     assert not made.emitters[0].exact
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-38, 1e-20, 1e-3, 1.0, 1e20, 1e37])
+@pytest.mark.parametrize("kind", ["heuristic_point", "heuristic_spot"])
+def test_a_lights_plugin_answers_at_any_distance(rgb, kind, distance):
+    """``pi I / d²`` wherever single precision has it, and nothing on the light itself."""
+    intensity = min(max(distance**2, 1e-30), 1e30)
+    description = {"type": kind, "position": (0, 0, distance), "intensity": intensity}
+    description |= {"k0": 0.0, "k2": 1.0}
+    if kind == "heuristic_spot":
+        description["direction"] = (0, 0, -1)
+    light = mi.load_dict(description)
+    ds, weight = light.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+    assert dr.all(dr.isfinite(weight) & dr.isfinite(ds.dist) & dr.all(dr.isfinite(ds.d)))
+    if distance in (0.0, 1e-38):
+        assert dr.all(ds.d == 0)
+        return
+    np.testing.assert_allclose(np.array(ds.d).ravel(), (0, 0, 1), atol=1e-6)
+    np.testing.assert_allclose(np.array(ds.dist), distance, rtol=1e-6)
+    expected = np.pi * (intensity / distance / distance)
+    np.testing.assert_allclose(np.array(weight).ravel(), expected, rtol=1e-5, atol=1e-37)

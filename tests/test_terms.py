@@ -208,7 +208,7 @@ def test_attenuation_on_the_light_itself(float_type):
     """Where the polynomial is 0 the open form gives nothing, and the clamped one its limit 1."""
     assert dr.all(terms.attenuation(float_type(0), 0, 0, 1) == 0)
     assert dr.all(terms.clamped_attenuation(float_type(0), 0, 0, 1) == 1)
-    assert dr.all(terms.attenuation(float_type(0), 0.5, 0, 1) == 2)
+    require(terms.attenuation(float_type(0), 0.5, 0, 1), 2, 4 * step(float_type))
 
 
 @bounded

@@ -157,10 +157,11 @@ class SceneMaterials:
         readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
         *values, n, is_blinn = dr.switch(self._index(si, active), readers, si, active)
         forms = sorted({bsdf.form for bsdf in self.bsdfs})
+        is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
         coefficients = dict(zip(present, values, strict=True))
         return [
             (
-                Material(**coefficients, n=n, form=form),
+                Material(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
                 len(forms) == 1 or is_blinn == (form == "blinn"),
             )
             for form in forms

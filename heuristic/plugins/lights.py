@@ -24,7 +24,7 @@ Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance `
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import terms
+from heuristic import numerics, terms, vectors
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLight
 from heuristic.plugins.spectra import emitted
@@ -97,12 +97,17 @@ def define():
             dr.make_opaque(self.position, self.k0, self.k1, self.k2)
 
         def sample_direction(self, it, sample, active=True):
-            offset = self.position - it.p
-            distance = dr.norm(offset)
-            direction = offset * dr.rcp(distance)
+            # Divided by its largest component first: the square need not lie in the type's range.
+            half = 0.5 * self.position - 0.5 * it.p
+            size = dr.max(abs(half))
+            is_away = size >= numerics.smallest(size)
+            half /= dr.select(is_away, size, 1)
+            length = dr.norm(half)
+            direction = half * dr.select(is_away, dr.rcp(length), 0)
+            distance = numerics.at_most(2 * length * size, numerics.largest(length))
             ds = self._direction_sample(it, self.position, direction, distance)
-            weight = IRRADIANCE_PER_INTENSITY * self._attenuation(distance)
-            return ds, self._spectrum(it, active) * weight & active
+            weight = self._attenuated(distance, self._spectrum(it, active))
+            return ds, IRRADIANCE_PER_INTENSITY * weight & active
 
         def light(self, si, active=True):
             """Return the kernel's form of this light."""
@@ -125,9 +130,9 @@ def define():
         def _coefficients(self):
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
-        def _attenuation(self, distance):
+        def _attenuated(self, distance, intensity):
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
-            return law(distance, *self._coefficients())
+            return law(distance, *self._coefficients(), intensity)
 
     class HeuristicSpot(HeuristicPoint):
         """Equations 6.2-6.4."""
@@ -141,9 +146,16 @@ def define():
 
         def sample_direction(self, it, sample, active=True):
             ds, weight = super().sample_direction(it, sample, active)
-            frame = mi.Frame3f(dr.normalize(self.direction))
-            cos_axis = frame.to_local(-ds.d).z
-            cone = terms.spot_cone(cos_axis, dr.cos(dr.deg2rad(self.cutoff)))
+            frame = mi.Frame3f(vectors.normalise(self.direction))
+            local = frame.to_local(-ds.d)
+            # 1 - cos and 1 + cos as halves of squared distances from the axis' two ends.
+            away = dr.square(local.x) + dr.square(local.y)
+            cos_axis = numerics.Cosine(
+                local.z,
+                0.5 * (away + dr.square(1 - local.z)),
+                0.5 * (away + dr.square(1 + local.z)),
+            )
+            cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
             return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
 
         def parameters_changed(self, keys=()):
@@ -176,7 +188,7 @@ def define():
             dr.make_opaque(self.direction)
 
         def sample_direction(self, it, sample, active=True):
-            direction = -dr.normalize(self.direction)
+            direction = -vectors.normalise(self.direction)
             ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
             return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
 

@@ -25,14 +25,18 @@ has no cosine of its own; as the chapters have it, it neither conserves energy n
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from heuristic import terms
+from heuristic import lobes, numerics, terms, vectors
 from heuristic.convention import RADIANCE_PER_IRRADIANCE
 from heuristic.errors import InputError
 from heuristic.materials import Material, check_form
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
 
 COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
+
+SMALLEST_SAMPLE = 2.0**-25
+"""In place of a random number of 0, which stands for all those below 2^-24."""
 
 
 def define():
@@ -69,7 +73,13 @@ def define():
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else COEFFICIENTS)
             }
-            return Material(**coefficients, n=self.n, form=self.form, normalised=self.normalised)
+            return Material(
+                **coefficients,
+                n=self.n,
+                form=self.form,
+                normalised=self.normalised,
+                n_is_moderate=self.n_is_moderate,
+            )
 
         def eval(self, ctx, si, wo, active=True):
             wi, wo = self._facing(si.wi, wo)
@@ -130,12 +140,14 @@ def define():
         def parameters_changed(self, keys=()):
             """Note which coefficients can be other than zero, and make the exponent opaque.
 
-            An opaque exponent can change without a new compilation, as fits and sweeps need.
+            An opaque exponent can change without a new compilation, as fits and sweeps need, as
+            long as it stays moderate, or does not (:data:`heuristic.numerics.MODERATE_EXPONENTS`).
             """
             self.present = {
                 name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
             }
             dr.make_opaque(self.n)
+            self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
 
         def to_string(self):
             parts = ", ".join(
@@ -169,29 +181,33 @@ def define():
 
         def _lobe_cosine(self, wi, wo):
             """Return ``R.V`` or ``N.H`` in the local frame."""
-            if self.form == "blinn":
-                return dr.normalize(wi + wo).z
-            return dr.dot(mi.reflect(wi), wo)
+            return lobes.local_lobe(self.form, self.n_is_moderate, wi, wo)
 
         def _sample_lobe(self, wi, sample2):
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
 
             That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
-            the normal, at which ``wi`` is then mirrored.
+            the normal, at which ``wi`` is then mirrored. Its cosine is ``u^(1/(n + 1))``, of which
+            ``1 - c^2`` would leave nothing for large ``n``: with ``c = 2^-x`` the sine comes from
+            ``1 - 2^(-2x)`` (:func:`heuristic.numerics.one_less_exp2`).
             """
-            cosine = dr.power(sample2.y, dr.rcp(self.n + 1))
-            sine = dr.safe_sqrt(1 - dr.square(cosine))
+            halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (self.n + 1)
+            sine = dr.sqrt(numerics.one_less_exp2(2 * halvings))
+            cosine = numerics.exp2(-halvings)
             sin_phi, cos_phi = dr.sincos(dr.two_pi * sample2.x)
             local = mi.Vector3f(cos_phi * sine, sin_phi * sine, cosine)
             if self.form == "blinn":
-                return mi.reflect(wi, local)
-            return mi.Frame3f(mi.reflect(wi)).to_world(local)
+                return mi.Vector3f(vectors.normalise(mi.reflect(wi, local)))
+            return mi.Vector3f(vectors.normalise(mi.Frame3f(mi.reflect(wi)).to_world(local)))
 
         def _lobe_pdf(self, wi, wo):
-            """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``."""
+            """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``.
+
+            ``wi.H = |wi + wo| / 2``, which is 0 for opposite directions alone.
+            """
             density = (self.n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), self.n)
             if self.form == "blinn":
-                density /= 4 * dr.dot(wi, dr.normalize(wi + wo))
+                density /= numerics.at_least(2 * dr.norm(wi + wo), numerics.smallest(wo))
             return density
 
     mi.register_bsdf("phong", PhongBSDF)

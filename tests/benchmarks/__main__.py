@@ -7,9 +7,14 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights, terms
+from tests.benchmarks import kernel, lights, stability, terms
 
-BENCHMARKS = {"kernel": kernel.run, "lights": lights.run, "terms": terms.run}
+BENCHMARKS = {
+    "kernel": kernel.run,
+    "lights": lights.run,
+    "stability": stability.run,
+    "terms": terms.run,
+}
 
 
 @click.command()

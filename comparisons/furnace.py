@@ -1,0 +1,112 @@
+"""Which models of reflection keep energy, and which are reciprocal: facts, by quadrature.
+
+In a white furnace, light of radiance 1 from all sides, a surface that loses nothing looks like the
+furnace; one that shows more creates light. What is tabulated is the directional-hemispherical
+albedo ``2 pi int f cos(theta_o)`` for light from one angle, with coefficients and reflectances of
+1, and how far ``f(i, o)`` is from ``f(o, i)``.
+"""
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+ANGLES = (0.0, 45.0, 80.0)
+AZIMUTHS, HEIGHTS = 960, 720
+
+
+@dataclass(frozen=True)
+class Furnace:
+    """A model's albedo for light from each of :data:`ANGLES`, and its departure from reciprocity.
+
+    ``asymmetry`` is the largest ``|f(i, o) - f(o, i)|`` over the mean of the two, over random pairs
+    within 80 degrees of the normal, where ``f`` exceeds a thousandth of its largest value.
+    """
+
+    model: str
+    albedo: tuple[float, ...]
+    asymmetry: float
+
+    @property
+    def creates(self):
+        """The largest share of light that the model adds; negative where it only loses."""
+        return max(self.albedo) - 1
+
+
+MODELS = {
+    "diffuse, ρ = 1": {"type": "diffuse", "reflectance": 1.0},
+    "Phong, k_s = 1, n = 9": {"type": "phong", "k_s": 1.0, "n": 9},
+    "Phong, k_s = 1, n = 1000": {"type": "phong", "k_s": 1.0, "n": 1000},
+    "Phong normalised, n = 9": {"type": "phong", "k_s": 1.0, "n": 9, "normalised": True},
+    "Phong normalised, n = 1000": {"type": "phong", "k_s": 1.0, "n": 1000, "normalised": True},
+    "Blinn–Phong, k_s = 1, n = 9": {"type": "phong", "k_s": 1.0, "n": 9, "form": "blinn"},
+    "Blinn–Phong normalised, n = 9": {
+        "type": "phong", "k_s": 1.0, "n": 9, "form": "blinn", "normalised": True
+    },
+    "Blinn–Phong normalised, n = 1000": {
+        "type": "phong", "k_s": 1.0, "n": 1000, "form": "blinn", "normalised": True
+    },
+    "roughplastic, ρ = 1, α = 0.1": {
+        "type": "roughplastic", "diffuse_reflectance": 1.0, "alpha": 0.1
+    },
+    "roughplastic, ρ = 1, α = 0.5": {
+        "type": "roughplastic", "diffuse_reflectance": 1.0, "alpha": 0.5
+    },
+}  # fmt: skip
+"""The models, as Mitsuba dictionaries; the plugins must be registered."""
+
+
+def table():
+    """Return a :class:`Furnace` for each of :data:`MODELS`, in the current variant."""
+    return [
+        Furnace(name, tuple(albedo(bsdf, angle) for angle in ANGLES), asymmetry(bsdf))
+        for name, bsdf in ((name, mi.load_dict(model)) for name, model in MODELS.items())
+    ]
+
+
+def albedo(bsdf, degrees):
+    """Return the albedo of a BSDF for light that comes at an angle from the normal.
+
+    Mitsuba's ``eval(wi, wo)`` is ``f cos(theta_wo)`` with the light at ``wo``; the outgoing
+    directions are those of ``wi`` here, so that models without reciprocity keep their sense.
+    """
+    light = _direction(np.deg2rad(degrees), 0.0)
+    # In t with cos = 1 - t^2, so that the directions are dense about the normal.
+    t = (np.arange(HEIGHTS) + 0.5) / HEIGHTS
+    phi = (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS
+    t, phi = (grid.ravel() for grid in np.meshgrid(t, phi))
+    cosine = 1 - t * t
+    outgoing = _direction(np.arccos(cosine), phi)
+    value = evaluate(bsdf, outgoing, light) / light[2, 0]  # f
+    return float((value * cosine * 2 * t).sum() * 2 * np.pi / len(t))
+
+
+def asymmetry(bsdf, pairs=20_000):
+    """Return the largest relative difference of ``f(i, o)`` and ``f(o, i)``."""
+    rng = np.random.default_rng(0)
+    a, b = (
+        _direction(np.arccos(rng.uniform(np.cos(np.deg2rad(80)), 1, pairs)),
+                   rng.uniform(0, 2 * np.pi, pairs))
+        for _ in range(2)
+    )  # fmt: skip
+    there, back = evaluate(bsdf, a, b) / b[2], evaluate(bsdf, b, a) / a[2]
+    mean = (there + back) / 2
+    counted = mean > 1e-3 * mean.max()
+    return float((np.abs(there - back)[counted] / mean[counted]).max())
+
+
+def evaluate(bsdf, wi, wo):
+    """Return ``f cos(theta_wo)`` of a white BSDF, for directions (3, N)."""
+    count = max(wi.shape[1], wo.shape[1])
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    si.wi = mi.Vector3f(np.broadcast_to(wi, (3, count)))
+    if mi.is_spectral:
+        si.wavelengths = 550.0
+    value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(np.broadcast_to(wo, (3, count))))
+    return np.atleast_2d(np.array(value, float))[0]
+
+
+def _direction(theta, phi):
+    theta, phi = np.broadcast_arrays(np.atleast_1d(theta), phi)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])

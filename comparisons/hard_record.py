@@ -1,0 +1,77 @@
+"""The hard cases evaluated: what the report shows of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons import furnace, hard_cases, hard_surfaces, textbook
+from comparisons.furnace import Furnace
+from comparisons.hard_cases import Outcome, Setting
+
+PICTURE = 160
+"""Pixels along each side of a picture."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One thing seen by the naive formula and by ours: images (H, W) of values from 0 to 1."""
+
+    title: str
+    naive: np.ndarray
+    ours: np.ndarray
+
+
+@dataclass(frozen=True)
+class HardCases:
+    """All cases with their errors, pictures of some, and the energy of the models."""
+
+    outcomes: tuple[Outcome, ...]
+    pictures: tuple[Picture, ...]
+    furnaces: tuple[Furnace, ...]
+
+
+def collect():
+    """Evaluate everything, in the current Mitsuba variant; a few seconds."""
+    cases = (*hard_cases.CASES, *hard_surfaces.CASES)
+    return HardCases(
+        outcomes=tuple(map(hard_cases.evaluate, cases)),
+        pictures=(
+            _picture("A highlight of n = 1e6, 0.4 degrees wide", _highlight(1e6, 0.0035)),
+            _picture("A highlight of n = 1e7, 0.13 degrees wide", _highlight(1e7, 0.00115)),
+            _picture("The spot of a cutoff of 0.005 degrees", _spot(0.005)),
+        ),
+        furnaces=tuple(furnace.table()),
+    )
+
+
+def _picture(title, setting):
+    setting = setting.rounded()
+    naive = textbook.shade(setting, textbook.NAIVE)
+    images = (naive, hard_cases.by_kernel(setting))
+    return Picture(title, *(image.reshape(PICTURE, PICTURE) for image in images))
+
+
+def _grid(half):
+    x, y = np.meshgrid(*[np.linspace(-half, half, PICTURE)] * 2)
+    return x.ravel()[:, None], y.ravel()[:, None]
+
+
+def _highlight(n, half):
+    """Return a setting of views in a square about the mirror direction of a light."""
+    base = hard_cases.highlight(n, 1)
+    axis = np.array(base.view)[0]
+    side = np.cross(axis, (0.3, 0.5, -0.8))
+    side /= np.linalg.norm(side)
+    x, y = _grid(half)
+    view = axis + x * side + y * np.cross(axis, side)
+    return Setting(normal=base.normal, light=base.light, view=view, k_s=1.0, n=n)
+
+
+def _spot(cutoff):
+    """Return a setting of points in a square below a spot, which is somewhat aslant."""
+    x, y = _grid(2.5 * np.deg2rad(cutoff))
+    position = np.concatenate([x, y, 0 * x], axis=1)
+    light = (0.3, 0.4, 0.8)
+    return Setting(
+        position=position, light=light, direction=tuple(-c for c in light), cutoff=cutoff, k_d=1.0
+    )

@@ -1,0 +1,201 @@
+"""The hard cases beside the kernel's points: sums of lights, triangles, normals and colours."""
+
+import drjit as dr
+import numpy as np
+from drjit.llvm import Array3f, Array3u
+
+import heuristic
+from comparisons import textbook
+from comparisons.hard_cases import HardCase
+from comparisons.metrics import log2_luminance_ratio
+from comparisons.spaces import DEFAULT_VIEWING, itp
+from heuristic import interpolation, normals, vertex_normals
+
+LIGHTS = 10_000
+
+
+def _lights():
+    """Return the intensities and positions of one light of 1e6 and many of 1e-2 around it."""
+    rng = np.random.default_rng(3)
+    position = rng.normal(size=(LIGHTS, 3)).astype(np.float32) + np.float32([0, 0, 8])
+    intensity = np.full(LIGHTS, 0.01, np.float32)
+    intensity[0] = 1e6
+    return intensity, position
+
+
+def _sum_of_lights(dtype):
+    intensity, position = (array.astype(dtype) for array in _lights())
+    length = np.sqrt((position * position).sum(axis=1))
+    terms = intensity * np.maximum(position[:, 2] / length, 0)
+    # One after the other, as a loop over the lights adds them.
+    return np.cumsum(terms, dtype=dtype)[-1:]
+
+
+def _kernel_sum():
+    intensity, position = _lights()
+    lights = [
+        heuristic.PointLight(tuple(map(float, place)), float(value))
+        for value, place in zip(intensity, position, strict=True)
+    ]
+    up = Array3f(0, 0, 1)
+    return np.array(heuristic.shade(Array3f(0), up, up, heuristic.Material(k_d=1), lights))
+
+
+def _triangle(name, hard, corners, bound=1e-5):
+    corners = np.float32(corners)
+
+    def ours():
+        return np.array(
+            normals.triangle_normal(*(Array3f(*map(float, corner)) for corner in corners))
+        )[:, 0]
+
+    return HardCase(
+        name, "geometry", hard, bound,
+        lambda: textbook.triangle_normal(*corners, textbook.NAIVE),
+        ours,
+        lambda: textbook.triangle_normal(*corners, textbook.EXACT),
+    )  # fmt: skip
+
+
+_AXES = np.float32([1e3, 1.0, 1e-3])
+_ON_ELLIPSOID = np.float32([600.0, 0.48, 0.64e-3])
+_ELLIPSOID_SCALE = np.float32(1e-20)
+
+
+def _ellipsoid_normal(dtype):
+    axes = (_AXES * _ELLIPSOID_SCALE).astype(dtype)
+    gradient = 2 * (_ON_ELLIPSOID * _ELLIPSOID_SCALE).astype(dtype) / axes**2
+    return gradient / np.sqrt((gradient**2).sum())
+
+
+def _our_ellipsoid_normal():
+    axes = map(float, _AXES * _ELLIPSOID_SCALE)
+    gradient = normals.ellipsoid_gradient(
+        Array3f(*map(float, _ON_ELLIPSOID * _ELLIPSOID_SCALE)), *axes
+    )
+    return np.array(normals.implicit_normal(gradient))[:, 0]
+
+
+# Two sides of a sheet: each face is there twice, once turned over.
+_SHEET = np.float32([[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4]])
+
+
+def _naive_vertex_normals():
+    front = textbook.triangle_normal(*_SHEET, textbook.NAIVE)
+    back = textbook.triangle_normal(*_SHEET[[1, 0, 2]], textbook.NAIVE)
+    total = front + back
+    with np.errstate(all="ignore"):
+        return total / np.sqrt((total * total).sum())
+
+
+def _our_vertex_normals():
+    faces = Array3u([0, 1], [1, 0], [2, 2])
+    return np.array(vertex_normals.mean_normals(Array3f(_SHEET.T.copy()), faces))[:, 0]
+
+
+def _naive_scan_line():
+    middle = np.float32([0.6, 0.0, 0.8]) * np.float32(0.5) + np.float32([-0.6, 0, -0.8]) * 0.5
+    with np.errstate(all="ignore"):
+        return middle / np.sqrt((middle * middle).sum())
+
+
+def _our_scan_line():
+    a = Array3f(0.6, 0, 0.8)
+    return np.array(interpolation.scan_line_normal(a, -a, 0, 1, dr.opaque(type(a.x), 0.5)))[:, 0]
+
+
+_HUGE = np.float32(
+    [[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4], [0.5, 0.6, 0.5]]
+) * np.float32(1e15)
+"""Three corners, and a point above the triangle."""
+
+
+def _weights(dtype):
+    p0, p1, p2, point = _HUGE.astype(dtype)
+    product = np.cross(p1 - p0, p2 - p0)
+    b1 = (np.cross(point - p0, p2 - p0) * product).sum() / (product * product).sum()
+    b2 = (np.cross(p1 - p0, point - p0) * product).sum() / (product * product).sum()
+    return np.array([1 - b1 - b2, b1, b2])
+
+
+def _our_weights():
+    p0, p1, p2, point = (Array3f(*map(float, corner)) for corner in _HUGE)
+    return np.array(interpolation.barycentric_coordinates(point, p0, p1, p2))[:, 0]
+
+
+_BLACK = np.zeros((1, 1, 3))
+_NEGATIVE = np.array([[[-0.2, 0.1, 0.3]]])
+
+
+def _naive_pq():
+    """ICtCp's intensity of BT.2100 as printed, of a colour outside of BT.709's gamut."""
+    power = (_NEGATIVE * DEFAULT_VIEWING.white_luminance / 1e4) ** 0.1593017578125
+    return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
+
+
+def _quietly(function):
+    def call():
+        with np.errstate(all="ignore"):
+            return function()
+
+    return call
+
+
+CASES = (
+    HardCase(
+        "10,000 lights of mixed magnitude", "lights",
+        "One light of 1e6 swallows the last digits of 9,999 of 0.01, one after the other.", 1e-6,
+        lambda: _sum_of_lights(textbook.NAIVE), _kernel_sum,
+        lambda: _sum_of_lights(textbook.EXACT),
+    ),
+    _triangle("a triangle of size 1e-30", "The cross product of its edges vanishes.",
+              [(0, 0, 0), (1e-30, 0, 2e-30), (0, 3e-30, 1e-30)]),
+    _triangle("a triangle of size 1e30", "The cross product of its edges is infinite.",
+              [(0, 0, 0), (1e30, 0, 2e30), (0, 3e30, 1e30)]),
+    _triangle("a needle of 1e-5 by 2", "Its long edges are nearly parallel.",
+              [(0.137, 0.291, 0.353), (1.713, 1.931, 1.337), (1.71301, 1.93099, 1.33703)], 1e-4),
+    HardCase(
+        "an ellipsoid of aspect 1e6", "geometry",
+        "Half axes of 1e-17, 1e-20 and 1e-23: their squares vanish, and with them the gradient.",
+        1e-5, _quietly(lambda: _ellipsoid_normal(textbook.NAIVE)), _our_ellipsoid_normal,
+        lambda: _ellipsoid_normal(textbook.EXACT),
+    ),
+    HardCase(
+        "vertices whose normals cancel", "shading",
+        "The two sides of a sheet leave rounding noise, or 0 / 0, in place of a normal.", 1e-5,
+        _naive_vertex_normals, _our_vertex_normals, lambda: np.zeros(3),
+    ),
+    HardCase(
+        "a single huge triangle", "shading",
+        "Barycentric weights divide by the fourth power of its size, 1e15.", 1e-5,
+        _quietly(lambda: _weights(textbook.NAIVE)), _our_weights,
+        lambda: _weights(textbook.EXACT),
+    ),
+    HardCase(
+        "an interpolated normal of length zero", "shading",
+        "Half way between opposite normals: 0 / 0.", 1e-5,
+        _naive_scan_line, _our_scan_line, lambda: np.zeros(3),
+    ),
+    HardCase(
+        "black against black", "colour", "The ratio of two luminances of 0: 0 / 0.", 1e-12,
+        _quietly(lambda: np.log2(_BLACK[..., 0] / _BLACK[..., 0])),
+        lambda: log2_luminance_ratio(_BLACK, _BLACK), lambda: np.zeros((1, 1)),
+    ),
+    HardCase(
+        "negative colours", "colour",
+        "The curve of BT.2100 is a power; out of gamut its base is negative.", 1e-3,
+        _quietly(_naive_pq), lambda: itp(_NEGATIVE, DEFAULT_VIEWING),
+        lambda: itp(_clipped_in_bt2020(), DEFAULT_VIEWING),
+    ),
+)  # fmt: skip
+
+
+def _clipped_in_bt2020():
+    """Return the colour that a display of BT.2020 shows instead, in BT.709.
+
+    The matrix is that of ITU-R BT.2087, whose four digits set the case's bound.
+    """
+    to_bt2020 = np.array(
+        [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]]
+    )
+    return np.maximum(_NEGATIVE @ to_bt2020.T, 0) @ np.linalg.inv(to_bt2020).T

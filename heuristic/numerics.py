@@ -1,0 +1,276 @@
+"""Powers, lengths and sums that keep their digits where the textbook's formulas lose them.
+
+All functions take floats of any type: Dr.Jit arrays of single or double precision, or plain
+numbers. From finite values no function makes a NaN. Numbers below the type's smallest normal float
+count as zero, as they do for the threads that Dr.Jit computes with.
+
+Three ideas carry the module:
+
+- A cosine near 1 travels with its *complement* ``1 - c``, which rounding would swallow. Then
+  ``c^n = 2^(n log2(1 - (1 - c)))`` is as accurate as the complement is, for every ``n``.
+- Vectors are scaled by a power of two before they are squared, which rounds nothing.
+- A running sum carries what its last addition lost (Kahan 1965, as improved by Neumaier 1974).
+"""
+
+import sys
+from math import factorial, inf, log2
+from numbers import Real
+from typing import NamedTuple
+
+import drjit as dr
+
+LARGEST_LITERAL_EXPONENT = 64
+"""Up to here an integer exponent is multiplied out: at most 11 products, and an error of
+``n`` rounding steps, against the logarithm, exponential and branch of a general power."""
+
+MODERATE_EXPONENTS = (2, 512)
+"""Where the cosine of two unit vectors in the kernel's own precision will do. It is wrong by up to
+three rounding steps of 2^-24, its power by ``3 n 2^-24``: within 1e-4 for these. Beyond them, and
+where the exponent is not known when the kernel is traced, the cosine is taken in double precision.
+Below 2 it is the small cosines that need it: ``c^n > 1e-3`` reaches down to ``c = 10^(-3/n)``."""
+
+
+class Cosine(NamedTuple):
+    """The cosine ``c`` of an angle, with ``1 - c`` and, where it is needed, ``1 + c``."""
+
+    value: object
+    complement: object
+    supplement: object = None
+
+
+def is_moderate(n):
+    """Tell whether an exponent is a plain number within :data:`MODERATE_EXPONENTS`."""
+    return isinstance(n, Real) and MODERATE_EXPONENTS[0] <= n <= MODERATE_EXPONENTS[1]
+
+
+def cosine_of_degrees(angle):
+    """Return the :class:`Cosine` of an angle in degrees, a plain number or a Dr.Jit float.
+
+    ``1 - c = 2 sin^2(a / 2)`` and ``1 + c = 2 cos^2(a / 2)``, accurate near 0 and near 180 degrees.
+    """
+    sine, cosine = dr.sincos(dr.deg2rad(angle) * 0.5)
+    return Cosine(1 - 2 * sine * sine, 2 * sine * sine, 2 * cosine * cosine)
+
+
+def power(cosine, n):
+    """Return ``c ** n`` where the cosine is positive, and 0 elsewhere, for ``n = 0`` too.
+
+    Parameters
+    ----------
+    cosine
+        A float, or a :class:`Cosine` whose complement is more accurate than ``1 - c``.
+    n
+        0 or more: a plain number, compiled in, or a Dr.Jit float. A Python integer up to
+        :data:`LARGEST_LITERAL_EXPONENT` becomes products, three times faster than the general
+        power.
+    """
+    if not isinstance(cosine, Cosine):
+        cosine = Cosine(cosine, 1 - cosine)
+    value = cosine.value
+    lobe = value >= smallest(value)
+    if isinstance(n, int) and n <= LARGEST_LITERAL_EXPONENT:
+        return dr.power(at_least(value, 0), n) if n > 0 else dr.select(lobe, 1.0, 0.0)
+    value = at_least(value, smallest(value))  # outside the lobe too nothing becomes infinite
+    complement = at_least(cosine.complement, 0)
+    return dr.select(lobe, exp2(n * log2_of(value, complement)), 0)
+
+
+def log2_of(value, complement):
+    """Return ``log2(c)`` of a cosine in (0, 1] from ``c`` and ``1 - c``, each accurate in itself.
+
+    Within two rounding steps relative to the result, also where ``c`` rounds to 1. In single
+    precision: ``c = 2^e m`` with ``m`` between the roots of 1/2 and 2, and a polynomial in
+    ``m - 1``, which is ``-(1 - c)`` itself where ``e = 0``. Otherwise ``log1p`` after Kahan:
+    ``log(w) x / (w - 1)`` with ``w`` the rounded ``1 + x``, in which the rounding cancels.
+    """
+    if _is_single(value):
+        bits = dr.reinterpret_array(dr.int32_array_t(type(value)), dr.detach(value))
+        exponent = (bits - _BITS_OF_ROOT_HALF) >> 23
+        to_mantissa = dr.reinterpret_array(type(value), (127 - exponent) << 23)
+        rest = dr.select(exponent == 0, -complement, dr.fma(value, to_mantissa, -1))
+        return dr.fma(rest, _polynomial(rest, _LOG2), type(value)(exponent))
+    rounded = 1 - complement
+    is_far, is_same = complement > 0.5, rounded == 1
+    quotient = dr.select(is_far | is_same, 1, complement / dr.select(is_same, 1, 1 - rounded))
+    logarithm = dr.log2(dr.select(is_far, value, rounded)) * quotient
+    return dr.select(is_same, -complement / _LN_2, logarithm)
+
+
+def exp2(x):
+    """Return ``2^x`` for ``x <= 0``, 0 where that is below the smallest normal float.
+
+    Within two rounding steps. In single precision: ``2^i 2^f`` with a polynomial in
+    ``|f| <= 1/2``; ``i`` is found by adding 1.5 * 2^23, which leaves it in the lowest bits.
+    """
+    if not _is_single(x):
+        return dr.exp2(x)
+    x = at_least(x, -127)
+    shifted = dr.detach(x) + _ROUNDER
+    bits = dr.reinterpret_array(dr.int32_array_t(type(x)), shifted)
+    scale = dr.reinterpret_array(type(x), (bits + 127) << 23)
+    return _polynomial(x - (shifted - _ROUNDER), _EXP2) * scale
+
+
+def one_less_exp2(x):
+    """Return ``1 - 2^-x`` for ``x >= 0``, accurate relative to the result where ``x`` is small.
+
+    Below ``x = 1/2`` by the series of the exponential function, whose next term is under 1e-9 of
+    it.
+    """
+    y = x * _LN_2
+    series = y * _polynomial(-y, [1 / factorial(k) for k in range(1, 9)])
+    return dr.select(x < 0.5, series, 1 - exp2(-x))
+
+
+def scaled(vector):
+    """Return a vector over a power of two near its length, that power's inverse, and its square.
+
+    The square of what is returned lies between 1/8 and 8, or for lengths at the ends of the type's
+    range well within it; for the zero vector it is 0.
+    """
+    square = dr.squared_norm(vector)
+    inverse = _inverse_root_power(dr.detach(square))
+    vector = vector * inverse
+    return vector, inverse, dr.squared_norm(vector)
+
+
+def inverse_root(square):
+    """Return ``1 / sqrt(square)``, finite where ``square`` is 0."""
+    return dr.rsqrt(at_least(square, smallest(square)))
+
+
+def at_least(value, low):
+    """Return the larger of two, and NaN for NaN.
+
+    This form is one instruction; ``dr.maximum`` is four, because it tells -0 from 0.
+    """
+    return dr.select(value < low, low, value)
+
+
+def at_most(value, high):
+    """Return the smaller of two, and NaN for NaN."""
+    return dr.select(value > high, high, value)
+
+
+def is_number(value, number):
+    """Tell whether a value is a plain number and that number; Dr.Jit arrays are not looked at."""
+    return isinstance(value, Real) and value == number
+
+
+def epsilon(value):
+    """Return the rounding step at 1 of a value's type."""
+    return 2 * dr.epsilon(value) if dr.is_array_v(value) else sys.float_info.epsilon
+
+
+def smallest(value):
+    """Return the smallest normal float of a value's type."""
+    return dr.smallest(value) if dr.is_array_v(value) else sys.float_info.min
+
+
+def largest(value):
+    """Return the largest float of a value's type."""
+    return dr.largest(value) if dr.is_array_v(value) else sys.float_info.max
+
+
+def wide(value):
+    """Return a Dr.Jit array of single precision in double precision; anything else as it is."""
+    return dr.float64_array_t(type(value))(value) if dr.is_array_v(value) else value
+
+
+def wide_unit(vector):
+    """Return a vector in double precision with length 1 to 1e-13, and zero for zero."""
+    scaled_vector, _, square = scaled(vector)
+    root = inverse_root(square)
+    if not _is_single(vector):
+        return scaled_vector * root
+    vector = wide(scaled_vector)
+    return vector * refined_inverse(dr.squared_norm(vector), wide(root))
+
+
+def refined_inverse(square, estimate):
+    """Return ``1 / sqrt(square)`` in double precision, from an estimate that is right to 1e-7.
+
+    One step of Newton: half the time of a root in double precision, and wrong by 1e-13.
+    """
+    return estimate * dr.fma(-0.5 * square * estimate, estimate, 1.5)
+
+
+def add(total, lost, term):
+    """Return ``total + term``, and with ``lost`` added what the sum's rounding took away.
+
+    The pair ``total, lost`` stands for ``total + lost`` (Neumaier). Start with ``0, 0``.
+    """
+    result = total + term
+    back = result - total
+    # Knuth's exact form, which needs to know nothing of which of the two is larger.
+    return result, lost + ((total - (result - back)) + (term - back))
+
+
+def summed(total, lost):
+    """Return ``total + lost``; what was lost of a sum beyond the type's range is no number."""
+    return total + dr.select(dr.isfinite(lost), lost, 0)
+
+
+def inverse_of_power(power_of_two):
+    """Return the inverse of a power of two, without a division."""
+    if not _is_single(power_of_two):
+        return 1 / power_of_two
+    bits = dr.reinterpret_array(dr.uint32_array_t(type(power_of_two)), power_of_two)
+    return dr.reinterpret_array(type(power_of_two), 0x7F000000 - bits)
+
+
+def _is_single(value):
+    return dr.is_jit_v(value) and dr.itemsize_v(value) == 4
+
+
+def _inverse_root_power(square):
+    """Return a power of two near ``1 / sqrt(square)``, by halving the bits of the exponent.
+
+    Any power of two will do, so that the bits of an overflown or vanished square are no special
+    case: the result is then 2^-65 or 2^63 in single precision.
+    """
+    if not dr.is_jit_v(square):
+        usable = 0 < square < inf
+        return 2.0 ** (-round(log2(square) / 2)) if usable else 2.0 ** (-513 if square else 511)
+    if _is_single(square):
+        integer, magic, mask = dr.uint32_array_t(type(square)), 0x5F3759DF, 0x7F800000
+    else:
+        integer, magic = dr.uint64_array_t(type(square)), 0x5FE6EB50C7B537A9
+        mask = 0x7FF0000000000000
+    bits = dr.reinterpret_array(integer, square)
+    return dr.reinterpret_array(type(square), (integer(magic) - (bits >> 1)) & mask)
+
+
+def _polynomial(x, coefficients):
+    """Return ``c0 + c1 x + c2 x^2 + ...`` by Horner's scheme."""
+    value = type(x)(coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        value = dr.fma(value, x, coefficient)
+    return value
+
+
+_LN_2 = 0.6931471805599453
+_BITS_OF_ROOT_HALF = 0x3F3504F3
+_ROUNDER = 1.5 * 2**23
+_LOG2 = (
+    1.4426950035679829,
+    -0.7213474682495625,
+    0.48091075345941775,
+    -0.3606932681354823,
+    0.28790326092464336,
+    -0.23916988139705947,
+    0.21607822551507405,
+    -0.20586188053941054,
+    0.12310968473049777,
+)
+_EXP2 = (
+    1.0,
+    0.6931471880262287,
+    0.24022650760568084,
+    0.05550357114218973,
+    0.009618082557286611,
+    0.0013390863364733119,
+    0.00015453162942006833,
+)
+"""Interpolations at Chebyshev's nodes: of ``log2(1 + f) / f`` between the root of 1/2 less 1 and
+that of 2 less 1, within 3e-8, and of ``2^f`` on ``|f| <= 1/2``, within 6e-9."""

@@ -1,0 +1,69 @@
+"""The report's section on hard cases, out of the record that `comparisons.hard_record` makes."""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from comparisons.furnace import ANGLES
+from comparisons.hard_record import HardCases
+from reports import images
+
+#: Groups of cases in the order of the page.
+GROUPS = {
+    "exponents": "Exponents",
+    "geometry": "Geometry",
+    "lights": "Lights",
+    "shading": "Shading",
+    "colour": "Colour",
+}
+
+
+def view(record: HardCases) -> dict[str, Any]:
+    """What the template ``hard_cases.html.j2`` shows.
+
+    groups
+        Each with its ``title`` and ``rows``: case, hard, naive, ours, bound and holds. An error
+        that is infinite stands as None, and is printed as the NaN or infinity that it is.
+    pictures
+        Each with its ``title`` and the two images as data URIs.
+    furnaces, angles
+        The models' albedo under light from each angle, and their asymmetry.
+    """
+    return {
+        "groups": [
+            {"title": title, "rows": [_row(o) for o in record.outcomes if o.case.group == group]}
+            for group, title in GROUPS.items()
+        ],
+        "pictures": [
+            {"title": picture.title, "naive": _uri(picture.naive), "ours": _uri(picture.ours)}
+            for picture in record.pictures
+        ],
+        "furnaces": record.furnaces,
+        "angles": ANGLES,
+    }
+
+
+def _row(outcome):
+    return {
+        "case": outcome.case.name,
+        "hard": outcome.case.hard,
+        "naive": _finite(outcome.naive_error),
+        "ours": _finite(outcome.our_error),
+        "bound": outcome.case.bound,
+        "holds": outcome.holds,
+    }
+
+
+def _finite(value):
+    return value if math.isfinite(value) else None
+
+
+def _uri(image):
+    grey = np.repeat(np.nan_to_num(np.float32(image))[..., None], 3, axis=2)
+    picture = images.tonemap(grey).resize((320, 320), Image.Resampling.NEAREST)
+    return "data:image/png;base64," + base64.b64encode(images.png(picture)).decode("ascii")

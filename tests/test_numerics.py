@@ -1,0 +1,219 @@
+"""Powers, lengths and sums in single precision: properties, gradients, and an oracle by mpmath."""
+
+import drjit as dr
+import drjit.llvm.ad
+import drjit.scalar
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import heuristic
+from heuristic import lighting, lobes, numerics, terms, vectors
+from tests import checks, oracle
+
+Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
+Array3f, Array3f64 = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
+FLOATS = pytest.mark.parametrize("float_type", [Single, Double], ids=["single", "double"])
+
+bounded = settings(max_examples=150, deadline=None)
+singles = st.floats(width=32, allow_nan=False, allow_infinity=False)
+cosines = st.one_of(
+    st.floats(-1, 1, width=32), st.floats(0.9375, 1, width=32), st.floats(0, 2**-20, width=32)
+)
+exponents = st.one_of(st.floats(1e-3, 1e7), st.sampled_from([0.0, 1.0, 2.0, 1e5, 1e6]))
+vectors_of_any_size = st.tuples(singles, singles, singles)
+SMALLEST = 2.0**-126
+
+
+@bounded
+@given(cosines, exponents)
+def test_powers_are_those_of_50_digits(cosine, n):
+    found = terms.power(Single(cosine), Single(n))[0]
+    if cosine < SMALLEST:
+        assert found == 0
+        return
+    with mpmath.workdps(50):
+        expected = mpmath.mpf(cosine) ** mpmath.mpf(float(np.float32(n)))
+    if expected > 1e-3:
+        assert abs(found - expected) <= 2e-4 * expected
+    assert 0 <= found <= 1
+
+
+@bounded
+@given(st.floats(0, 1), st.floats(0, 1), exponents)
+def test_a_lobe_never_rises_away_from_its_axis(a, b, n):
+    near, far = (terms.power(Single(c), Single(n))[0] for c in (max(a, b), min(a, b)))
+    assert far <= near * (1 + 4e-6)
+
+
+@FLOATS
+@pytest.mark.parametrize("n", [1e3, 1e5, 1e6, 1e7])
+def test_the_complement_carries_what_the_cosine_rounds_away(float_type, n):
+    """Angles of a highlight, whose cosines all round to 1 in the end."""
+    angle = np.linspace(0, np.sqrt(2 * np.log(1e3) / n), 200)
+    complement = 2 * np.sin(angle / 2) ** 2
+    cosine = numerics.Cosine(float_type(1 - complement), float_type(complement))
+    found = np.array(terms.power(cosine, dr.opaque(float_type, n)), float)
+    expected = np.exp(n * np.log1p(-complement))
+    np.testing.assert_allclose(found, expected, rtol=5e-6 if float_type is Single else 1e-12)
+    rounded = np.float32(1 - complement).astype(float) ** n
+    if n >= 1e5:
+        assert np.abs(rounded / expected - 1).max() > 1e-3, "without it the highlight is wrong"
+
+
+@bounded
+@given(vectors_of_any_size)
+def test_unit_vectors_have_unit_length_or_none(components):
+    components = tuple(float(np.float32(c)) for c in components)
+    length = np.sqrt(np.sum(np.square(components)))
+    found = np.array(vectors.normalise(Array3f(*components)), float)[:, 0]
+    wide = np.array(numerics.wide_unit(Array3f(*components)), float)[:, 0]
+    assume(length == 0 or length > 16 * SMALLEST)
+    if length == 0:
+        assert not found.any()
+        assert not wide.any()
+        return
+    np.testing.assert_allclose(found, np.array(components) / length, atol=4e-7)
+    assert abs(np.linalg.norm(wide) - 1) < 1e-12
+
+
+@bounded
+@given(vectors_of_any_size, vectors_of_any_size)
+def test_directions_are_opposite_from_the_other_end(a, b):
+    toward, there = vectors.light_vector(Array3f(*a), Array3f(*b))
+    back, again = vectors.light_vector(Array3f(*b), Array3f(*a))
+    np.testing.assert_array_equal(np.array(toward), -np.array(back))
+    np.testing.assert_array_equal(np.array(there), np.array(again))
+    assert np.isfinite(np.array(toward)).all()
+    assert np.isfinite(np.array(there)).all()
+
+
+@bounded
+@given(st.lists(st.floats(-(2.0**90), 2.0**90, width=32), min_size=1, max_size=60))
+def test_sums_lose_next_to_nothing(values):
+    total, lost = Single(0), Single(0)
+    for value in values:
+        total, lost = numerics.add(total, lost, Single(value))
+    found = numerics.summed(total, lost)[0]
+    exact = float(mpmath.fsum(map(mpmath.mpf, values)))
+    size = float(np.abs(values).sum())
+    assert abs(found - exact) <= 2.0**-23 * abs(exact) + 2.0**-40 * size + 2.0**-120
+
+
+def test_a_sum_beyond_the_range_is_infinite_and_no_nan():
+    total, lost = Single(3e38), Single(0)
+    total, lost = numerics.add(total, lost, Single(3e38))
+    assert numerics.summed(total, lost)[0] == np.inf
+
+
+@pytest.mark.parametrize("count", [3 * lighting.BLOCK + 5, 3000])
+@pytest.mark.parametrize("spread", [0, 4, 30])
+def test_many_lights_of_mixed_magnitude_add_up_to_a_millionth(count, spread):
+    """Terms of up to 60 decades, in blocks as they are summed."""
+    rng = np.random.default_rng(count + spread)
+    points = checks.random_points(100, seed=4)
+    lights = [
+        oracle.Light(
+            "point",
+            float(np.float32(10.0 ** rng.uniform(-spread, spread))),
+            tuple(map(float, np.float32(rng.normal(size=3) * 4))),
+        )
+        for _ in range(count)
+    ]
+    arrays = (points.position, points.normal, points.view)
+    arrays = tuple(a.astype(float) for a in arrays)
+    expected = oracle.shade(*arrays, oracle.Material(k_d=0.5), lights)
+    found = heuristic.shade(
+        *(Array3f(a.T) for a in arrays),
+        heuristic.Material(k_d=0.5),
+        list(map(checks.kernel_light, lights)),
+    )
+    largest = max(light.intensity for light in lights)
+    oracle.require_close(checks.as_rows(found), expected, relative=1e-6, absolute=2e-7 * largest)
+
+
+@bounded
+@given(st.floats(0, 40))
+def test_one_less_a_power_of_two_keeps_its_digits(x):
+    found = numerics.one_less_exp2(Single(x))[0]
+    expected = -np.expm1(-float(np.float32(x)) * np.log(2))
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-38)
+
+
+# --- Gradients -------------------------------------------------------------------------------
+
+PLACES = [(0.0, 0.0, 1.0), (0.0, 0.0, 1e-12), (0.0, 0.0, 1e12), (1.0, 0.0, 1e-7), (0.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("is_moderate", [False, True])
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 9.0, 1e6])
+@pytest.mark.parametrize("place", PLACES, ids=str)
+def test_gradients_are_finite_wherever_the_value_is(place, n, form, is_moderate):
+    """On the axis of the lobe, on the light, at the horizon, by every argument."""
+    position, normal, view = Array3f(0, 0, 0), Array3f(0, 0, 1), Array3f(0, 0, 1)
+    light, intensity, exponent = Array3f(*place), Single(0.5), Single(n)
+    arguments = (position, normal, view, light, intensity, exponent)
+    dr.enable_grad(arguments)
+    material = heuristic.Material(
+        k_d=0.5, k_s=0.5, n=exponent, form=form, n_is_moderate=is_moderate
+    )
+    lights = [
+        heuristic.PointLight(light, intensity, (1.0, 0.5, 0.25)),
+        heuristic.SpotLight(light, (0, 0, -1), intensity, 30.0, exponent),
+    ]
+    value = heuristic.shade(position, normal, view, material, lights)
+    assert dr.all(dr.isfinite(value))
+    dr.backward(value, flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+    for argument in arguments:
+        assert np.isfinite(np.array(dr.grad(argument))).all()
+
+
+@pytest.mark.parametrize("n", [0.7, 9.0, 1e4, 1e6])
+def test_derivatives_of_the_lobe_are_those_of_differences(n):
+    """By the view, in a highlight, against the kernel in double precision."""
+    view = np.array([0.6 / np.sqrt(n), 0.0, 1.0])
+    light, step = [heuristic.PointLight((0, 0, 2), 1.0)], 1e-6 / np.sqrt(n)
+
+    def at(vector_type, x):
+        material = heuristic.Material(k_s=1, n=vector_type(n, n, n).x)
+        return heuristic.shade(
+            vector_type(0), vector_type(0, 0, 1), vector_type(x, 0, 1), material, light
+        )
+
+    expected = (
+        at(Array3f64, float(view[0] + step))[0] - at(Array3f64, float(view[0] - step))[0]
+    ) / (2 * step)
+    x = Single(float(view[0]))
+    dr.enable_grad(x)
+    dr.backward(at(Array3f, x))
+    assert dr.grad(x)[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_moderate_exponents_are_those_whose_error_stays_within_the_bound():
+    low, high = numerics.MODERATE_EXPONENTS
+    assert 3 * high * 2.0**-24 < 2e-4
+    assert [numerics.is_moderate(n) for n in (low, high, low - 1, high + 1, 9.5)] == [
+        True, True, False, False, True
+    ]  # fmt: skip
+    assert not numerics.is_moderate(Single(9))
+    assert heuristic.Material(n=9).n_is_moderate
+    assert not heuristic.Material(n=1e6).n_is_moderate
+
+
+def test_the_lobe_between_local_directions_is_that_in_space():
+    """For directions that are not quite of unit length, as renderers have them."""
+    rng = np.random.default_rng(0)
+    wi, wo = np.abs(rng.normal(size=(2, 3, 100)))
+    for form in ("phong", "blinn"):
+        for is_moderate in (False, True):
+            cosine = lobes.local_lobe(form, is_moderate, Array3f(wi), Array3f(wo))
+            cosine = cosine if is_moderate else cosine.value
+            a, b = wi / np.linalg.norm(wi, axis=0), wo / np.linalg.norm(wo, axis=0)
+            half = a + b
+            expected = (a * [[-1], [-1], [1]] * b).sum(axis=0)
+            if form == "blinn":
+                expected = half[2] / np.linalg.norm(half, axis=0)
+            np.testing.assert_allclose(np.array(cosine), expected, atol=5e-7)
