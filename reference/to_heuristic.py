@@ -115,6 +115,7 @@ def _area_to_heuristic(graph, geometry, hide_emitters):
             else:
                 _glow(graph, shape, radiance)
             derived, record = _area_light(graph, shape, index, radiance, geometry())
+            derived.set_id(f"light of {graph.label(shape)}")
             light = graph.add(EMITTER, derived)
             graph.attach(0, f"light_of_{shape}", light)
             records.append(record)
