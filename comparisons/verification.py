@@ -15,8 +15,9 @@ from reference import halves
 from reference.gbuffer import gbuffer
 from reference.rendering import Accumulator, Renderer
 
-OUTLIERS = 0.001
-"""Share of pixels of largest variance that the noise of a side is measured without."""
+PASSES_WITH_PATHS = 4
+"""Times as many passes where paths are sampled: their variance is itself hard to measure, since few
+paths carry most of it."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Verification:
     planned_s, everything_s
         Time of a pass, median.
     planned_noise, everything_noise
-        Root mean square standard error of one pass over the pixels, less outliers.
+        Root mean square standard error of one pass over the pixels.
     gain
         ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
         planned reference reaches the same noise.
@@ -85,6 +86,8 @@ def verify(source, options=None, progress=None):
     options = options or Options()
     sides = [prepare(source, replace(options, everything=choice)) for choice in (False, True)]
     passes = max(side.passes for side in sides)
+    if sides[0].plan.max_depth != 2:
+        passes *= PASSES_WITH_PATHS
     sums = [Accumulator() for _ in sides]
     for number in range(passes):
         if progress:
@@ -122,8 +125,10 @@ def _summarise(name, sides, estimates, kernel_difference):
         magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
     )
     times = [side.reference.pass_times().median for side in sides]
-    noises = _noises([estimate.standard_error[counted] for estimate in estimates])
-    noises = [noise * np.sqrt(estimates[0].passes) for noise in noises]
+    noises = [
+        float(np.sqrt(np.mean(estimate.standard_error[counted] ** 2) * estimate.passes))
+        for estimate in estimates
+    ]
     # A plan without any noise left would divide by zero; below rounding there is nothing to gain.
     costs = [time * max(noise, 1e-7) ** 2 for time, noise in zip(times, noises, strict=True)]
     gain = costs[1] / costs[0]
@@ -144,18 +149,6 @@ def _summarise(name, sides, estimates, kernel_difference):
         planning_s=sides[0].planning_seconds,
         saved_s=planned_total * (gain - 1),
     )
-
-
-def _noises(errors):
-    """Return the root mean square of each side's standard errors, (M, 3), outliers left out.
-
-    A pixel with a firefly has nearly all of the variance of an image, and which side it fell to is
-    chance; those in the top :data:`OUTLIERS` of either side do not count for either.
-    """
-    variances = [np.mean(error**2, axis=-1) for error in errors]
-    limits = [np.quantile(v, 1 - OUTLIERS) if v.size else 0.0 for v in variances]
-    kept = np.logical_and(*(v <= limit for v, limit in zip(variances, limits, strict=True)))
-    return [float(np.sqrt(v[kept].mean())) if kept.any() else 0.0 for v in variances]
 
 
 def _word(plan):
