@@ -15,7 +15,7 @@ from comparisons.significance import significance
 from reference import halves
 from reference.gbuffer import gbuffer
 from reference.halves import Pair
-from reference.plan import Plan, plan
+from reference.plan import Plan, plan, sampler
 from reference.rendering import Accumulator, Estimate, Renderer, physical_integrator, variant
 
 LEVEL = 0.01
@@ -47,15 +47,11 @@ def prepare(source, options=None):
     """
     options = options or Options()
     pair = _pair(source, options)
-    physical = pair.physical.instantiate()
+    physical = halves.with_sampler(pair.physical, sampler(options.everything)).instantiate()
     begin = perf_counter()
     chosen = plan(pair, physical, options.interpolation, options.everything)
-    planning = perf_counter() - begin
-    # The sampler is part of the plan, and a scene is made with its sampler.
-    physical = halves.with_sampler(pair.physical, chosen.sampler).instantiate()
-    begin = perf_counter()
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
-    planning += perf_counter() - begin
+    planning = perf_counter() - begin
     passes, spp = _passes(options.spp or chosen.spp, chosen.passes)
     return Prepared(
         pair=pair,

@@ -60,11 +60,6 @@ def view_vector(viewer_position, position):
     return light_vector(viewer_position, position)[0]
 
 
-def half_vector(direction, view):
-    """Return ``H = (L + V) / |L + V|`` (Blinn 1977), zero where ``L`` and ``V`` are opposite."""
-    return normalise(direction + view)
-
-
 def mirror_vector(normal, direction, cosine):
     """Equations 6.28-6.31: ``R = 2 (L.N) N - L``, the mirror image of ``L`` about ``N``.
 

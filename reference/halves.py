@@ -97,7 +97,7 @@ def pair(
     given_physical = bsdfs.to_heuristic(heuristic, convention)
     lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    _set_integrator(heuristic, ambient, settings.hide_emitters, interpolation, prune)
+    _set_integrator(heuristic, ambient, settings, interpolation, prune)
     if interpolation is not Interpolation.PHONG or tessellation is not None:
         meshing.replace_shapes(
             heuristic, geometry(), tessellation or meshes.RESOLUTION, interpolation
@@ -129,9 +129,10 @@ def pair(
 class _Settings:
     """What the scene's own integrator asks for."""
 
-    ambient: object
-    hide_emitters: bool
-    max_depth: int
+    ambient: object = None
+    hide_emitters: bool = False
+    max_depth: int = -1
+    occlusion: bool = False
 
 
 def with_sampler(graph, plugin):
@@ -180,25 +181,29 @@ def _prepare_film(graph, sensor, resolution):
 
 def _integrator_settings(graph):
     """Read the scene's integrator, and take it out: each half gets its own."""
-    settings = _Settings(None, False, -1)
+    settings = _Settings()
     for index in graph.nodes(INTEGRATOR):
         props = graph.props(index)
         hidden = props.get("hide_emitters", None)
         if graph.plugin(index) == "heuristic":
             ambient = props.get("ambient", None)
             # The chapters' background is black, though their ambient light fills the room.
-            settings = _Settings(ambient, ambient is not None if hidden is None else hidden, -1)
+            settings = _Settings(
+                ambient=ambient,
+                hide_emitters=ambient is not None if hidden is None else hidden,
+                occlusion=props.get("occlusion", False),
+            )
         else:
-            depth = props.get("max_depth", -1)
-            settings = _Settings(None, bool(hidden), depth)
+            settings = _Settings(hide_emitters=bool(hidden), max_depth=props.get("max_depth", -1))
         graph.remove(index)
     return settings
 
 
-def _set_integrator(graph, ambient, hide_emitters, interpolation, prune):
+def _set_integrator(graph, ambient, settings, interpolation, prune):
     props = properties(
         "heuristic",
-        hide_emitters=hide_emitters,
+        hide_emitters=settings.hide_emitters,
+        occlusion=settings.occlusion,
         interpolation=interpolation.value,
         prune=prune,
     )
@@ -231,11 +236,10 @@ def _add_environment(physical, graph, ambient, convention):
 def _ambient_ratio(graph):
     """Return ``k_a / k_d`` for each channel by least squares, and whether it fits all materials."""
     pairs = []
-    for index in graph.nodes(BSDF):
-        if graph.plugin(index) == "phong":
-            k_a, k_d = (values.colour(graph, index, key, 0.0) for key in ("k_a", "k_d"))
-            # Without a diffuse part the reflectance is k_a itself.
-            pairs.append((k_a, k_d if any(k_d) or any(_specular(graph, index)) else k_a))
+    for index in _phongs(graph):
+        k_a, k_d = (values.colour(graph, index, key, 0.0) for key in ("k_a", "k_d"))
+        # Without a diffuse part the reflectance is k_a itself.
+        pairs.append((k_a, k_d if any(k_d) or any(_specular(graph, index)) else k_a))
     ratio = []
     for channel in range(3):
         weight = sum(k_d[channel] ** 2 for _, k_d in pairs)

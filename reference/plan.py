@@ -79,6 +79,11 @@ class Plan:
         return next(d.called_for for d in self.decisions if d.effect is effect)
 
 
+def sampler(everything=False):
+    """Return the sampler of a plan; it is known before the scene is, which is made with it."""
+    return STOCK_SAMPLER if everything else SAMPLER
+
+
 def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     """Decide on each effect, and choose the reference.
 
@@ -97,7 +102,7 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     if everything:
         decisions = tuple(Decision(effect, True, "asked", "--everything") for effect in Effect)
         terms = ("k_i", "k_a", "k_d", "k_s")
-        return Plan(decisions, terms, "path", pair.max_depth, STOCK_SAMPLER, SPP, PASSES)
+        return Plan(decisions, terms, "path", pair.max_depth, sampler(True), SPP, PASSES)
     structure = examine(pair.physical, scene)
     occlusion, interreflection = rules.occlusion(structure), rules.interreflection(structure)
     decisions = _decisions(pair, structure, interpolation, occlusion, interreflection)

@@ -50,8 +50,6 @@ class ShapeFacts:
         Whether its BSDF can reflect anything.
     opaque
         Whether its BSDF only reflects; a light that comes through is beyond these rules.
-    emits
-        Whether it carries an emitter.
     """
 
     name: str
@@ -61,7 +59,6 @@ class ShapeFacts:
     plane: tuple | None
     reflects: bool
     opaque: bool
-    emits: bool
 
     def corners(self):
         """Return the corners of the bounding box, (8, 3)."""
@@ -100,11 +97,6 @@ class Structure:
     lights: tuple[LightFacts, ...]
     cameras: tuple[np.ndarray, ...]
 
-    @property
-    def is_deterministic(self):
-        """Whether all lights are points or directions, which need no random numbers."""
-        return all(light.kind in ("point", "spot", "directional") for light in self.lights)
-
 
 def examine(graph, scene):
     """Return the :class:`Structure` of a physical half: its graph, and the same instantiated."""
@@ -127,7 +119,6 @@ def _shape_facts(graph, index, shape):
         plane=plane,
         reflects=reflects,
         opaque=bool(plugins) and all(plugin in OPAQUE for plugin in plugins),
-        emits=shape.is_emitter(),
     )
 
 

@@ -370,3 +370,10 @@ def test_a_scene_without_a_camera_is_refused(rgb):
     del description["sensor"]
     with pytest.raises(InputError, match="no sensor"):
         halves.pair(Source("a test", description))
+
+
+@pytest.mark.parametrize("occlusion", [False, True])
+def test_the_heuristic_keeps_the_shadows_that_its_scene_asks_for(rgb, occlusion):
+    phong = {"type": "phong", "k_d": 0.5}
+    pair = pair_of(phong, integrator={"type": "heuristic", "occlusion": occlusion})
+    assert pair.heuristic.instantiate().integrator().occlusion is occlusion
