@@ -25,6 +25,18 @@ class Resolution(click.ParamType):
         return int(width), int(height)
 
 
+def output_option(default):
+    """Return the option for the folder of the results."""
+    return click.option(
+        "-o",
+        "--output",
+        default=default,
+        show_default=True,
+        type=click.Path(path_type=Path),
+        help="Folder for the results.",
+    )
+
+
 def rendering_options(command):
     """Add the options that all commands which render have in common."""
     options = (

@@ -1,0 +1,44 @@
+"""``fotismos plan``: which effects a scene calls for."""
+
+import json
+
+import click
+
+from reports import jobs
+
+
+@click.command()
+@click.argument("scene", metavar="SCENE")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
+@jobs.rendering_options
+def plan(scene, as_json, verify, **rendering):
+    """Say which effects a scene calls for, by which rule, and what will be simulated.
+
+    \b
+    Examples:
+      fotismos plan cornell-box
+      fotismos plan --verify fig-8-9 --resolution 128x128
+    """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.check_installation()
+    from reference.scene import set_variant
+    from reports import planning, progress
+
+    source, chosen = jobs.job(scene, rendering)
+    set_variant(chosen["variant"])
+    options = jobs.options(chosen)
+    if verify:
+        from comparisons.verification import verify as run
+
+        with progress.shown() as bar:
+            data = run(source, options, bar.of(source.name)).data()
+        lines = planning.verification_lines([data])
+    else:
+        from comparisons.compare import prepare
+
+        data = planning.data(source.name, prepare(source, options), chosen["variant"])
+        lines = planning.lines(data)
+    if as_json:
+        lines = [json.dumps(data, indent=2, ensure_ascii=False)]
+    for line in lines:
+        click.echo(line)
