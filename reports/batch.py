@@ -12,8 +12,8 @@ START = perf_counter()
 def run(names, folder, rendering, equations=(), verifications=(), with_hard_cases=False):
     """Compare scenes and write the results of each, then the page of all."""
     jobs.check_installation()
-    from comparisons import hard_record
     from comparisons.compare import compare
+    from comparisons.hard import record
     from reference.scene import set_variant
     from reports import hard_cases, output, progress
 
@@ -33,7 +33,7 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
-    shown = hard_cases.view(hard_record.collect()) if with_hard_cases else None
+    shown = hard_cases.view(record.collect()) if with_hard_cases else None
     output.write_page(folder, list(views.values()), equations, verifications, shown)
     share = (perf_counter() - begin) / len(views)
     for name, view in views.items():

@@ -1,4 +1,4 @@
-"""The report's section on hard cases, out of the record that `comparisons.hard_record` makes."""
+"""The report's section on hard cases, out of the record that `comparisons.hard.record` makes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from comparisons.furnace import ANGLES
-from comparisons.hard_record import HardCases
+from comparisons.hard.furnace import ANGLES
+from comparisons.hard.record import HardCases
 from reports import images
 
 #: Groups of cases in the order of the page.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons import furnace
+from comparisons.hard import furnace
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from comparisons import hard_cases, hard_surfaces
-from comparisons.hard_cases import evaluate
+from comparisons.hard import catalogue
+from comparisons.hard.cases import error, evaluate
 
-CASES = {case.name: case for case in (*hard_cases.CASES, *hard_surfaces.CASES)}
+CASES = {case.name: case for case in catalogue.CASES}
 GROUPS = {"exponents", "geometry", "lights", "shading", "colour"}
 ALL = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
@@ -29,7 +29,7 @@ def test_ours_keeps_the_bound(outcomes, case):
 
 
 def test_the_cases_are_told_apart_and_explained():
-    assert len(CASES) == len(hard_cases.CASES) + len(hard_surfaces.CASES)
+    assert len(CASES) == len(catalogue.CASES)
     assert {case.group for case in CASES.values()} == GROUPS
     for case in CASES.values():
         assert case.hard.endswith(".")
@@ -39,9 +39,9 @@ def test_the_cases_are_told_apart_and_explained():
 @pytest.mark.parametrize("found", [np.nan, np.inf, 1.0])
 def test_light_where_there_is_none_is_an_infinite_error(found):
     nothing = np.zeros(3, np.longdouble)
-    assert hard_cases.error([0, 0, found], nothing) == np.inf
-    assert hard_cases.error([0, 0, 0], nothing) == 0
-    assert hard_cases.error([2.0, 0, 0], np.array([1, 0, 0], np.longdouble)) == 1
+    assert error([0, 0, found], nothing) == np.inf
+    assert error([0, 0, 0], nothing) == 0
+    assert error([2.0, 0, 0], np.array([1, 0, 0], np.longdouble)) == 1
 
 
 # --- An oracle of 50 digits ------------------------------------------------------------------

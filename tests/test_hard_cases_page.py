@@ -5,17 +5,19 @@ import re
 import numpy as np
 import pytest
 
-from comparisons import hard_cases, hard_record
-from comparisons.furnace import Furnace
-from comparisons.hard_record import HardCases, Picture
+from comparisons.hard import record as hard_record
+from comparisons.hard.cases import Outcome, evaluate
+from comparisons.hard.catalogue import CASES
+from comparisons.hard.furnace import Furnace
+from comparisons.hard.record import HardCases, Picture
 from reports import hard_cases as section
 from reports import output, page
 
 
 @pytest.fixture
 def record():
-    outcomes = tuple(hard_cases.evaluate(case) for case in hard_cases.CASES[:3])
-    lost = hard_cases.Outcome(hard_cases.CASES[4], np.inf, 0.5)
+    outcomes = tuple(evaluate(case) for case in CASES[:3])
+    lost = Outcome(CASES[4], np.inf, 0.5)
     picture = Picture("A highlight", np.full((4, 4), np.nan), np.ones((4, 4)))
     return HardCases((*outcomes, lost), (picture,), (Furnace("a < model", (1.2, 1, 0.5), 0.25),))
 
@@ -36,11 +38,7 @@ def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
 
 
 def test_all_groups_of_the_catalogue_are_shown():
-    groups = {case.group for case in hard_cases.CASES}
-    from comparisons import hard_surfaces
-
-    groups |= {case.group for case in hard_surfaces.CASES}
-    assert groups == set(section.GROUPS)
+    assert {case.group for case in CASES} == set(section.GROUPS)
 
 
 def test_the_page_is_written_with_its_hard_cases(record, tmp_path):

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons import furnace, hard_cases, hard_surfaces, textbook
-from comparisons.furnace import Furnace
-from comparisons.hard_cases import Outcome, Setting
+from comparisons.hard import furnace, kernel, textbook
+from comparisons.hard.cases import Outcome, evaluate
+from comparisons.hard.catalogue import CASES
+from comparisons.hard.furnace import Furnace
+from comparisons.hard.textbook import Setting
 
 PICTURE = 160
 """Pixels along each side of a picture."""
@@ -32,9 +34,8 @@ class HardCases:
 
 def collect():
     """Evaluate everything, in the current Mitsuba variant; a few seconds."""
-    cases = (*hard_cases.CASES, *hard_surfaces.CASES)
     return HardCases(
-        outcomes=tuple(map(hard_cases.evaluate, cases)),
+        outcomes=tuple(map(evaluate, CASES)),
         pictures=(
             _picture("A highlight of n = 1e6, 0.4 degrees wide", _highlight(1e6, 0.0035)),
             _picture("A highlight of n = 1e7, 0.13 degrees wide", _highlight(1e7, 0.00115)),
@@ -47,7 +48,7 @@ def collect():
 def _picture(title, setting):
     setting = setting.rounded()
     naive = textbook.shade(setting, textbook.NAIVE)
-    images = (naive, hard_cases.by_kernel(setting))
+    images = (naive, kernel.by_kernel(setting))
     return Picture(title, *(image.reshape(PICTURE, PICTURE) for image in images))
 
 
@@ -58,7 +59,7 @@ def _grid(half):
 
 def _highlight(n, half):
     """Return a setting of views in a square about the mirror direction of a light."""
-    base = hard_cases.highlight(n, 1)
+    base = kernel.highlight(n, 1)
     axis = np.array(base.view)[0]
     side = np.cross(axis, (0.3, 0.5, -0.8))
     side /= np.linalg.norm(side)

@@ -5,8 +5,8 @@ import numpy as np
 from drjit.llvm import Array3f, Array3u
 
 import heuristic
-from comparisons import textbook
-from comparisons.hard_cases import HardCase
+from comparisons.hard import textbook
+from comparisons.hard.cases import HardCase
 from comparisons.metrics import log2_luminance_ratio
 from comparisons.spaces import DEFAULT_VIEWING, itp
 from heuristic import interpolation, normals, vertex_normals

@@ -1,78 +1,20 @@
-"""The hard cases: where the textbook's formulas break in single precision.
+"""The hard cases of the kernel at single points: exponents, geometry and lights.
 
-Each is judged alike: the exact value, the naive evaluation in single precision, ours, and a bound
-on the error that ours keeps and the naive one does not. Tests demand both of every case; the
-report prints them. Further cases are in `comparisons.hard_surfaces` (triangles and normals, sums,
-colours).
+Here the naive evaluation is the textbook's formula in single precision.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import drjit as dr
 import numpy as np
 from drjit.llvm import Array3f, Float
 
 import heuristic
-from comparisons import textbook
-from comparisons.textbook import Setting
-
-ABSENT = 1e-3
-"""Values below this share of the largest are judged by their absolute error: the bound of the issue
-of highlights holds where they exceed a thousandth."""
+from comparisons.hard import textbook
+from comparisons.hard.cases import HardCase
+from comparisons.hard.textbook import Setting
 
 POINTS = 2001
-
-
-@dataclass(frozen=True)
-class HardCase:
-    """A case: its name and group, what is hard about it, and the bound on the relative error.
-
-    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
-    """
-
-    name: str
-    group: str
-    hard: str
-    bound: float
-    naive: Callable
-    ours: Callable
-    exact: Callable
-    setting: Setting | None = None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A case and its two errors; infinite for a NaN, an infinity, or light where there is none."""
-
-    case: HardCase
-    naive_error: float
-    our_error: float
-
-    @property
-    def holds(self):
-        """Whether ours keeps the bound."""
-        return self.our_error <= self.case.bound
-
-
-def evaluate(case):
-    """Return the :class:`Outcome` of a case."""
-    exact = np.asarray(case.exact(), np.longdouble)
-    return Outcome(case, error(case.naive(), exact), error(case.ours(), exact))
-
-
-def error(found, exact):
-    """Return the largest error, relative to the exact value or to a thousandth of the largest."""
-    found = np.asarray(found, np.longdouble)
-    if found.shape != exact.shape:
-        raise ValueError(f"shapes {found.shape} and {exact.shape}")
-    if not np.isfinite(found).all():
-        return np.inf
-    scale = np.maximum(np.abs(exact), ABSENT * np.abs(exact).max())
-    difference = np.abs(found - exact)
-    if not scale.all():
-        return np.inf if difference.any() else 0.0
-    return float((difference / scale).max())
 
 
 def by_kernel(setting):

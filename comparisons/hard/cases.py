@@ -1,0 +1,68 @@
+"""What a hard case is, and how it is judged.
+
+A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
+the naive one does not. Tests demand both of every case; the report prints them. The cases
+themselves are in `comparisons.hard.catalogue`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons.hard.textbook import Setting
+
+ABSENT = 1e-3
+"""Values below this share of the largest are judged by their absolute error: the bound of the issue
+of highlights holds where they exceed a thousandth."""
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A case: its name and group, what is hard about it, and the bound on the relative error.
+
+    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
+    """
+
+    name: str
+    group: str
+    hard: str
+    bound: float
+    naive: Callable
+    ours: Callable
+    exact: Callable
+    setting: Setting | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case and its two errors; infinite for a NaN, an infinity, or light where there is none."""
+
+    case: HardCase
+    naive_error: float
+    our_error: float
+
+    @property
+    def holds(self):
+        """Whether ours keeps the bound."""
+        return self.our_error <= self.case.bound
+
+
+def evaluate(case):
+    """Return the :class:`Outcome` of a case."""
+    exact = np.asarray(case.exact(), np.longdouble)
+    return Outcome(case, error(case.naive(), exact), error(case.ours(), exact))
+
+
+def error(found, exact):
+    """Return the largest error, relative to the exact value or to a thousandth of the largest."""
+    found = np.asarray(found, np.longdouble)
+    if found.shape != exact.shape:
+        raise ValueError(f"shapes {found.shape} and {exact.shape}")
+    if not np.isfinite(found).all():
+        return np.inf
+    scale = np.maximum(np.abs(exact), ABSENT * np.abs(exact).max())
+    difference = np.abs(found - exact)
+    if not scale.all():
+        return np.inf if difference.any() else 0.0
+    return float((difference / scale).max())
