@@ -14,6 +14,14 @@ Limit             Where
 ================  ===========================================================================
 
 Masks may overlap. `find` is a function of plain arrays; `of_scene` collects them.
+
+Of which lights the normals may disagree is geometry alone. Points, spots and directional lights
+have one direction. An area light is taken for :data:`LIGHT_GRID` squared points of each of its
+shapes, edges and corners among them, and one is enough; what may fall between them is so near the
+shading normal's horizon that it is dark. Under an environment, which has all
+directions, the normals' hemispheres always differ by a wedge, as soon as the normals do: of light
+from all sides alike it is the share ``(1 - N.N_g) / 2`` of the irradiance, which is lost, and
+counts from :data:`WEDGE_LOST` on.
 """
 
 from dataclasses import dataclass, fields
@@ -27,6 +35,9 @@ from reference.albedo import RoughPlastic, of_roughplastic
 SMALLEST_ALPHA = 1e-4
 LOST = 0.05
 """Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
+WEDGE_LOST = 0.01
+"""That of normals 11.5 degrees apart."""
+LIGHT_GRID = 5
 FIREFLY_SHARE = 0.5
 FIREFLY_CONTRAST = 8.0
 NEIGHBOURHOOD = 5
@@ -53,22 +64,32 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Lights:
+    """Where light comes from: points (N, 3), directions towards it (M, 3), and from all sides."""
+
+    points: np.ndarray
+    directions: np.ndarray
+    surrounding: bool = False
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """What limits depend on, at the first surface on a grid of camera rays.
 
     ``alpha`` (H, W) is infinite and ``albedo`` (H, W) 1 where there is no ``roughplastic``;
     ``albedo`` is that of the same surface under the white furnace: at normal incidence with a
-    reflectance of 1. ``shading`` and ``geometric`` are normals, ``view`` the direction towards the
-    viewer, (H, W, 3); ``lights`` a list of directions towards lights, (H, W, 3) each.
+    reflectance of 1. ``position`` is in world space, ``shading`` and ``geometric`` are normals,
+    ``view`` the direction towards the viewer, (H, W, 3).
     """
 
     hit: np.ndarray
     alpha: np.ndarray
     albedo: np.ndarray
+    position: np.ndarray
     shading: np.ndarray
     geometric: np.ndarray
     view: np.ndarray
-    lights: tuple
+    lights: Lights
 
 
 def find(surfaces, mean, standard_error, counted=None):
@@ -94,12 +115,25 @@ def find(surfaces, mean, standard_error, counted=None):
 
 def terminator(surfaces):
     """Return where shading and geometric normal disagree about a light or the viewer."""
-    mask = np.zeros(surfaces.hit.shape, bool)
-    for direction in (surfaces.view, *surfaces.lights):
-        sides = [np.einsum("...i,...i", n, direction) > 0 for n in (
-            surfaces.shading, surfaces.geometric)]  # fmt: skip
-        mask |= sides[0] != sides[1]
-    return mask & surfaces.hit
+    mask = surfaces.hit & (surfaces.shading != surfaces.geometric).any(axis=-1)
+    position, shading, geometric, view = (
+        getattr(surfaces, name)[mask] for name in ("position", "shading", "geometric", "view")
+    )
+
+    def disagree(direction):
+        sides = [np.einsum("...i,...i", n, direction) > 0 for n in (shading, geometric)]
+        return sides[0] != sides[1]
+
+    lights = surfaces.lights
+    found = disagree(view)
+    for point in lights.points:
+        found |= disagree(point - position)
+    for direction in lights.directions:
+        found |= disagree(np.broadcast_to(direction, shading.shape))
+    if lights.surrounding:
+        found |= (1 - np.einsum("...i,...i", shading, geometric)) / 2 > WEDGE_LOST
+    mask[mask] = found
+    return mask
 
 
 def fireflies(mean, standard_error):
@@ -136,10 +170,9 @@ def of_scene(scene, width, height, sensor=0):
         if found is not None:
             is_here = index == int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
             alpha[is_here], albedo[is_here] = found.alpha, _furnace(found)
-    position = grid(si.p)
-    lights = tuple(np.array(p, float).ravel() - position for p in _positions(scene))
     seen = np.array(hit).reshape(height, width)
-    return Surfaces(seen, alpha, albedo, grid(si.sh_frame.n), grid(si.n), grid(-ray.d), lights)
+    normals = grid(si.sh_frame.n), grid(si.n)
+    return Surfaces(seen, alpha, albedo, grid(si.p), *normals, grid(-ray.d), lights_of(scene))
 
 
 def _roughplastic(bsdf):
@@ -159,13 +192,33 @@ def _furnace(plastic):
     return float((albedo.diffuse + albedo.specular).mean())
 
 
-def _positions(scene):
-    """Return the positions of the lights that are points or spots."""
+def lights_of(scene):
+    """Return the :class:`Lights` of a scene."""
+    points, directions, surrounding = [], [], False
     for emitter in scene.emitters():
-        if not emitter.flags() & +mi.EmitterFlags.DeltaPosition:
-            continue
+        flags = emitter.flags()
         params = mi.traverse(emitter)
-        if "position" in params:
-            yield params["position"]
-        elif "to_world" in params:
-            yield np.array(params["to_world"].matrix)[:3, 3]
+        if flags & +mi.EmitterFlags.DeltaPosition:
+            points.append(_given(params, "position", column=3))
+        elif flags & +mi.EmitterFlags.DeltaDirection:
+            directions.append(-_given(params, "direction", column=2))
+        elif flags & +mi.EmitterFlags.Infinite:
+            surrounding = True
+    for shape in scene.shapes():
+        if shape.is_emitter():
+            points.extend(_points_on(shape))
+    return Lights(np.reshape(points, (-1, 3)), np.reshape(directions, (-1, 3)), surrounding)
+
+
+def _given(params, name, column):
+    """Return a parameter of three numbers, or the column of ``to_world`` that stands for it."""
+    value = params[name] if name in params else params["to_world"].matrix
+    value = np.array(value, float)
+    return value.ravel() if name in params else value[:3, column].ravel()
+
+
+def _points_on(shape):
+    """Return points of a shape, (N, 3), by its own sampling on a grid with its edges."""
+    places = np.linspace(0, 1 - 2**-24, LIGHT_GRID)
+    x, y = (axis.ravel() for axis in np.meshgrid(places, places))
+    return np.array(shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y))).p, float).T

@@ -72,14 +72,15 @@ def _parts(plastic, level):
     if mi.is_spectral:
         si.wavelengths = 550.0  # any will do: all spectra here are uniform
     wo = mi.Vector3f(mi.Float(np.sin(theta)), 0, mi.Float(np.cos(theta)))
-    total = bsdf.eval(mi.BSDFContext(), si, wo)
-    # Which component is diffuse is told by its flags, not by its place.
-    context = mi.BSDFContext()
-    context.type_mask = +mi.BSDFFlags.DiffuseReflection
-    diffuse = bsdf.eval(context, si, wo)
-    dr.eval(total, diffuse)
-    total, diffuse = (weight @ np.atleast_2d(np.array(value[0])).T for value in (total, diffuse))
-    return float(diffuse[0]), float(total[0] - diffuse[0])
+    # Each part by itself: near an IOR of 1 their difference from the whole would be rounding. Which
+    # component is which is told by its flags, not by its place.
+    parts = []
+    for flag in (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection):
+        context = mi.BSDFContext()
+        context.type_mask = +flag
+        parts.append(bsdf.eval(context, si, wo))
+    dr.eval(parts)
+    return tuple(float(weight @ np.array(part[0], float).ravel()) for part in parts)
 
 
 def _nodes(alpha):

@@ -47,6 +47,8 @@ INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
 
 LITERAL_IOR = 1.5
+SMALLEST_IOR = exp(1e-4)
+"""Reflects 2.5e-9 at normal incidence. Less is taken for that: Mitsuba refuses an IOR of 1."""
 LARGEST_IOR = 10.0
 """No dielectric comes near it; a larger specular albedo than it gives is recorded as missed."""
 
@@ -152,20 +154,22 @@ def to_phong(plastic, convention):
 
 
 def _ior_for(plastic, wanted):
-    """Return the IOR at which the specular albedo is ``wanted``, or the largest one allowed.
+    """Return the IOR at which the specular albedo is ``wanted``, or the nearest one allowed.
 
     The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
     1))^2``: its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
     """
 
     def reached(log_ior):
-        int_ior = exp(min(max(log_ior, 1e-4), log(LARGEST_IOR)))
+        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(LARGEST_IOR)))
         return max(albedo.of_roughplastic(replace(plastic, int_ior=int_ior)).specular)
 
     if wanted <= 0:
         return LITERAL_IOR
     if wanted >= reached(log(LARGEST_IOR)):
         return LARGEST_IOR
+    if wanted <= reached(log(SMALLEST_IOR)):
+        return SMALLEST_IOR
     root = min(sqrt(wanted), 0.8)
     guess = log((1 + root) / (1 - root))
     found = root_scalar(
@@ -192,7 +196,10 @@ def _nearest_ior(plastic, wanted, highest):
 
     return exp(
         minimize_scalar(
-            distance, bounds=(1e-4, log(highest)), method="bounded", options={"xatol": 1e-3}
+            distance,
+            bounds=(log(SMALLEST_IOR), log(highest)),
+            method="bounded",
+            options={"xatol": 1e-3},
         ).x
     )
 

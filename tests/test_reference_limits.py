@@ -6,7 +6,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.reference_limits import SMALLEST_ALPHA, Surfaces, find, fireflies, of_scene
+from comparisons.reference_limits import (
+    SMALLEST_ALPHA,
+    WEDGE_LOST,
+    Lights,
+    Surfaces,
+    find,
+    fireflies,
+    lights_of,
+    of_scene,
+)
+from heuristic import meshes
 
 SIDE = 32
 UP = np.broadcast_to([0.0, 0.0, 1.0], (SIDE, SIDE, 3))
@@ -20,10 +30,11 @@ def plain():
         hit=np.ones((SIDE, SIDE), bool),
         alpha=np.full((SIDE, SIDE), np.inf),
         albedo=np.ones((SIDE, SIDE)),
+        position=np.zeros((SIDE, SIDE, 3)),
         shading=UP,
         geometric=UP,
         view=UP,
-        lights=(UP,),
+        lights=Lights(np.empty((0, 3)), UP[0, :1]),
     )
 
 
@@ -46,17 +57,36 @@ def test_alpha_at_mitsubas_smallest_is_clamped_and_above_it_not(plain):
     assert limits.clamped[0, :3].tolist() == [True, True, False]
 
 
-@pytest.mark.parametrize("which", ["view", "light"])
+GRAZING = np.array([-0.96, 0.0, 0.28])
+"""Above the surface, and below for the tilted normal."""
+LIT_FROM = {
+    "point": Lights(10 * GRAZING[None], np.empty((0, 3))),
+    "direction": Lights(np.empty((0, 3)), GRAZING[None]),
+    "all sides": Lights(np.empty((0, 3)), np.empty((0, 3)), surrounding=True),
+}
+
+
+@pytest.mark.parametrize("which", ["view", *LIT_FROM])
 def test_normals_that_disagree_about_light_or_viewer_are_a_terminator(plain, which):
     tilted = UP.copy()
     tilted[4, 5] = 0.8, 0.0, 0.6
     grazing = UP.copy()
-    grazing[4, 5] = -0.96, 0.0, 0.28  # above the surface, and below for the tilted normal
-    changed = {"view": grazing} if which == "view" else {"lights": (grazing,)}
+    grazing[4, 5] = GRAZING
+    changed = {"view": grazing} if which == "view" else {"lights": LIT_FROM[which]}
     limits = find(replace(plain, shading=tilted, **changed), GREY, noise())
     assert limits.data()["terminator"] == 1
     assert limits.terminator[4, 5]
     assert not find(replace(plain, shading=tilted), GREY, noise()).terminator.any()
+    assert not find(replace(plain, **changed), GREY, noise()).terminator.any()
+
+
+def test_under_light_from_all_sides_the_wedge_that_counts_is_a_hundredth(plain):
+    tilted = UP.copy()
+    for x, degrees in enumerate((11.0, 12.0)):
+        angle = np.deg2rad(degrees)
+        tilted[0, x] = np.sin(angle), 0, np.cos(angle)
+    shaded = replace(plain, shading=tilted, lights=LIT_FROM["all sides"])
+    assert np.argwhere(find(shaded, GREY, noise()).terminator).tolist() == [[0, 1]]
 
 
 def test_a_surface_that_loses_light_is_marked(plain):
@@ -120,7 +150,7 @@ def test_a_scenes_roughplastic_is_read(rgb, alpha, expected, twosided):
     assert 0.2 < surfaces.hit.mean() < 0.9
     for name, everywhere in expected.items():
         np.testing.assert_array_equal(getattr(limits, name), surfaces.hit & everywhere)
-    assert len(surfaces.lights) == 2
+    assert surfaces.lights.points.tolist() == [[-4, 0, 0], [0, 0, 3]]
     assert not limits.terminator.any(), "a sphere's two normals are one"
 
 
@@ -129,22 +159,120 @@ def test_other_materials_have_no_limit(rgb):
     assert find(surfaces, GREY, noise()).data()["any"] == 0
 
 
-def test_a_coarse_mesh_with_smooth_normals_has_a_terminator(rgb):
-    """Where the interpolated normal still sees the light and the face does not, or not yet."""
-    from heuristic import meshes
+# --- Terminators of a mesh -------------------------------------------------------------------
 
-    smooth = mi.load_dict({"type": "sphere", "bsdf": {"type": "diffuse"}})
-    mesh = meshes.to_mesh(smooth, 3)
+LIGHTS = {
+    "point": {"type": "point", "position": (5, 0, 0), "intensity": 10.0},
+    "directional": {"type": "directional", "direction": (-1, -0.3, 0)},
+    "heuristic directional": {"type": "heuristic_directional", "direction": (-1, -0.3, 0)},
+}
+
+
+def coarse_sphere(light):
+    """A mesh of few faces with smooth normals, each point of which no other face hides."""
+    smooth = mi.load_dict({"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": 1.0}})
     description = {
         "type": "scene",
         "sensor": {
-            "type": "perspective", "fov": 40.0,
+            "type": "perspective", "fov": 35.0,
             "to_world": mi.ScalarTransform4f().look_at((0, -4, 0), (0, 0, 0), (0, 0, 1)),
         },
-        "shape": mesh,
-        "light": {"type": "point", "position": (5, 0, 0), "intensity": 10.0},
+        "shape": meshes.to_mesh(smooth, 4),
+        "light": light,
     }  # fmt: skip
-    surfaces = of_scene(mi.load_dict(description, optimize=False), 64, 64)
-    big = np.full((64, 64, 3), 0.5)
-    marked = find(surfaces, big, 0 * big).terminator
-    assert 0.005 < marked[surfaces.hit].mean() < 0.5
+    return mi.load_dict(description, optimize=False)
+
+
+def seen(scene, integrator, samples=1):
+    """Return the mean radiance along the rays through the centres of pixels, (64, 64)."""
+    x, y = (axis.ravel() for axis in np.meshgrid(*[(np.arange(64) + 0.5) / 64] * 2))
+    place = mi.Point2f(np.repeat(x, samples), np.repeat(y, samples))
+    ray, _ = scene.sensors()[0].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(3, 64 * 64 * samples)
+    value, *_ = mi.load_dict(integrator).sample(scene, sampler, ray)
+    return np.array(value[0]).reshape(64, 64, samples).mean(axis=2)
+
+
+def marked(surfaces):
+    nothing = np.zeros((64, 64, 3))
+    return find(surfaces, nothing, nothing).terminator
+
+
+def cosines(surfaces, toward):
+    """Return ``N.L`` for both normals and ``N.V`` for the shading normal."""
+    return (
+        np.einsum("...i,...i", a, b)
+        for a, b in (
+            (surfaces.shading, toward),
+            (surfaces.geometric, toward),
+            (surfaces.shading, surfaces.view),
+        )
+    )
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_a_coarse_mesh_with_smooth_normals_is_black_where_it_is_marked(rgb, name):
+    """Where the interpolated normal still sees the light and the face does not."""
+    scene = coarse_sphere(LIGHTS[name])
+    surfaces = of_scene(scene, 64, 64)
+    at_infinity = name != "point"
+    toward = (1, 0.3, 0) if at_infinity else np.array([5, 0, 0]) - surfaces.position
+    shading, geometric, view = cosines(surfaces, np.broadcast_to(toward, (64, 64, 3)))
+    radiance = seen(scene, {"type": "direct"})
+    at_fault = surfaces.hit & (radiance == 0) & (shading > 1e-4)
+    assert at_fault.sum() > 20
+    mask = marked(surfaces)
+    assert mask[at_fault].all()
+    # Nothing else is marked but where the normals do disagree.
+    assert not (mask & (np.sign(shading) == np.sign(geometric)) & (view > 0)).any()
+    assert 0.01 < mask[surfaces.hit].mean() < 0.4
+
+
+def test_pixels_that_lose_a_part_of_an_area_light_are_marked(rgb):
+    """Against the irradiance of the shading normal, by 64 x 64 points of the light."""
+    place = mi.ScalarTransform4f().look_at((3, 0, 0), (0, 0, 0), (0, 0, 1))
+    light = {"type": "rectangle", "to_world": place, "emitter": {"type": "area", "radiance": 1.0}}
+    scene = coarse_sphere(light)
+    surfaces = of_scene(scene, 64, 64)
+    cells = (np.arange(64) + 0.5) / 32 - 1
+    y, z = (axis.ravel() for axis in np.meshgrid(cells, cells))
+    points = np.stack([np.full_like(y, 3), y, z], axis=1)
+    on_sphere = surfaces.hit & (np.abs(np.linalg.norm(surfaces.position, axis=2) - 1) < 0.2)
+    whole, kept = np.zeros((64, 64)), np.zeros((64, 64))
+    for point in points:
+        shading, geometric, _ = cosines(surfaces, point - surfaces.position)
+        weight = np.maximum(shading, 0)
+        whole += weight
+        kept += weight * (geometric > 0)
+    at_fault = on_sphere & (whole - kept > 0.005 * whole[on_sphere].max())
+    assert at_fault.sum() > 20
+    assert marked(surfaces)[at_fault].all()
+    # The lost light is lost in Mitsuba too.
+    radiance = seen(scene, {"type": "direct"}, samples=64)
+    dark = on_sphere & (kept == 0) & (whole > 0)
+    assert dark.sum() > 5
+    assert not radiance[dark].any()
+
+
+def test_what_an_environment_loses_by_two_normals_is_the_wedge_between_them(rgb):
+    scene = coarse_sphere({"type": "constant", "radiance": 1.0})
+    surfaces = of_scene(scene, 64, 64)
+    assert surfaces.lights.surrounding
+    radiance = seen(scene, {"type": "direct"}, samples=256)
+    _, _, view = cosines(surfaces, surfaces.view)
+    apart = np.einsum("...i,...i", surfaces.shading, surfaces.geometric)
+    counted = surfaces.hit & (view > 0)
+    lost = (1 - radiance)[counted] - ((1 - apart) / 2)[counted]
+    assert abs(lost.mean()) < 2e-3
+    assert np.abs(lost).max() < 0.08  # 256 samples
+    mask = marked(surfaces)[counted]
+    np.testing.assert_array_equal(mask, ((1 - apart) / 2)[counted] > WEDGE_LOST)
+    assert 0.05 < mask.mean() < 0.95
+
+
+def test_a_light_of_a_shape_is_known_by_its_edges(rgb):
+    light = {"type": "rectangle", "emitter": {"type": "area"}}
+    points = lights_of(coarse_sphere(light)).points
+    assert np.ptp(points[:, :2], axis=0) == pytest.approx([2, 2], abs=1e-5)
+    assert not points[:, 2].any()

@@ -35,6 +35,19 @@ class HardCase:
 
 
 @dataclass(frozen=True)
+class Convention:
+    """What is laid down where nothing is exact: no formula breaks, but somebody must decide.
+
+    ``ours`` takes nothing and returns what is to equal ``stated``, which ``text`` says in words.
+    """
+
+    name: str
+    text: str
+    stated: object
+    ours: Callable
+
+
+@dataclass(frozen=True)
 class Outcome:
     """A case and its two errors; infinite for a NaN, an infinity, or light where there is none."""
 
@@ -66,3 +79,13 @@ def error(found, exact):
     if not scale.all():
         return np.inf if difference.any() else 0.0
     return float((difference / scale).max())
+
+
+def quietly(function):
+    """Return a function without NumPy's warnings of NaN and infinities, which cases are about."""
+
+    def call():
+        with np.errstate(all="ignore"):
+            return function()
+
+    return call

@@ -1,5 +1,5 @@
 """All hard cases in one place, for the tests and the report."""
 
-from comparisons.hard import kernel, surfaces
+from comparisons.hard import colours, kernel, orientation, surfaces
 
-CASES = (*kernel.CASES, *surfaces.CASES)
+CASES = (*kernel.CASES, *orientation.CASES, *surfaces.CASES, *colours.CASES)

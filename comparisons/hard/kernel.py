@@ -44,15 +44,15 @@ def by_kernel(setting):
     return np.array(value + dr.zeros(Float, count))
 
 
-def shaded(name, group, hard, bound, setting):
-    """Make a case of a setting."""
+def shaded(name, group, hard, bound, setting, naive=textbook.shade):
+    """Make a case of a setting; ``naive(setting, dtype)`` is the formula as people write it."""
     setting = setting.rounded()
     return HardCase(
         name,
         group,
         hard,
         bound,
-        lambda: textbook.shade(setting, textbook.NAIVE),
+        lambda: naive(setting, textbook.NAIVE),
         lambda: by_kernel(setting),
         lambda: textbook.shade_exactly(setting),
         setting,

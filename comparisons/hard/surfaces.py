@@ -1,4 +1,4 @@
-"""The hard cases beside the kernel's points: sums of lights, triangles, normals and colours."""
+"""The hard cases of surfaces, triangles and their normals, and of sums of many lights."""
 
 import drjit as dr
 import numpy as np
@@ -6,9 +6,7 @@ from drjit.llvm import Array3f, Array3u
 
 import heuristic
 from comparisons.hard import textbook
-from comparisons.hard.cases import HardCase
-from comparisons.metrics import log2_luminance_ratio
-from comparisons.spaces import DEFAULT_VIEWING, itp
+from comparisons.hard.cases import HardCase, quietly
 from heuristic import interpolation, normals, vertex_normals
 
 LIGHTS = 10_000
@@ -41,7 +39,7 @@ def _kernel_sum():
     return np.array(heuristic.shade(Array3f(0), up, up, heuristic.Material(k_d=1), lights))
 
 
-def _triangle(name, hard, corners, bound=1e-5):
+def _triangle(name, hard, corners, bound=1e-5, exact=None):
     corners = np.float32(corners)
 
     def ours():
@@ -53,7 +51,7 @@ def _triangle(name, hard, corners, bound=1e-5):
         name, "geometry", hard, bound,
         lambda: textbook.triangle_normal(*corners, textbook.NAIVE),
         ours,
-        lambda: textbook.triangle_normal(*corners, textbook.EXACT),
+        exact or (lambda: textbook.triangle_normal(*corners, textbook.EXACT)),
     )  # fmt: skip
 
 
@@ -123,24 +121,6 @@ def _our_weights():
     return np.array(interpolation.barycentric_coordinates(point, p0, p1, p2))[:, 0]
 
 
-_BLACK = np.zeros((1, 1, 3))
-_NEGATIVE = np.array([[[-0.2, 0.1, 0.3]]])
-
-
-def _naive_pq():
-    """ICtCp's intensity of BT.2100 as printed, of a colour outside of BT.709's gamut."""
-    power = (_NEGATIVE * DEFAULT_VIEWING.white_luminance / 1e4) ** 0.1593017578125
-    return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
-
-
-def _quietly(function):
-    def call():
-        with np.errstate(all="ignore"):
-            return function()
-
-    return call
-
-
 CASES = (
     HardCase(
         "10,000 lights of mixed magnitude", "lights",
@@ -152,12 +132,15 @@ CASES = (
               [(0, 0, 0), (1e-30, 0, 2e-30), (0, 3e-30, 1e-30)]),
     _triangle("a triangle of size 1e30", "The cross product of its edges is infinite.",
               [(0, 0, 0), (1e30, 0, 2e30), (0, 3e30, 1e30)]),
+    _triangle("a triangle of size 1e-40", "Denormal edges; a side below the smallest normal float"
+              " counts as none, and the triangle has no normal.",
+              [(0, 0, 0), (1e-40, 0, 2e-40), (0, 3e-40, 1e-40)], exact=lambda: np.zeros(3)),
     _triangle("a needle of 1e-5 by 2", "Its long edges are nearly parallel.",
               [(0.137, 0.291, 0.353), (1.713, 1.931, 1.337), (1.71301, 1.93099, 1.33703)], 1e-4),
     HardCase(
         "an ellipsoid of aspect 1e6", "geometry",
         "Half axes of 1e-17, 1e-20 and 1e-23: their squares vanish, and with them the gradient.",
-        1e-5, _quietly(lambda: _ellipsoid_normal(textbook.NAIVE)), _our_ellipsoid_normal,
+        1e-5, quietly(lambda: _ellipsoid_normal(textbook.NAIVE)), _our_ellipsoid_normal,
         lambda: _ellipsoid_normal(textbook.EXACT),
     ),
     HardCase(
@@ -168,7 +151,7 @@ CASES = (
     HardCase(
         "a single huge triangle", "shading",
         "Barycentric weights divide by the fourth power of its size, 1e15.", 1e-5,
-        _quietly(lambda: _weights(textbook.NAIVE)), _our_weights,
+        quietly(lambda: _weights(textbook.NAIVE)), _our_weights,
         lambda: _weights(textbook.EXACT),
     ),
     HardCase(
@@ -176,26 +159,4 @@ CASES = (
         "Half way between opposite normals: 0 / 0.", 1e-5,
         _naive_scan_line, _our_scan_line, lambda: np.zeros(3),
     ),
-    HardCase(
-        "black against black", "colour", "The ratio of two luminances of 0: 0 / 0.", 1e-12,
-        _quietly(lambda: np.log2(_BLACK[..., 0] / _BLACK[..., 0])),
-        lambda: log2_luminance_ratio(_BLACK, _BLACK), lambda: np.zeros((1, 1)),
-    ),
-    HardCase(
-        "negative colours", "colour",
-        "The curve of BT.2100 is a power; out of gamut its base is negative.", 1e-3,
-        _quietly(_naive_pq), lambda: itp(_NEGATIVE, DEFAULT_VIEWING),
-        lambda: itp(_clipped_in_bt2020(), DEFAULT_VIEWING),
-    ),
 )  # fmt: skip
-
-
-def _clipped_in_bt2020():
-    """Return the colour that a display of BT.2020 shows instead, in BT.709.
-
-    The matrix is that of ITU-R BT.2087, whose four digits set the case's bound.
-    """
-    to_bt2020 = np.array(
-        [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]]
-    )
-    return np.maximum(_NEGATIVE @ to_bt2020.T, 0) @ np.linalg.inv(to_bt2020).T

@@ -42,25 +42,31 @@ class Setting:
         )
 
 
-def shade(setting, dtype):
-    """Equation 8.10 for one light, without any precaution: an array (N,) of a precision."""
+def shade(setting, dtype, horizon=True, unit_normal=True):
+    """Equation 8.10 for one light, without any precaution: an array (N,) of a precision.
+
+    Without ``horizon`` nothing asks whether ``N.L`` and ``R.V`` are above 0, as 8.5 and 8.9 are
+    printed; without ``unit_normal`` the normal is taken for a unit vector as it comes.
+    """
     s = setting
     with np.errstate(all="ignore"):
-        normal, view = (_unit(_of(vector, dtype)) for vector in (s.normal, s.view))
+        normal, view = (_of(vector, dtype) for vector in (s.normal, s.view))
+        normal, view = _unit(normal) if unit_normal else normal, _unit(view)
         offset = _of(s.light, dtype) - _of(s.position, dtype)
         distance = np.sqrt(_dot(offset, offset))
         toward = offset / distance[..., None]
         cosine = _dot(normal, toward)
         mirrored = 2 * normal * cosine[..., None] - toward
-        lobe = np.maximum(_dot(mirrored, view), 0) ** _of(s.n, dtype)
+        reflection = _dot(mirrored, view)
+        lobe = (np.maximum(reflection, 0) if horizon else reflection) ** _of(s.n, dtype)
         k0, k1, k2 = (dtype(k) for k in s.attenuation)
         arriving = _of(s.intensity, dtype) / (k0 + k1 * distance + k2 * distance**2)
         if s.direction is not None:
             cos_axis = -_dot(toward, _unit(_of(s.direction, dtype)))
             inside = cos_axis >= np.cos(np.deg2rad(dtype(s.cutoff)))
             arriving = np.where(inside, arriving * np.maximum(cos_axis, 0) ** dtype(s.m), 0)
-        reflected = dtype(s.k_d) * np.maximum(cosine, 0) + dtype(s.k_s) * lobe
-        return np.atleast_1d(np.where(cosine <= 0, 0, arriving * reflected))
+        value = arriving * (dtype(s.k_d) * cosine + dtype(s.k_s) * lobe)
+        return np.atleast_1d(np.where(horizon & (cosine <= 0), 0, value))
 
 
 def shade_exactly(setting):

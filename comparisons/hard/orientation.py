@@ -1,0 +1,99 @@
+"""The hard cases of sides: lights and viewers behind a surface, and normals of other lengths.
+
+Rounding has little part in these. The naive forms are what is often written: 8.5 and 8.9 without
+their condition ``N.L > 0``, a normal turned to face the viewer, an interpolated normal as it comes.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from comparisons.hard import textbook
+from comparisons.hard.kernel import POINTS, shaded
+from comparisons.hard.textbook import Setting
+
+_UNCONDITIONAL = partial(textbook.shade, horizon=False)
+_AS_IT_COMES = partial(textbook.shade, unit_normal=False)
+
+
+def _facing_viewer(setting, dtype):
+    """Turn normals to the viewer's side, as shaders do for surfaces with two sides."""
+    behind = (setting.normal * setting.view).sum(axis=-1, keepdims=True) < 0
+    normal = np.where(behind, -setting.normal, setting.normal)
+    return textbook.shade(
+        Setting(normal=normal, view=setting.view, light=setting.light, k_d=setting.k_d), dtype
+    )
+
+
+def _directions(seed):
+    """Return three sets of random unit vectors, (POINTS, 3) each."""
+    vectors = np.random.default_rng(seed).normal(size=(3, POINTS, 3))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _inside():
+    """Points of a sphere of radius 2 with a light within, seen from outside."""
+    normal, view, _ = _directions(11)
+    view *= np.sign((view * normal).sum(axis=1, keepdims=True))
+    return Setting(
+        position=2 * normal, normal=normal, view=view, light=(0.9, -0.4, 1.1), k_d=0.5, k_s=0.5, n=4
+    )
+
+
+def _behind():
+    """Shading normals 91 to 180 degrees away from a light, seen about the mirror direction."""
+    light, side, jitter = _directions(12)
+    side = np.cross(light, side)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    angle = np.deg2rad(np.linspace(91, 180, POINTS))[:, None]
+    normal = np.cos(angle) * light + np.sin(angle) * side
+    mirrored = 2 * (normal * light).sum(axis=1, keepdims=True) * normal - light
+    return Setting(
+        normal=normal, light=light, view=mirrored + 0.1 * jitter, k_d=0.5, k_s=0.5, n=9.5
+    )
+
+
+def _unseen():
+    """Shading normals 91 to 120 degrees away from the viewer, with a light on their own side."""
+    view, side, light = _directions(13)
+    side = np.cross(view, side)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    angle = np.deg2rad(np.linspace(91, 120, POINTS))[:, None]
+    normal = np.cos(angle) * view + np.sin(angle) * side
+    height = (light * normal).sum(axis=1, keepdims=True)
+    light += (np.abs(height) + 0.1 - height) * normal
+    return Setting(normal=normal, light=light, view=view, k_d=1.0)
+
+
+def _opposing():
+    """Normals exactly opposite to the light, which is their mirror image; seen from there."""
+    light = np.array([(0, 0, 1), (0, 3, 4), (-1, 2, 2)], float)
+    return Setting(normal=-light, light=light, view=light, k_d=0.2, k_s=0.8, n=8)
+
+
+def _shortened():
+    """Normals half way between two units, whose length is what interpolation leaves: 0.1 to 1."""
+    normal, light, view = _directions(14)
+    light *= np.sign((light * normal).sum(axis=1, keepdims=True))
+    length = np.linspace(0.1, 1, POINTS)[:, None]
+    return Setting(normal=length * normal, light=light, view=view, k_d=0.5, k_s=0.5, n=9.5)
+
+
+CASES = (
+    shaded("a light inside the object", "geometry",
+           "N·L < 0 all over the outside: without its condition the diffuse term takes light away,"
+           " and an even power makes a highlight of R·V < 0.", 1e-6, _inside(), _UNCONDITIONAL),
+    shaded("normals opposite to the light", "geometry",
+           "R is then L itself: a full highlight on the dark side, where N·L > 0 is not asked.",
+           1e-6, _opposing(), _UNCONDITIONAL),
+    shaded("normals that are not unit vectors", "geometry",
+           "Interpolation leaves lengths below 1; taken as they come they dim the surface and bend"
+           " R.", 2e-4, _shortened(), _AS_IT_COMES),
+    shaded("a shading normal that faces away from the light", "shading",
+           "Mirrored about such a normal the light points to the viewer: a highlight out of the"
+           " dark.", 1e-6, _behind(), _UNCONDITIONAL),
+    shaded("a shading normal that faces away from the viewer", "shading",
+           "At the silhouettes of smoothed meshes. 8.5 asks nothing of the viewer; a normal turned"
+           " to face him loses its light.", 1e-5, _unseen(), _facing_viewer),
+)  # fmt: skip
+"""The cases of sides."""
