@@ -137,5 +137,10 @@ directions and cutoff."""
 
 
 def spot_falloff(cos_axis, m):
-    """Equation 6.4: ``(v_L.v_P)^m``, the factor by which the cone of 6.3 fades from its axis."""
-    return power(cos_axis, m)
+    """Equation 6.4: ``(v_L.v_P)^m``, the factor by which the cone of 6.3 fades from its axis.
+
+    0 from 90 degrees on, but for ``m = 0``, which does not fade at all: the even cone of 6.3.
+    """
+    if isinstance(m, Real):
+        return power(cos_axis, m) if m else 1.0
+    return dr.select(m == 0, 1, power(cos_axis, m))

@@ -66,7 +66,7 @@ def _parts(plastic, level):
             "nonlinear": plastic.nonlinear,
         }
     )
-    theta, weight = _nodes(plastic.alpha)
+    theta, weight = nodes(plastic.alpha)
     si = dr.zeros(mi.SurfaceInteraction3f, NODES)
     si.wi = mi.Vector3f(0, 0, 1)
     if mi.is_spectral:
@@ -83,7 +83,7 @@ def _parts(plastic, level):
     return tuple(float(weight @ np.array(part[0], float).ravel()) for part in parts)
 
 
-def _nodes(alpha):
+def nodes(alpha):
     """Return polar angles and weights of the quadrature, ``sin(theta)`` included in the weights."""
     points, weights = np.polynomial.legendre.leggauss(NODES)
     end = np.arctan(1 / alpha)

@@ -19,7 +19,19 @@ GROUPS = {
     "geometry": "Geometry",
     "lights": "Lights",
     "shading": "Shading",
+    "reference": "The reference",
     "colour": "Colour",
+}
+
+
+#: What a group's two errors are of, where it is not the formula as printed and the kernel.
+NOTES = {
+    "reference": (
+        "Where Mitsuba’s own formula breaks as printed, “ours” is Mitsuba’s value. Where Mitsuba is"
+        " at fault, the error is what would be booked on the heuristic: naively of every pixel,"
+        " ours without those that are counted as limits of the reference."
+    ),
+    "colour": "“Ours” are the metrics of this report, in double precision like the naive forms.",
 }
 
 
@@ -27,8 +39,10 @@ def view(record: HardCases) -> dict[str, Any]:
     """What the template ``hard_cases.html.j2`` shows.
 
     groups
-        Each with its ``title`` and ``rows``: case, hard, naive, ours, bound and holds. An error
-        that is infinite stands as None, and is printed as the NaN or infinity that it is.
+        Each with its ``title``, ``note`` and ``rows``: case, hard, naive, ours, bound and holds. An
+        error that is infinite stands as None, and is printed as the NaN or infinity that it is.
+    conventions
+        What is laid down: case, text and holds.
     pictures
         Each with its ``title`` and the two images as data URIs.
     furnaces, angles
@@ -36,8 +50,16 @@ def view(record: HardCases) -> dict[str, Any]:
     """
     return {
         "groups": [
-            {"title": title, "rows": [_row(o) for o in record.outcomes if o.case.group == group]}
+            {
+                "title": title,
+                "note": NOTES.get(group),
+                "rows": [_row(o) for o in record.outcomes if o.case.group == group],
+            }
             for group, title in GROUPS.items()
+        ],
+        "conventions": [
+            {"case": convention.name, "text": convention.text, "holds": holds}
+            for convention, holds in record.conventions
         ],
         "pictures": [
             {"title": picture.title, "naive": _uri(picture.naive), "ours": _uri(picture.ours)}

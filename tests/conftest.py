@@ -15,19 +15,19 @@ from reference import direct
 @pytest.fixture
 def variant(request):
     """The Mitsuba variant that the test asks for by indirect parameter, RGB where it does not."""
-    yield from _in_variant(getattr(request, "param", "llvm_ad_rgb"))
+    yield from in_variant(getattr(request, "param", "llvm_ad_rgb"))
 
 
 @pytest.fixture
 def rgb():
     """The variant llvm_ad_rgb, with the project's plugins."""
-    yield from _in_variant("llvm_ad_rgb")
+    yield from in_variant("llvm_ad_rgb")
 
 
 @pytest.fixture
 def spectral():
     """The variant llvm_ad_spectral, with the project's plugins."""
-    yield from _in_variant("llvm_ad_spectral")
+    yield from in_variant("llvm_ad_spectral")
 
 
 @pytest.fixture
@@ -45,7 +45,8 @@ def kernel_history():
     _clean_up()
 
 
-def _in_variant(name):
+def in_variant(name):
+    """Yield in a variant with the project's plugins, for fixtures of any scope."""
     mi.set_variant(name)
     plugins.register()
     direct.register()

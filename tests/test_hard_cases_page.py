@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons.hard import record as hard_record
-from comparisons.hard.cases import Outcome, evaluate
+from comparisons.hard.cases import Convention, Outcome, evaluate
 from comparisons.hard.catalogue import CASES
 from comparisons.hard.furnace import Furnace
 from comparisons.hard.record import HardCases, Picture
@@ -19,7 +19,13 @@ def record():
     outcomes = tuple(evaluate(case) for case in CASES[:3])
     lost = Outcome(CASES[4], np.inf, 0.5)
     picture = Picture("A highlight", np.full((4, 4), np.nan), np.ones((4, 4)))
-    return HardCases((*outcomes, lost), (picture,), (Furnace("a < model", (1.2, 1, 0.5), 0.25),))
+    stated = Convention("a limit", "It is 0 & stays so.", 0.0, lambda: 1.0)
+    return HardCases(
+        (*outcomes, lost),
+        ((stated, stated.holds()),),
+        (picture,),
+        (Furnace("a < model", (1.2, 1, 0.5), 0.25),),
+    )
 
 
 def test_a_page_without_hard_cases_has_no_such_section():
@@ -34,6 +40,7 @@ def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
     assert text.count("bound violated") == 1
     assert "not finite" in text
     assert "a &lt; model" in text
+    assert re.search(r"It is 0 &amp; stays so\..*?strong.>no<", text)
     assert len(re.findall(r'<img src="data:image/png;base64,', text)) == 2
 
 
@@ -50,6 +57,7 @@ def test_everything_is_collected(rgb):
     """Pictures differ where there is something to see, and every case keeps its bound."""
     record = hard_record.collect()
     assert all(outcome.holds for outcome in record.outcomes)
+    assert all(holds for _, holds in record.conventions)
     for picture in record.pictures:
         assert picture.ours.shape == (hard_record.PICTURE, hard_record.PICTURE)
         assert np.isfinite(picture.ours).all()

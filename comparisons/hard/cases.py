@@ -46,6 +46,10 @@ class Convention:
     stated: object
     ours: Callable
 
+    def holds(self):
+        """Tell whether what is done is what is stated, to single precision."""
+        return bool(np.allclose(self.ours(), self.stated, rtol=1e-6, atol=0))
+
 
 @dataclass(frozen=True)
 class Outcome:

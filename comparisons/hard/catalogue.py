@@ -1,5 +1,16 @@
-"""All hard cases in one place, for the tests and the report."""
+"""All hard cases in one place, for the tests and the report.
 
-from comparisons.hard import colours, kernel, orientation, surfaces
+Those of the group ``reference`` need a Mitsuba variant and the plugins.
+"""
 
-CASES = (*kernel.CASES, *orientation.CASES, *surfaces.CASES, *colours.CASES)
+from comparisons.hard import colours, conventions, kernel, orientation, physical, surfaces
+
+CASES = (
+    *kernel.CASES,
+    *orientation.CASES,
+    *surfaces.CASES,
+    *physical.CASES,
+    *colours.CASES,
+)
+
+CONVENTIONS = conventions.CONVENTIONS

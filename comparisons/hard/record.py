@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.hard import furnace, kernel, textbook
-from comparisons.hard.cases import Outcome, evaluate
-from comparisons.hard.catalogue import CASES
+from comparisons.hard.cases import Convention, Outcome, evaluate
+from comparisons.hard.catalogue import CASES, CONVENTIONS
 from comparisons.hard.furnace import Furnace
 from comparisons.hard.textbook import Setting
 
@@ -25,9 +25,13 @@ class Picture:
 
 @dataclass(frozen=True)
 class HardCases:
-    """All cases with their errors, pictures of some, and the energy of the models."""
+    """All cases with their errors, what is laid down, pictures of some, and the models' energy.
+
+    ``conventions`` are pairs of a :class:`Convention` and whether it holds.
+    """
 
     outcomes: tuple[Outcome, ...]
+    conventions: tuple[tuple[Convention, bool], ...]
     pictures: tuple[Picture, ...]
     furnaces: tuple[Furnace, ...]
 
@@ -36,6 +40,7 @@ def collect():
     """Evaluate everything, in the current Mitsuba variant; a few seconds."""
     return HardCases(
         outcomes=tuple(map(evaluate, CASES)),
+        conventions=tuple((convention, convention.holds()) for convention in CONVENTIONS),
         pictures=(
             _picture("A highlight of n = 1e6, 0.4 degrees wide", _highlight(1e6, 0.0035)),
             _picture("A highlight of n = 1e7, 0.13 degrees wide", _highlight(1e7, 0.00115)),
