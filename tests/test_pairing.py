@@ -175,6 +175,16 @@ def test_a_matched_highlight_is_as_wide(rgb, form):
     assert flank / top == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.parametrize("k_s", [1e-6, 1e-8, 1e-12])
+def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb, k_s):
+    """A smooth surface reflects ``((ior - 1) / (ior + 1))^2``, here ``2 k_s / (n + 2)``."""
+    plastic, misses = pairing.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
+    reflected = ((plastic.int_ior - 1) / (plastic.int_ior + 1)) ** 2
+    faintest = 2.5e-9
+    assert reflected == pytest.approx(max(2 * k_s / 102, faintest), rel=0.05)
+    assert not misses
+
+
 def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
     """And what it reaches instead is what the record says, by the independent quadrature."""
     plastic, misses = pairing.to_roughplastic(UNREACHABLE, MATCHED)

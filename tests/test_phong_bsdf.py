@@ -155,8 +155,7 @@ def test_the_density_integrates_to_the_share_of_samples_above_the_horizon(rgb, v
 
 EXPONENTS = [0, 1e-3, 0.5, 1e3, 1e5]
 GRAZING = [0, 60, 85, 89.5]
-# Blinn's lobe at 89.5 degrees is a hundred times narrower across than along: too narrow for cells.
-VIEWS = [("phong", degrees) for degrees in GRAZING] + [("blinn", d) for d in GRAZING[:3]]
+VIEWS = [(form, degrees) for form in ("phong", "blinn") for degrees in GRAZING]
 CASES_OF_CHI2 = len(EXPONENTS) * len(VIEWS)
 
 
@@ -170,10 +169,11 @@ def test_samples_of_any_exponent_follow_the_density(rgb, n, form, degrees):
     assert probability(observed, expected) > level
 
 
+@pytest.mark.parametrize(("form", "degrees"), [("phong", 60), ("blinn", 60), ("blinn", 89.5)])
 @pytest.mark.parametrize("n", [20, 1e3, 1e5])
-def test_a_density_of_another_exponent_is_found_out(rgb, n):
-    observed, _ = patch_counts("phong", n, 60)
-    _, expected = patch_counts("phong", n, 60, density_n=1.2 * n)
+def test_a_density_of_another_exponent_is_found_out(rgb, n, form, degrees):
+    observed, _ = patch_counts(form, n, degrees)
+    _, expected = patch_counts(form, n, degrees, density_n=1.2 * n)
     assert probability(observed, expected) < 1e-6
 
 
@@ -187,15 +187,6 @@ def probability(observed, expected):
     return stats.chi2.sf(np.sum((found - wanted) ** 2 / wanted), len(wanted) - 1)
 
 
-def lobe_frame(degrees):
-    """Return the mirror image of a direction, and two more axes; (3,) each."""
-    wi = np.float32(direction(degrees, 30)).astype(float)
-    mirrored = wi * [-1, -1, 1]
-    side = np.cross(mirrored, [0.3, 0.5, -0.8])
-    side /= np.linalg.norm(side)
-    return wi, mirrored, side, np.cross(mirrored, side)
-
-
 BINS, DRAWN = 24, 100_000
 
 
@@ -204,38 +195,55 @@ def radius_to_angle(n, place):
     return 2 * np.arcsin(np.sqrt(-np.expm1(np.log1p(-place) / (n + 1)) / 2))
 
 
+def lobe_frame(form, wi):
+    """Return the axis of which the lobe is a power, and two more; (3,) each.
+
+    The mirror image of ``wi``, and for ``blinn`` the normal, about which the half vector lies.
+    """
+    axis = np.array([0.0, 0.0, 1.0]) if form == "blinn" else wi * [-1, -1, 1]
+    side = np.cross(axis, [0.3, 0.5, -0.8])
+    side /= np.linalg.norm(side)
+    return axis, side, np.cross(axis, side)
+
+
 def patch_counts(form, n, degrees, density_n=None):
     """Return samples in cells about the lobe's axis, and the integral of the density there.
 
     The cells divide the lobe of ``n`` evenly in its two random numbers: azimuth, and the share of
-    the lobe within an angle. For ``blinn``, whose lobe is about the normal, the axis is the same
-    and the exponent a quarter, as its half vector turns half as fast.
+    the lobe within an angle. For ``blinn`` they are cells of the half vector: seen as directions
+    they are a hundred times narrower across than along, at 89.5 degrees.
     """
-    wi, axis, side, up = lobe_frame(degrees)
+    wi = np.float32(direction(degrees, 30)).astype(float)
+    axis, side, up = lobe_frame(form, wi)
     bsdf = mi.load_dict(phong(k_s=0.9, n=n, form=form))
-    of_density = bsdf if density_n is None else mi.load_dict(phong(k_s=0.9, n=density_n))
-    width = n / 4 if form == "blinn" else n
+    of_density = bsdf if density_n is None else mi.load_dict(phong(k_s=0.9, n=density_n, form=form))
     u = np.random.default_rng(5).random((3, DRAWN))
     bs, _ = bsdf.sample(mi.BSDFContext(), interaction(wi, DRAWN), mi.Float(u[0]), mi.Point2f(u[1:]))
-    wo = np.array(bs.wo, float)[:, np.array(bs.pdf) > 0]
-    chord = np.sqrt(np.sum((wo - axis[:, None]) ** 2, axis=0))
-    cosine = 1 - chord**2 / 2
-    place = -np.expm1((width + 1) * np.log(np.maximum(cosine, 1e-300)))
-    azimuth = np.arctan2(up @ wo, side @ wo) / (2 * np.pi) % 1
+    vector = np.array(bs.wo, float)[:, np.array(bs.pdf) > 0]
+    if form == "blinn":
+        vector += wi[:, None]
+        vector /= np.linalg.norm(vector, axis=0)
+    cosine = 1 - np.sum((vector - axis[:, None]) ** 2, axis=0) / 2
+    place = -np.expm1((n + 1) * np.log(np.maximum(cosine, 1e-300)))
+    azimuth = np.arctan2(up @ vector, side @ vector) / (2 * np.pi) % 1
     inside = cosine > 0
     observed, *_ = np.histogram2d(place[inside], azimuth[inside], bins=BINS, range=[(0, 1), (0, 1)])
     fine = 32  # midpoints in each cell, along each side
     s, t = ((np.arange(BINS * fine) + 0.5) / (BINS * fine) for _ in range(2))
     s, t = (grid.ravel() for grid in np.meshgrid(s, t, indexing="ij"))
-    angle, phi = radius_to_angle(width, s), 2 * np.pi * t
+    angle, phi = radius_to_angle(n, s), 2 * np.pi * t
     directions = np.cos(angle) * axis[:, None] + np.sin(angle) * (
         np.cos(phi) * side[:, None] + np.sin(phi) * up[:, None]
     )
+    # d(omega) = 2 pi ds dt / ((n + 1) cos^n)
+    solid = 2 * np.pi / ((n + 1) * np.cos(angle) ** n) / len(s)
+    if form == "blinn":
+        facing = wi @ directions
+        solid *= 4 * np.abs(facing)  # of the directions mirrored at half vectors
+        directions = 2 * facing * directions - wi[:, None]
     density = np.array(
         of_density.pdf(mi.BSDFContext(), interaction(wi, len(s)), mi.Vector3f(directions)), float
     )
-    # d(omega) = 2 pi ds dt / ((width + 1) cos^width)
-    solid = 2 * np.pi / ((width + 1) * np.cos(angle) ** width) / len(s)
     cells = (density * solid).reshape(BINS, fine, BINS, fine).sum(axis=(1, 3))
     return observed, cells * DRAWN
 
@@ -244,7 +252,7 @@ def patch_counts(form, n, degrees, density_n=None):
 @pytest.mark.parametrize("degrees", GRAZING)
 @pytest.mark.parametrize("n", [*EXPONENTS, 1e6, 1e7])
 def test_weight_is_value_over_density_for_any_exponent(rgb, n, degrees, form):
-    """``2 k_s / (n + 1)`` for ``phong``, to the bound of the power; and nothing is NaN."""
+    """``2 k_s / (n + 1)``, for ``blinn`` times ``4 (wi.H)``; and nothing is NaN."""
     bsdf = mi.load_dict(phong(k_s=0.9, n=n, form=form))
     rng = mi.PCG32(50_000)
     bs, weight = bsdf.sample(
@@ -258,8 +266,11 @@ def test_weight_is_value_over_density_for_any_exponent(rgb, n, degrees, form):
     assert drawn.mean() > 0.2
     assert not weight[~drawn].any()
     assert np.abs(np.linalg.norm(np.array(bs.wo, float), axis=0) - 1).max() < 4e-7
-    if form == "phong":
-        np.testing.assert_allclose(weight[drawn], 2 * 0.9 / (n + 1), rtol=1e-5)
+    expected = np.full(drawn.sum(), 2 * 0.9 / (n + 1))
+    if form == "blinn":  # wi.H is half the length of wi + wo
+        both = np.array(bs.wo, float)[:, drawn] + np.float32(direction(degrees))[:, None]
+        expected *= 2 * np.linalg.norm(both, axis=0)
+    np.testing.assert_allclose(weight[drawn], expected, rtol=2e-5)
 
 
 @pytest.mark.parametrize("n", [1e3, 1e5, 1e7])

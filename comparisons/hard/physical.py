@@ -63,11 +63,11 @@ def _directions(alpha, degrees):
 
 def _by_mitsuba(alpha, light, view):
     """Return the specular part of ``roughplastic`` of IOR 1.5, one roughness a row."""
-    values = []
-    for a, wo, wi in zip(alpha, light, view, strict=True):
-        bsdf = mi.load_dict(_plastic(a, diffuse_reflectance=0.0))
-        values.append(evaluate(bsdf, wi[:, None], wo[:, None])[0])
-    return np.array(values)
+    values = np.empty(len(alpha))
+    for a in np.unique(alpha):
+        bsdf, rows = mi.load_dict(_plastic(a, diffuse_reflectance=0.0)), alpha == a
+        values[rows] = evaluate(bsdf, view[rows].T, light[rows].T)
+    return values
 
 
 def _plastic(alpha, int_ior=1.5, **more):
