@@ -188,6 +188,8 @@ def is_unattenuated(coefficients):
 def _attenuated(toward, intensity, distance, light, position):
     if not is_unattenuated(light.attenuation):
         law = terms.clamped_attenuation if light.clamped else terms.attenuation
+        if not light.clamped and terms.is_tame(light.attenuation, light.intensity):
+            law = terms.tame_attenuation
         inverse = vectors.inverse_distance(type(position)(light.position), position)
         intensity = law(distance, *light.attenuation, intensity, inverse)
     return Arrival(toward, intensity, distance)

@@ -76,6 +76,25 @@ def attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
     return _representable(intensity * root * root)
 
 
+def is_tame(coefficients, intensity):
+    """Tell whether :func:`tame_attenuation` will do: all are plain numbers of moderate size.
+
+    With ``k0 >= 1e-30`` the denominator is never 0, and small products are lost beside it; with
+    ``k1, k2 <= 1`` its parts are finite, and where the whole is not, an intensity of 4 or less
+    leaves less than the smallest normal float, which counts as zero.
+    """
+    numbers = (*coefficients, *(intensity if isinstance(intensity, tuple) else (intensity,)))
+    if not all(isinstance(number, Real) for number in numbers):
+        return False
+    k0, k1, k2 = coefficients
+    return 1e-30 <= k0 <= 1e30 and max(k1, k2) <= 1 and max(numbers[3:]) <= 4
+
+
+def tame_attenuation(distance, k0, k1, k2, intensity, inverse=None):
+    """Equation 6.1 as printed, where :func:`is_tame`: a quarter of the work of the general form."""
+    return intensity * dr.rcp(dr.fma(distance, dr.fma(distance, k2, k1), k0))
+
+
 def clamped_attenuation(distance, c1, c2, c3, intensity=1, inverse=None):
     """Text at 8.6: ``f_att = min(1 / (c1 + c2 d + c3 d^2), 1)``, so that ``0 <= f_att <= 1``."""
     root = numerics.at_most(attenuation_root(distance, c1, c2, c3, inverse, at_zero=1), 1)
