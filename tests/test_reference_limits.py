@@ -276,3 +276,10 @@ def test_a_light_of_a_shape_is_known_by_its_edges(rgb):
     points = lights_of(coarse_sphere(light)).points
     assert np.ptp(points[:, :2], axis=0) == pytest.approx([2, 2], abs=1e-5)
     assert not points[:, 2].any()
+
+
+@pytest.mark.parametrize("name", ["directional", "heuristic directional"])
+def test_a_directional_light_is_known_by_the_way_towards_it(rgb, name):
+    (toward,) = lights_of(coarse_sphere(LIGHTS[name])).directions
+    np.testing.assert_allclose(toward / toward[0], [1, 0.3, 0], atol=1e-6)
+    assert toward[0] > 0
