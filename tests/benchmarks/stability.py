@@ -2,7 +2,9 @@
 
 Each scene is rendered by the integrator ``heuristic``, once with the kernel as it is and once with
 its vectors, powers, lobes, attenuations and cones replaced by the formulas as printed. The two take
-turns, each rendering once untimed and then thrice timed, evaluated and synchronised.
+turns, each rendering once untimed and then thrice timed, evaluated and synchronised. Below, the
+kernel alone: a million points in memory under three lights whose numbers are compiled in, by its
+own time on the device and by the number of operations in it, which no other work disturbs.
 """
 
 from contextlib import contextmanager
@@ -19,6 +21,8 @@ from heuristic import backend  # isort: skip  it finds LLVM first
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from drjit.llvm import Array3f, Float
 
 from comparisons.scenes import SCENES
 from heuristic import lobes, numerics, terms, vectors
@@ -34,6 +38,18 @@ SPOT = {
 }  # fmt: skip
 LAMP = {"type": "heuristic_point", "position": (-4.24, 0, 0), "k0": 0.25, "k1": 0.5, "k2": 0.125}
 SQUARE = {"type": "heuristic_point", "position": (-4.24, 0, 0), "k0": 0.0, "k2": 1.0}
+
+
+POINTS = 1 << 20
+PLACES = ((0, 3, 4), (3, 0, 4), (-3, -1, 4))
+KERNELS = {
+    "n = 9": ({}, 9),
+    "n opaque": ({}, None),
+    "k0, k1, k2": ({"attenuation": (0.25, 0.5, 0.125)}, 9),
+    "inverse square": ({"attenuation": (0, 0, 1)}, 9),
+    "spots, m = 5": ({"cutoff": 30.0, "exponent": 5}, 9),
+}
+"""By title: what the lights have beside place and intensity, and the exponent, or None."""
 
 
 def run(rounds):
@@ -55,7 +71,46 @@ def run(rounds):
             {"scene": name, "naive_ms": naive, "stable_ms": stable, "ratio": stable / naive}
         )
     _print(rows, rounds)
-    return {"side": SIDE, "spp": SPP, "rows": rows, "wanted": WANTED}
+    kernels = _alone(rounds)
+    _print_kernels(kernels)
+    return {"side": SIDE, "spp": SPP, "rows": rows, "kernels": kernels, "wanted": WANTED}
+
+
+def _alone(rounds):
+    """Measure the kernels without a renderer; operations and milliseconds of both forms."""
+    rng = np.random.default_rng(0)
+    points = tuple(Array3f(rng.normal(size=(3, POINTS)).astype(np.float32)) for _ in range(3))
+    dr.eval(points)
+    rows = []
+    for title, (extra, n) in KERNELS.items():
+        kinds = {"naive": _naive, "stable": _as_it_is}
+        found = {kind: [] for kind in kinds}
+        for _ in range(rounds):
+            for kind, formulas in kinds.items():
+                with formulas():
+                    runs = [_kernel(points, extra, n) for _ in range(TIMED_A_TURN + 1)]
+                found[kind] += runs[1:]
+        row = {"kernel": title}
+        for kind, runs in found.items():
+            row[f"{kind}_operations"] = runs[0]["operation_count"]
+            row[f"{kind}_ms"] = median(kernel["execution_time"] for kernel in runs)
+        rows.append(row | {"ratio": row["stable_ms"] / row["naive_ms"]})
+    return rows
+
+
+def _kernel(points, extra, n):
+    """Shade once and return what Dr.Jit's history says of the kernel."""
+    if "cutoff" in extra:
+        lights = [heuristic.SpotLight(p, tuple(-c for c in p), 1.0, **extra) for p in PLACES]
+    else:
+        lights = [heuristic.PointLight(p, 1.0, **extra) for p in PLACES]
+    n = dr.opaque(Float, 9.0) if n is None else n
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        dr.eval(heuristic.shade(*points, heuristic.Material(k_d=0.5, k_s=0.5, n=n), lights))
+        dr.sync_thread()
+        (kernel,) = [k for k in dr.kernel_history([dr.KernelType.JIT]) if k["size"] == POINTS]
+    return kernel
 
 
 def _descriptions():
@@ -127,6 +182,8 @@ def _lobe(material, normal, view):
 def _power(cosine, n):
     if isinstance(cosine, numerics.Cosine):
         cosine = cosine.value
+    if isinstance(n, int):
+        return dr.power(dr.select(cosine > 0, cosine, 0), n)
     lobe = cosine > 0
     return dr.select(lobe, dr.exp2(n * dr.log2(dr.select(lobe, cosine, 1))), 0)
 
@@ -157,3 +214,15 @@ def _print(rows, rounds):
         f" (wanted: at most {WANTED})",
         highlight=False,
     )
+
+
+def _print_kernels(rows):
+    table = Table(title="the kernel alone: operations, and medians of its own time")
+    for heading in ("kernel", "naive", "stable", "naive", "stable", "ratio"):
+        table.add_column(heading, justify="left" if heading == "kernel" else "right")
+    for row in rows:
+        table.add_row(
+            row["kernel"], str(row["naive_operations"]), str(row["stable_operations"]),
+            f"{row['naive_ms']:.2f} ms", f"{row['stable_ms']:.2f} ms", f"{row['ratio']:.2f}",
+        )  # fmt: skip
+    Console().print(table)
