@@ -1,0 +1,259 @@
+"""Fitting the heuristic half of a scene to its reference.
+
+What is left of the departure at the best parameters is the *model error*: no values of them would
+remove it. What they removed is the *parameter error* of those that the pairing table gave.
+"""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import mitsuba as mi
+import numpy as np
+
+from comparisons import record as comparison_record
+from comparisons.compare import prepare
+from comparisons.fit import record
+from comparisons.fit.identify import identify
+from comparisons.fit.loss import LOSSES
+from comparisons.fit.model import Model
+from comparisons.fit.optimise import Residuals, minimise
+from comparisons.fit.parameters import parameters
+from comparisons.fit.record import Fit, FitImages
+from comparisons.fit.samples import Recorder
+from comparisons.options import Options
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from heuristic.materials import FORMS
+from reference.gbuffer import gbuffer
+from reference.rendering import Accumulator, variant
+from reference.scene import Source, properties
+
+RESOLUTION = (96, 96)
+SPP = 64
+"""A fit is a mean over all pixels, so that fewer and noisier ones than of a comparison do."""
+
+VARIANT = "llvm_ad_rgb"
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What can be chosen about a fit, beside the rendering.
+
+    Parameters
+    ----------
+    loss
+        A name in :data:`comparisons.fit.loss.LOSSES`.
+    forms
+        Of the lobe: any of :data:`heuristic.materials.FORMS`.
+    intensities
+        Whether to fit the lights' intensities too, each by one factor.
+
+    Raises
+    ------
+    InputError
+        For an unknown loss or form, or none.
+    """
+
+    loss: str = "perceptual"
+    forms: tuple[str, ...] = FORMS
+    intensities: bool = False
+
+    def __post_init__(self):
+        if self.loss not in LOSSES:
+            raise InputError(f"loss {self.loss!r} is not known: choose one of {', '.join(LOSSES)}.")
+        if not self.forms or not set(self.forms) <= set(FORMS):
+            raise InputError(f"forms {self.forms} are not known: choose of {', '.join(FORMS)}.")
+
+
+def fit(source, options=None, chosen=None, progress=None, command=""):
+    """Fit the heuristic half of a scene to its reference, in the current variant.
+
+    Parameters
+    ----------
+    source : reference.scene.Source
+        The scene.
+    options : comparisons.options.Options, optional
+        What is rendered; :data:`RESOLUTION` and :data:`SPP` where it does not say. Films get a box
+        filter, which keeps pixels independent.
+    chosen : FitOptions, optional
+        How it is fitted.
+    progress : callable, optional
+        Called as ``progress(stage, done, total)`` after each pass.
+    command
+        How to repeat the fit, for the record.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
+        Phong interpolation, or the camera sees no surface.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    begin = perf_counter()
+    chosen = chosen or FitOptions()
+    options = _completed(options or Options())
+    ready = prepare(_BoxFiltered(source.name, source.content, source.parameters), options)
+    rendered = _render(ready, options, progress or (lambda *_: None))
+    rendering = perf_counter() - begin
+    if not rendered.counted.any():
+        raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
+    attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
+    best = min(range(len(attempts)), key=lambda place: attempts[place].solution.cost)
+    physical = record.physical_materials(ready.pair.physical)
+    lights = [emitter.id() for emitter in ready.heuristic.scene.emitters()]
+    fits, maps = [], None
+    for place, attempt in enumerate(attempts):
+        departure, residual = record.departure(
+            rendered.before,
+            attempt.image(rendered),
+            rendered.reference.mean,
+            rendered.counted,
+            rendered.difference.noise,
+            options.viewing,
+        )
+        maps = residual if place == best else maps
+        fits += _fit_data(attempt, departure, physical, lights)
+    data = {
+        "scene": source.name,
+        "variant": ready.reference.variant,
+        "seed": options.seed,
+        "resolution": list(options.resolution),
+        "spp": ready.reference.spp * ready.passes,
+        "passes": ready.passes,
+        "viewing": options.viewing.record(),
+        "pairing": options.convention.value,
+        "loss": {"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
+        "intensities": chosen.intensities,
+        "pixels": {"counted": int(rendered.counted.sum()), "total": rendered.counted.size},
+        "fits": fits,
+        "best": 2 * best,
+        "time": {"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
+        "warnings": list(ready.pair.warnings),
+        "versions": comparison_record.versions(),
+        "command": command,
+    }
+    after = attempts[best].image(rendered)
+    return Fit(data, FitImages(rendered.before, rendered.reference.mean, after, maps))
+
+
+@dataclass(frozen=True)
+class _BoxFiltered(Source):
+    """A scene whose films have a box filter."""
+
+    def parse(self):
+        graph = super().parse()
+        for film in graph.nodes(mi.ObjectType.Film):
+            for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
+                graph.detach(film, key)
+        for sensor in graph.nodes(mi.ObjectType.Sensor):
+            if not graph.children(sensor, mi.ObjectType.Film):
+                film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
+                graph.attach(sensor, "film", film)
+        for film in graph.nodes(mi.ObjectType.Film):
+            box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
+            graph.attach(film, "rfilter", box)
+        return graph
+
+
+def _completed(options):
+    """Fill in a fit's own defaults."""
+    if options.interpolation is not Interpolation.PHONG:
+        raise InputError(
+            f"interpolation {options.interpolation.value} cannot be fitted: its values are those of"
+            " vertices or faces. Give --interpolation phong."
+        )
+    return replace(
+        options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP
+    )
+
+
+@dataclass(frozen=True)
+class _Rendered:
+    """Both halves' passes: the image of the paired parameters, the reference, and the surface."""
+
+    before: np.ndarray
+    reference: object
+    difference: object
+    surface: object
+    counted: np.ndarray
+
+
+def _render(ready, options, progress):
+    if ready.heuristic.variant != VARIANT:
+        raise InputError(
+            f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
+            f" --heuristic-variant {VARIANT}."
+        )
+    recorder = Recorder(ready.heuristic)
+    sums = [Accumulator() for _ in range(3)]
+    for number in range(ready.passes):
+        progress("rendering", number, ready.passes)
+        seed = options.seed + number
+        images = [half.render(seed) for half in (ready.heuristic, ready.reference)]
+        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
+        for total, image in zip(sums, images, strict=True):
+            total.add(image)
+        recorder.render(seed)
+    progress("rendering", ready.passes, ready.passes)
+    before, reference, difference = (total.estimate() for total in sums)
+    seen = gbuffer(ready.scene, *options.resolution)
+    with variant(VARIANT):
+        return _Rendered(before.mean, reference, difference, recorder.surface(), seen.hit)
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """The best fit of one form."""
+
+    model: Model
+    solution: object
+    verdicts: list
+    covariance: np.ndarray
+
+    def image(self, rendered):
+        return self.model.image(self.solution.x).reshape(rendered.before.shape)
+
+
+def _attempt(rendered, form, chosen, viewing):
+    loss = LOSSES[chosen.loss]
+    surface, counted = rendered.surface, rendered.counted.ravel()
+    model = Model(
+        surface, form, parameters(surface, form, loss.sees_colour, chosen.intensities)
+    )
+    reference = rendered.reference.mean.reshape(-1, 3)
+    residuals = Residuals(model, reference, counted, loss, viewing)
+    solution = minimise(residuals)
+    error = rendered.difference.standard_error.reshape(-1, 3)[counted]
+    slopes = loss.derivative(reference[counted], viewing)
+    variance = np.einsum("nkc,nc->nk", slopes**2, error**2).ravel()
+    reach = [np.unique(samples.pixel) for samples in surface.samples]
+    pixels = [counted[place].sum() for place in reach]
+    reached = np.array(
+        [counted.sum() if p.name == "intensity" else pixels[p.owner] for p in model.parameters]
+    )
+    verdicts, covariance = identify(
+        solution, model.parameters, reached, loss.threshold, variance
+    )
+    return _Attempt(model, solution, verdicts, covariance)
+
+
+def _fit_data(attempt, departure, physical, lights):
+    """Return the data of a form as the chapters have it, and normalised: one fit, two ``k_s``."""
+    model, judged = attempt.model, (attempt.solution, attempt.verdicts, attempt.covariance)
+    return [
+        {
+            "form": model.form,
+            "normalised": normalised,
+            "cost": attempt.solution.cost,
+            "departure": departure,
+            "materials": record.materials_data(model, *judged, normalised, physical),
+            "lights": record.lights_data(model, *judged, lights),
+            "convergence": record.convergence_data(attempt.solution),
+        }
+        for normalised in (False, True)
+    ]

@@ -1,0 +1,94 @@
+"""What a fit minimises: the mean square of a distance between two images.
+
+===============  ==========================================================================  =======
+Loss             Distance of two pixels                                                      Unit
+===============  ==========================================================================  =======
+``perceptual``   Euclidean in CAM16-UCS (:func:`comparisons.spaces.cam16ucs`)                ΔE
+``linear``       Euclidean in linear RGB                                                     1 is
+                                                                                             white
+``log-``         ``log2`` of the ratio of luminances, each with                              stops
+                 :data:`comparisons.metrics.LOG2_EPSILON` added
+===============  ==========================================================================  =======
+
+Each is a map of pixels to coordinates, whose differences are the residuals. ``perceptual`` is the
+default: results are reported as colour differences, and of the three metrics CAM16-UCS alone is a
+plain Euclidean distance that is also close to ΔE2000. ΔE ITP is one too, but it is ruled by the
+darkest pixels, where the models differ whatever the parameters are. Residuals are not weighted by
+the reference's standard error: where a reference has no noise all weights would be infinite, and
+where it has some, the doubt is in the dark pixels' favour, not in a viewer's.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons.metrics import LOG2_EPSILON
+from comparisons.spaces import cam16ucs, luminance
+
+STEP = 1e-4
+"""Relative step of the finite differences of colour spaces; their own error is its square."""
+
+SMALLEST_STEP = 1e-8
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A loss: coordinates of pixels, and their derivatives.
+
+    Attributes
+    ----------
+    name, unit
+        As in the table above.
+    coordinates
+        ``(rgb (N, 3), viewing) -> (N, K)``.
+    derivative
+        ``(rgb (N, 3), viewing) -> (N, K, 3)``, of the coordinates by R, G and B.
+    threshold
+        Root mean square change of the coordinates that counts as none.
+    sees_colour
+        Whether it tells colours of one luminance apart.
+    """
+
+    name: str
+    unit: str
+    coordinates: Callable
+    derivative: Callable
+    threshold: float
+    sees_colour: bool = True
+
+
+def _linear(rgb, viewing):
+    return rgb
+
+
+def _linear_derivative(rgb, viewing):
+    return np.broadcast_to(np.eye(3), (len(rgb), 3, 3))
+
+
+def _log(rgb, viewing):
+    return np.log2(np.maximum(luminance(rgb), 0) + LOG2_EPSILON)[:, None]
+
+
+def _log_derivative(rgb, viewing):
+    weights = luminance(np.eye(3))
+    lifted = np.maximum(luminance(rgb), 0) + LOG2_EPSILON
+    return (weights / (lifted[:, None] * np.log(2)))[:, None, :]
+
+
+def _perceptual_derivative(rgb, viewing):
+    """Central differences, all six images of them converted at once."""
+    step = STEP * np.abs(rgb) + SMALLEST_STEP
+    shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])
+    values = cam16ucs(rgb + shifts[:, None, :] * step, viewing)
+    return np.moveaxis((values[:3] - values[3:]) / (2 * step.T[..., None]), 0, -1)
+
+
+LOSSES = {
+    loss.name: loss
+    for loss in (
+        Loss("perceptual", "ΔE (CAM16-UCS)", cam16ucs, _perceptual_derivative, 0.05),
+        Loss("linear", "white", _linear, _linear_derivative, 5e-4),
+        Loss("log-luminance", "stops", _log, _log_derivative, 5e-3, sees_colour=False),
+    )
+}
