@@ -103,7 +103,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     if not rendered.counted.any():
         raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
     attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
-    best = min(range(len(attempts)), key=lambda place: attempts[place].solution.cost)
+    best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
     physical = record.physical_materials(ready.pair.physical)
     lights = [emitter.id() for emitter in ready.heuristic.scene.emitters()]
     fits, maps = [], None
@@ -216,29 +216,25 @@ class _Attempt:
     covariance: np.ndarray
 
     def image(self, rendered):
-        return self.model.image(self.solution.x).reshape(rendered.before.shape)
+        """Return the whole image, (H, W, 3)."""
+        model = Model(rendered.surface, self.model.form, self.model.parameters)
+        return model.image(self.solution.x).reshape(rendered.before.shape)
 
 
 def _attempt(rendered, form, chosen, viewing):
-    loss = LOSSES[chosen.loss]
-    surface, counted = rendered.surface, rendered.counted.ravel()
-    model = Model(
-        surface, form, parameters(surface, form, loss.sees_colour, chosen.intensities)
-    )
-    reference = rendered.reference.mean.reshape(-1, 3)
-    residuals = Residuals(model, reference, counted, loss, viewing)
+    loss, counted = LOSSES[chosen.loss], rendered.counted
+    surface = rendered.surface.within(counted.ravel())
+    wanted = parameters(surface, form, loss.sees_colour, chosen.intensities)
+    model = Model(surface, form, wanted)
+    residuals = Residuals(model, rendered.reference.mean[counted], loss, viewing)
     solution = minimise(residuals)
-    error = rendered.difference.standard_error.reshape(-1, 3)[counted]
-    slopes = loss.derivative(reference[counted], viewing)
-    variance = np.einsum("nkc,nc->nk", slopes**2, error**2).ravel()
-    reach = [np.unique(samples.pixel) for samples in surface.samples]
-    pixels = [counted[place].sum() for place in reach]
-    reached = np.array(
-        [counted.sum() if p.name == "intensity" else pixels[p.owner] for p in model.parameters]
-    )
-    verdicts, covariance = identify(
-        solution, model.parameters, reached, loss.threshold, variance
-    )
+    reached = [len(np.unique(samples.pixel)) for samples in surface.samples]
+    pixels = [
+        counted.sum() if parameter.name == "intensity" else reached[parameter.owner]
+        for parameter in wanted
+    ]
+    error = rendered.difference.standard_error[counted]
+    verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
     return _Attempt(model, solution, verdicts, covariance)
 
 
@@ -249,7 +245,7 @@ def _fit_data(attempt, departure, physical, lights):
         {
             "form": model.form,
             "normalised": normalised,
-            "cost": attempt.solution.cost,
+            "loss": attempt.solution.loss,
             "departure": departure,
             "materials": record.materials_data(model, *judged, normalised, physical),
             "lights": record.lights_data(model, *judged, lights),

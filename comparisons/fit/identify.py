@@ -12,8 +12,9 @@ one at which the search happened to stop. Two questions of the Jacobian's column
 Where either is under the loss's threshold, the parameter is not identifiable. To first order, at
 the fitted values: a parameter at its bound is fixed there, and no freedom to the others.
 
-The covariance ``P diag(s^2) P^T`` with ``P = (J^T J)^-1 J^T`` carries the standard error ``s`` of
-the reference to the parameters. It speaks of noise alone: a model that is wrong has a best fit all
+The covariance carries the reference's noise to the parameters: noise ``e`` in a pixel's coordinates
+moves the gradient of the loss by ``J^T C e`` and its minimum by ``H^-1 J^T C e``, with the loss's
+second derivatives ``C`` by a pixel's coordinates and ``H`` by the parameters. It speaks of noise alone: a model that is wrong has a best fit all
 the same, and that fit is as certain as the image is.
 """
 
@@ -58,21 +59,19 @@ class Verdict:
     at_bound: bool = False
 
 
-def identify(solution, parameters, pixels, threshold, variance):
+def identify(residuals, x, pixels, standard_error):
     """Judge each parameter at the best fit.
 
     Parameters
     ----------
-    solution : comparisons.fit.optimise.Solution
-        With the Jacobian, (R, P).
-    parameters
-        P of them.
+    residuals : comparisons.fit.optimise.Residuals
+        What was minimised.
+    x
+        (P,), the best parameters.
     pixels
-        For each parameter, the number of pixels that it can reach.
-    threshold
-        Of the loss.
-    variance
-        (R,), squared standard error of the reference in the loss's coordinates.
+        (P,), the number of pixels that each can reach.
+    standard_error
+        (counted pixels, 3), of the reference, or of its difference from the heuristic.
 
     Returns
     -------
@@ -80,20 +79,21 @@ def identify(solution, parameters, pixels, threshold, variance):
     covariance
         (P, P), in the vector's numbers; 0 for what is not identifiable or at its bound.
     """
-    low, high = bounds(parameters)
-    near = AT_BOUND * (high - low)
-    at_bound = (solution.x - low < near) | (high - solution.x < near)
+    low, high = bounds(residuals.model.parameters)
+    near, threshold = AT_BOUND * (high - low), residuals.distance.threshold
+    at_bound = (x - low < near) | (high - x < near)
     root = np.sqrt(np.maximum(pixels, 1))
-    shows = np.linalg.norm(solution.jacobian, axis=0) / root
+    changes = residuals.changes(x).reshape(-1, len(x))
+    shows = np.linalg.norm(changes, axis=0) / root
     free = ~at_bound & (shows >= threshold)
-    own = np.where(at_bound, shows, 0.0)
-    inverse = _inverse_normal(solution.jacobian[:, free])
+    inverse = _inverse_normal(changes[:, free])
+    own = shows.copy()
     own[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
     determined = free & (own >= threshold)
-    covariance = _covariance(solution.jacobian, determined, variance)
+    covariance = _covariance(residuals, x, determined, standard_error)
     lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
     verdicts = []
-    for number in range(len(parameters)):
+    for number in range(len(x)):
         reason, partners = "", ()
         if shows[number] < threshold:
             reason = "does not show in the image"
@@ -120,12 +120,16 @@ def _inverse_normal(jacobian):
     return scaled @ scaled.T
 
 
-def _covariance(jacobian, determined, variance):
-    covariance = np.zeros((jacobian.shape[1],) * 2)
-    part = jacobian[:, determined]
-    if part.shape[1]:
-        projection = _inverse_normal(part) @ part.T
-        covariance[np.ix_(determined, determined)] = (projection * variance) @ projection.T
+def _covariance(residuals, x, determined, standard_error):
+    covariance = np.zeros((len(x),) * 2)
+    if determined.any():
+        second = residuals.quadratic(x)[1][np.ix_(determined, determined)]
+        slopes = residuals.distance.derivative(residuals.reference, residuals.viewing)
+        noise = residuals.curvature(x) @ (slopes * standard_error[:, None, :])
+        changes = residuals.changes(x)[..., determined]
+        spread = np.einsum("nkp,nkc->pnc", changes, noise) / len(noise)
+        moved = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+        covariance[np.ix_(determined, determined)] = moved @ moved.T
     return covariance
 
 

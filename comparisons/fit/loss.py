@@ -1,25 +1,28 @@
-"""What a fit minimises: the mean square of a distance between two images.
+"""What a fit minimises: the mean over pixels of a distance between two images.
 
-===============  ==========================================================================  =======
-Loss             Distance of two pixels                                                      Unit
-===============  ==========================================================================  =======
-``perceptual``   Euclidean in CAM16-UCS (:func:`comparisons.spaces.cam16ucs`)                ΔE
-``linear``       Euclidean in linear RGB                                                     1 is
-                                                                                             white
-``log-``         ``log2`` of the ratio of luminances, each with                              stops
-                 :data:`comparisons.metrics.LOG2_EPSILON` added
-===============  ==========================================================================  =======
+=================  =====================================================================  =========
+Loss               Distance of two pixels                                                 Unit
+=================  =====================================================================  =========
+``perceptual``     Euclidean in CAM16-UCS (:func:`comparisons.spaces.cam16ucs`)           ΔE
+``linear``         its square, in linear RGB; 1 is display white                          white
+``log-luminance``  square of the ratio of luminances, each with                           stops
+                   :data:`comparisons.metrics.LOG2_EPSILON` added, in stops
+=================  =====================================================================  =========
 
-Each is a map of pixels to coordinates, whose differences are the residuals. ``perceptual`` is the
-default: results are reported as colour differences, and of the three metrics CAM16-UCS alone is a
-plain Euclidean distance that is also close to ΔE2000. ΔE ITP is one too, but it is ruled by the
-darkest pixels, where the models differ whatever the parameters are. Residuals are not weighted by
-the reference's standard error: where a reference has no noise all weights would be infinite, and
-where it has some, the doubt is in the dark pixels' favour, not in a viewer's.
+``perceptual`` is the default: departures are reported as mean colour differences, and of the three
+metrics CAM16-UCS alone is a plain Euclidean distance that is also close to ΔE2000. ΔE ITP is one
+too, but it is ruled by the darkest pixels, where the models differ whatever the parameters are. It
+is the distance and not its square that is averaged, as in the reports: a shadow, which no parameter
+makes, would otherwise bend all of them towards itself. Below :attr:`Loss.rounding` the distance
+turns into its square, ``sqrt(d^2 + c^2) - c``, so that it has derivatives everywhere.
+
+Residuals are not weighted by the reference's standard error: where a reference has no noise all
+weights would be infinite, and a fit to what is certain is not a fit to what is seen.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -48,6 +51,8 @@ class Loss:
         Root mean square change of the coordinates that counts as none.
     sees_colour
         Whether it tells colours of one luminance apart.
+    rounding
+        ``c`` above; infinite for squares.
     """
 
     name: str
@@ -56,6 +61,7 @@ class Loss:
     derivative: Callable
     threshold: float
     sees_colour: bool = True
+    rounding: float = inf
 
 
 def _linear(rgb, viewing):
@@ -87,7 +93,7 @@ def _perceptual_derivative(rgb, viewing):
 LOSSES = {
     loss.name: loss
     for loss in (
-        Loss("perceptual", "ΔE (CAM16-UCS)", cam16ucs, _perceptual_derivative, 0.05),
+        Loss("perceptual", "ΔE (CAM16-UCS)", cam16ucs, _perceptual_derivative, 0.05, rounding=1.0),
         Loss("linear", "white", _linear, _linear_derivative, 5e-4),
         Loss("log-luminance", "stops", _log, _log_derivative, 5e-3, sees_colour=False),
     )

@@ -44,11 +44,12 @@ class Model:
         self._last = None
 
     def image(self, x):
-        """Return the image (H W, 3) for a vector of parameters."""
-        return self.surface.fixed + self.columns(x)[..., self.linear] @ x[self.linear]
+        """Return the image (N, 3) of the surface's pixels for a vector of parameters."""
+        columns = self.columns(x)[self.linear]
+        return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
     def columns(self, x):
-        """Return the derivatives (H W, 3, number of parameters) of the image."""
+        """Return the derivatives (number of parameters, N, 3) of the image."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self._columns(x)
@@ -72,7 +73,7 @@ class Model:
         return float(np.exp(number))
 
     def _columns(self, x):
-        result = np.zeros((*self.surface.fixed.shape, len(x)))
+        result = np.empty((len(x), *self.surface.fixed.shape))
         factors = self._factors(x)
         diffuse, albedo = self.coefficients(x, "k_d"), self.coefficients(x, "k_s")
         lobes = [self._lobe(owner, self.exponent(x, owner)) for owner in albedo]
@@ -92,7 +93,7 @@ class Model:
                     + lobes[material].value[..., owner] * albedo[material]
                     for material in albedo
                 )
-            result[..., place] = column
+            result[place] = column
         return result
 
     def _factors(self, x):
@@ -104,12 +105,12 @@ class Model:
         return factors
 
     def _ambient_basis(self, owner):
-        """Return the ambient basis of a material, (H W, 3)."""
+        """Return the ambient basis of a material, (N, 3)."""
         ambient = ambient_of(self.surface, self._intensities)
         return self._basis(owner, "k_a", [], ambient=ambient)
 
     def _diffuse_bases(self, owner):
-        """Return the diffuse bases of a material, (H W, 3, groups of lights)."""
+        """Return the diffuse bases of a material, (N, 3, groups of lights)."""
         return self._stacked([self._basis(owner, "k_d", lights) for lights in self._groups])
 
     def _lobe(self, owner, n):
@@ -164,7 +165,7 @@ class Model:
 
 @dataclass(frozen=True)
 class _Lobe:
-    """Specular bases (H W, 3, groups of lights) at ``n``, and their derivatives by ``ln n``."""
+    """Specular bases (N, 3, groups of lights) at ``n``, and their derivatives by ``ln n``."""
 
     n: float
     value: np.ndarray

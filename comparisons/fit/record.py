@@ -90,11 +90,10 @@ def convergence_data(solution):
     return [
         {
             "n": start.n,
-            "cost": start.cost,
-            "final_cost": start.final_cost,
+            "loss": start.loss,
+            "final_loss": start.final_loss,
             "evaluations": start.evaluations,
             "converged": start.converged,
-            "message": start.message,
         }
         for start in solution.starts
     ]

@@ -5,7 +5,7 @@ integrator that keeps, for each camera ray of each pass, where it ends; from the
 one call of the kernel, without a ray. The rays are those of the reference's passes.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -18,6 +18,8 @@ from reference.rendering import Accumulator, Renderer, variant
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
 """Those that are fitted."""
+
+VECTORS = ("position", "normal", "view")
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,22 @@ class Surface:
     fixed: np.ndarray
     samples_a_pixel: int
 
+    def within(self, counted):
+        """Return the part of the surface that a mask (H W) of pixels counts, pixels renumbered."""
+        places = np.cumsum(counted) - 1
+        samples = []
+        for part in self.samples:
+            index = mi.UInt32(np.flatnonzero(counted[part.pixel]))
+            samples.append(
+                Samples(
+                    *(gathered(getattr(part, key), index) for key in VECTORS),
+                    pixel=places[part.pixel[np.array(index)]],
+                    textures={key: gathered(value, index) for key, value in part.textures.items()},
+                    visible=tuple(gathered(mask, index) for mask in part.visible),
+                )
+            )
+        return replace(self, samples=tuple(samples), fixed=self.fixed[counted])
+
     def pixels(self, samples, values):
         """Return the image (H W, 3) of one value for each sample of a material."""
         values = np.broadcast_to(np.atleast_2d(np.array(values, np.float64)), (3, len(samples.pixel)))
@@ -126,7 +144,7 @@ class Recorder:
         for number, parts in enumerate(self._parts):
             index = dr.compress(seen["facing"] & (seen["material"] == number))
             kept = {
-                key: dr.gather(type(value), value, index)
+                key: gathered(value, index)
                 for key, value in seen.items()
                 if key not in ("facing", "material")
             }
@@ -140,7 +158,7 @@ class Recorder:
             shadows = sorted((key for key in whole if key.startswith("light ")), key=_light_number)
             samples.append(
                 Samples(
-                    *(whole[key] for key in ("position", "normal", "view", "pixel")),
+                    *(whole[key] for key in (*VECTORS, "pixel")),
                     textures={name: whole[name] for name in _textured(bsdf)},
                     visible=tuple(whole[key] for key in shadows),
                 )
@@ -155,6 +173,11 @@ class Recorder:
             fixed,
             self._samples_a_pixel,
         )
+
+
+def gathered(values, index):
+    """Return the samples of a Dr.Jit array with the given numbers."""
+    return dr.gather(type(values), values, index)
 
 
 def _eye(shading):
