@@ -105,7 +105,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
     physical = record.physical_materials(ready.pair.physical)
-    lights = [emitter.id() for emitter in ready.heuristic.scene.emitters()]
+    lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
     fits, maps = [], None
     for place, attempt in enumerate(attempts):
         departure, residual = record.departure(
@@ -167,9 +167,7 @@ def _completed(options):
             f"interpolation {options.interpolation.value} cannot be fitted: its values are those of"
             " vertices or faces. Give --interpolation phong."
         )
-    return replace(
-        options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP
-    )
+    return replace(options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP)
 
 
 @dataclass(frozen=True)
@@ -238,6 +236,11 @@ def _attempt(rendered, form, chosen, viewing):
     return _Attempt(model, solution, verdicts, covariance)
 
 
+def _light_names(scene):
+    """Return the names of the lights that the kernel knows, in its order."""
+    return [emitter.id() for emitter in scene.emitters() if hasattr(emitter, "light")]
+
+
 def _fit_data(attempt, departure, physical, lights):
     """Return the data of a form as the chapters have it, and normalised: one fit, two ``k_s``."""
     model, judged = attempt.model, (attempt.solution, attempt.verdicts, attempt.covariance)
@@ -248,7 +251,7 @@ def _fit_data(attempt, departure, physical, lights):
             "loss": attempt.solution.loss,
             "departure": departure,
             "materials": record.materials_data(model, *judged, normalised, physical),
-            "lights": record.lights_data(model, *judged, lights),
+            "lights": record.lights_data(model, *judged, lights) if lights else [],
             "convergence": record.convergence_data(attempt.solution),
         }
         for normalised in (False, True)

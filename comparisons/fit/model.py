@@ -36,8 +36,7 @@ class Model:
         self.parameters = parameters
         self.linear = np.array([parameter.is_linear for parameter in parameters], bool)
         self._groups = [list(surface.lights)] if surface.lights else []
-        self._intensities = any(p.name == "intensity" for p in parameters)
-        if self._intensities:
+        if any(parameter.name == "intensity" for parameter in parameters):
             self._groups = [[light] for light in surface.lights]
         self._ambient, self._diffuse = cache(self._ambient_basis), cache(self._diffuse_bases)
         self._lobes = {}
@@ -106,8 +105,7 @@ class Model:
 
     def _ambient_basis(self, owner):
         """Return the ambient basis of a material, (N, 3)."""
-        ambient = ambient_of(self.surface, self._intensities)
-        return self._basis(owner, "k_a", [], ambient=ambient)
+        return self._basis(owner, "k_a", [], ambient_of(self.surface, intensities=True))
 
     def _diffuse_bases(self, owner):
         """Return the diffuse bases of a material, (N, 3, groups of lights)."""

@@ -4,9 +4,9 @@ The loss is a sum over pixels of a convex function of the coordinates' differenc
 linear in the parameters: its second derivative is that function's, carried over by the Jacobian, as
 in the method of Gauss and Newton. Each step minimises the quadratic that has these derivatives,
 damped as by Levenberg and Marquardt, within the bounds; SciPy's bounded-variable least squares
-finds that minimum exactly, so that a parameter reaches its bound and does not only approach it. (A
-least squares method on the roots of distances takes a hundred steps where this takes ten: it sees a
-curvature where a distance has none.)
+finds that minimum exactly, so that a parameter reaches its bound and does not only approach it. (The
+method of Gauss and Newton on the roots of distances takes over a hundred steps where this takes ten:
+it sees a curvature where a distance has none.)
 
 A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
 several widths with the coefficients that suit each best.
@@ -188,9 +188,7 @@ def _best_coefficients(residuals, x, n):
     linear = model.linear
     columns = model.columns(x)[linear].reshape(linear.sum(), -1)
     wanted = (residuals.reference - model.surface.fixed).ravel()
-    x[linear] = _bounded_minimum(
-        columns @ columns.T, -columns @ wanted, low[linear], high[linear]
-    )
+    x[linear] = _bounded_minimum(columns @ columns.T, -columns @ wanted, low[linear], high[linear])
     return x
 
 

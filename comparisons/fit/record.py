@@ -76,13 +76,29 @@ def materials_data(model, solution, verdicts, covariance, normalised, physical):
 
 
 def lights_data(model, solution, verdicts, covariance, lights):
-    """Return the factors on the lights' intensities, empty where they were not fitted."""
-    return [
-        {"name": lights[parameter.owner]}
+    """Return the factors on the intensities of lights, by name; the first is what they refer to."""
+    fitted = [
+        {"light": lights[parameter.owner]}
         | _parameter_data(model, solution, verdicts, covariance, place, False)
         for place, parameter in enumerate(model.parameters)
         if parameter.name == "intensity"
     ]
+    first = {
+        "light": lights[0],
+        "name": "intensity",
+        "channel": "",
+        "is_factor": True,
+        "paired": 1.0,
+        "fitted": None,
+        "stopped_at": 1.0,
+        "interval": None,
+        "bounds": [1.0, 1.0],
+        "at_bound": False,
+        "identifiable": False,
+        "reason": "only products with k_d and k_s show; other lights' factors are relative to it",
+        "partners": [],
+    }
+    return [first, *fitted]
 
 
 def convergence_data(solution):

@@ -98,7 +98,9 @@ class Surface:
 
     def pixels(self, samples, values):
         """Return the image (H W, 3) of one value for each sample of a material."""
-        values = np.broadcast_to(np.atleast_2d(np.array(values, np.float64)), (3, len(samples.pixel)))
+        values = np.broadcast_to(
+            np.atleast_2d(np.array(values, np.float64)), (3, len(samples.pixel))
+        )
         count = len(self.fixed)
         sums = [np.bincount(samples.pixel, channel, count) for channel in values]
         return np.stack(sums, axis=1) / self.samples_a_pixel
