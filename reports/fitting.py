@@ -17,7 +17,7 @@ SHOWN = "dE2000"
 """The metric of the residual map in the picture."""
 
 SMALLEST_TILE = 256
-"""Pixels; smaller images are enlarged by a whole factor, so that their pixels stay what they are."""
+"""Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
 
 GAP, CAPTION = 8, 22
 FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
@@ -101,8 +101,8 @@ def markdown(records, scenes):
     )
     yield ""
     labels = [metric.label for metric in METRICS.values()]
-    heading = ["scene", "best form"] + [f"{label}: before → after (floor)" for label in labels]
-    yield from _row(heading + ["parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"])
+    heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
+    yield from _row([*heading, "parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"])
     yield from _row(["---"] * 2 + ["---:"] * (len(labels) + 3))
     for data in records:
         best, seconds = _best(data), sum(data["time"].values())
@@ -110,7 +110,7 @@ def markdown(records, scenes):
         cells = [
             f"{d['before']:.3f} → {d['after']:.3f} ({d['noise_floor']:.3f})" for d in departures
         ]
-        parts = [f"{departures[0][key]:.3f}" for key in ("parameter_error", "model_error")]
+        parts = [_three(departures[0][key]) for key in ("parameter_error", "model_error")]
         yield from _row([data["scene"], best["form"], *cells, *parts, f"{seconds:.1f}"])
     yield ""
     yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
@@ -150,7 +150,7 @@ def _departures(data):
     table.add_row("noise floor", *(f"{first[name]['noise_floor']:.3f}" for name in METRICS), "")
     best = _best(data)["departure"]
     for key in ("parameter_error", "model_error"):
-        means = [f"{best[name][key]:.3f}" for name in METRICS]
+        means = [_three(best[name][key]) for name in METRICS]
         table.add_row(key.replace("_", " "), *means, "")
     return table
 
@@ -194,6 +194,11 @@ def _described(reference):
         if key in ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
     ]
     return " ".join([reference["plugin"], ", ".join(words)]).strip()
+
+
+def _three(value):
+    """Three decimals, and no sign where they are all 0."""
+    return f"{value:.3f}".replace("-0.000", "0.000")
 
 
 def _number(value):

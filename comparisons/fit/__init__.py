@@ -1,1 +1,4 @@
-"""Fitting the heuristic model's parameters to the reference: is the model wrong, or only they?"""
+"""Fitting the heuristic model's parameters to the reference.
+
+Is the model wrong, or only its parameters?
+"""

@@ -7,7 +7,6 @@ remove it. What they removed is the *parameter error* of those that the pairing 
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-import mitsuba as mi
 import numpy as np
 
 from comparisons import record as comparison_record
@@ -19,20 +18,15 @@ from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
 from comparisons.fit.parameters import parameters
 from comparisons.fit.record import Fit, FitImages
-from comparisons.fit.samples import Recorder
+from comparisons.fit.rendering import BoxFiltered, render
 from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
-from reference.gbuffer import gbuffer
-from reference.rendering import Accumulator, variant
-from reference.scene import Source, properties
 
 RESOLUTION = (96, 96)
 SPP = 64
 """A fit is a mean over all pixels, so that fewer and noisier ones than of a comparison do."""
-
-VARIANT = "llvm_ad_rgb"
 
 
 @dataclass(frozen=True)
@@ -97,67 +91,21 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     begin = perf_counter()
     chosen = chosen or FitOptions()
     options = _completed(options or Options())
-    ready = prepare(_BoxFiltered(source.name, source.content, source.parameters), options)
-    rendered = _render(ready, options, progress or (lambda *_: None))
+    ready = prepare(BoxFiltered(source.name, source.content, source.parameters), options)
+    rendered = render(ready, options, progress or (lambda *_: None))
     rendering = perf_counter() - begin
     if not rendered.counted.any():
         raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
     attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
-    physical = record.physical_materials(ready.pair.physical)
-    lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
-    fits, maps = [], None
-    for place, attempt in enumerate(attempts):
-        departure, residual = record.departure(
-            rendered.before,
-            attempt.image(rendered),
-            rendered.reference.mean,
-            rendered.counted,
-            rendered.difference.noise,
-            options.viewing,
-        )
-        maps = residual if place == best else maps
-        fits += _fit_data(attempt, departure, physical, lights)
-    data = {
+    data, maps = _measured(ready, rendered, attempts, best, chosen, options)
+    data |= {
         "scene": source.name,
-        "variant": ready.reference.variant,
-        "seed": options.seed,
-        "resolution": list(options.resolution),
-        "spp": ready.reference.spp * ready.passes,
-        "passes": ready.passes,
-        "viewing": options.viewing.record(),
-        "pairing": options.convention.value,
-        "loss": {"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
-        "intensities": chosen.intensities,
-        "pixels": {"counted": int(rendered.counted.sum()), "total": rendered.counted.size},
-        "fits": fits,
-        "best": 2 * best,
         "time": {"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
-        "warnings": list(ready.pair.warnings),
-        "versions": comparison_record.versions(),
         "command": command,
     }
     after = attempts[best].image(rendered)
     return Fit(data, FitImages(rendered.before, rendered.reference.mean, after, maps))
-
-
-@dataclass(frozen=True)
-class _BoxFiltered(Source):
-    """A scene whose films have a box filter."""
-
-    def parse(self):
-        graph = super().parse()
-        for film in graph.nodes(mi.ObjectType.Film):
-            for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
-                graph.detach(film, key)
-        for sensor in graph.nodes(mi.ObjectType.Sensor):
-            if not graph.children(sensor, mi.ObjectType.Film):
-                film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
-                graph.attach(sensor, "film", film)
-        for film in graph.nodes(mi.ObjectType.Film):
-            box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
-            graph.attach(film, "rfilter", box)
-        return graph
 
 
 def _completed(options):
@@ -168,40 +116,6 @@ def _completed(options):
             " vertices or faces. Give --interpolation phong."
         )
     return replace(options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP)
-
-
-@dataclass(frozen=True)
-class _Rendered:
-    """Both halves' passes: the image of the paired parameters, the reference, and the surface."""
-
-    before: np.ndarray
-    reference: object
-    difference: object
-    surface: object
-    counted: np.ndarray
-
-
-def _render(ready, options, progress):
-    if ready.heuristic.variant != VARIANT:
-        raise InputError(
-            f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
-            f" --heuristic-variant {VARIANT}."
-        )
-    recorder = Recorder(ready.heuristic)
-    sums = [Accumulator() for _ in range(3)]
-    for number in range(ready.passes):
-        progress("rendering", number, ready.passes)
-        seed = options.seed + number
-        images = [half.render(seed) for half in (ready.heuristic, ready.reference)]
-        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
-        for total, image in zip(sums, images, strict=True):
-            total.add(image)
-        recorder.render(seed)
-    progress("rendering", ready.passes, ready.passes)
-    before, reference, difference = (total.estimate() for total in sums)
-    seen = gbuffer(ready.scene, *options.resolution)
-    with variant(VARIANT):
-        return _Rendered(before.mean, reference, difference, recorder.surface(), seen.hit)
 
 
 @dataclass(frozen=True)
@@ -234,6 +148,41 @@ def _attempt(rendered, form, chosen, viewing):
     error = rendered.difference.standard_error[counted]
     verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
     return _Attempt(model, solution, verdicts, covariance)
+
+
+def _measured(ready, rendered, attempts, best, chosen, options):
+    """Return the record of all attempts, and the residual maps of the best one."""
+    physical = record.physical_materials(ready.pair.physical)
+    lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
+    fits, maps = [], []
+    for attempt in attempts:
+        departure, residual = record.departure(
+            rendered.before,
+            attempt.image(rendered),
+            rendered.reference.mean,
+            rendered.counted,
+            rendered.difference.noise,
+            options.viewing,
+        )
+        maps.append(residual)
+        fits += _fit_data(attempt, departure, physical, lights)
+    data = {
+        "variant": ready.reference.variant,
+        "seed": options.seed,
+        "resolution": list(options.resolution),
+        "spp": ready.reference.spp * ready.passes,
+        "passes": ready.passes,
+        "viewing": options.viewing.record(),
+        "pairing": options.convention.value,
+        "loss": {"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
+        "intensities": chosen.intensities,
+        "pixels": {"counted": int(rendered.counted.sum()), "total": rendered.counted.size},
+        "fits": fits,
+        "best": len(fits) // len(attempts) * best,
+        "warnings": list(ready.pair.warnings),
+        "versions": comparison_record.versions(),
+    }
+    return data, maps[best]
 
 
 def _light_names(scene):

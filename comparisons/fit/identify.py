@@ -14,8 +14,8 @@ the fitted values: a parameter at its bound is fixed there, and no freedom to th
 
 The covariance carries the reference's noise to the parameters: noise ``e`` in a pixel's coordinates
 moves the gradient of the loss by ``J^T C e`` and its minimum by ``H^-1 J^T C e``, with the loss's
-second derivatives ``C`` by a pixel's coordinates and ``H`` by the parameters. It speaks of noise alone: a model that is wrong has a best fit all
-the same, and that fit is as certain as the image is.
+second derivatives ``C`` by a pixel's coordinates and ``H`` by the parameters. It speaks of noise
+alone: a model that is wrong has a best fit all the same, and that fit is as certain as the image.
 """
 
 from dataclasses import dataclass

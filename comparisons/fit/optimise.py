@@ -4,9 +4,9 @@ The loss is a sum over pixels of a convex function of the coordinates' differenc
 linear in the parameters: its second derivative is that function's, carried over by the Jacobian, as
 in the method of Gauss and Newton. Each step minimises the quadratic that has these derivatives,
 damped as by Levenberg and Marquardt, within the bounds; SciPy's bounded-variable least squares
-finds that minimum exactly, so that a parameter reaches its bound and does not only approach it. (The
-method of Gauss and Newton on the roots of distances takes over a hundred steps where this takes ten:
-it sees a curvature where a distance has none.)
+finds that minimum exactly, so that a parameter reaches its bound and does not only approach it.
+(The method of Gauss and Newton on the roots of distances takes over a hundred steps where this
+takes ten: it sees a curvature where a distance has none.)
 
 A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
 several widths with the coefficients that suit each best.
@@ -115,7 +115,7 @@ class Residuals:
         return identity / s - differences[:, :, None] * differences[:, None, :] / s**3
 
     def quadratic(self, x):
-        """Return gradient (parameters) and second derivative (parameters, parameters) of the loss."""
+        """Return gradient (P,) and second derivative (P, P) of the loss by the parameters."""
         changes, differences = self.changes(x), self.differences(x)
         gradient = np.einsum("nkp,nk->p", changes, differences / self._norm(differences))
         flat = changes.reshape(-1, len(x))
@@ -180,7 +180,7 @@ def _descend(residuals, x):
 
 
 def _best_coefficients(residuals, x, n):
-    """Return parameters with one exponent, and the coefficients of least linear mean square error."""
+    """Return parameters with one exponent, and the coefficients that suit it in linear RGB."""
     model = residuals.model
     low, high = layout.bounds(model.parameters)
     at_n = np.array([parameter.name == "n" for parameter in model.parameters])

@@ -6,7 +6,6 @@ from math import exp, sqrt
 import mitsuba as mi
 import numpy as np
 
-from comparisons.fit import parameters as layout
 from comparisons.fit.identify import AT_BOUND, COVERAGE
 from comparisons.metrics import METRICS
 from comparisons.statistics import noise_floor
@@ -121,7 +120,7 @@ def physical_materials(graph):
     for index in graph.nodes(mi.ObjectType.BSDF):
         label = graph.label(index)
         for _, child in graph.children(index, mi.ObjectType.BSDF):
-            index = child  # noqa: PLW2901 of twosided, what is inside
+            index = child  # of twosided, what is inside
         found[label] = {"plugin": graph.plugin(index)} | _plain_properties(graph.props(index))
     return found
 

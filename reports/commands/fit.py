@@ -1,4 +1,4 @@
-"""``fotismos fit``: is the model wrong, or only its parameters?"""
+"""``fotismos fit``: the best heuristic parameters, and what they leave."""
 
 import json
 from pathlib import Path
@@ -57,7 +57,8 @@ def fit(scenes, output, form, as_json, markdown, **words):
     from comparisons.fit.fit import fit as run
     from heuristic.materials import FORMS
     from reference.scene import set_variant
-    from reports import fitting, output as files, progress
+    from reports import fitting, progress
+    from reports import output as files
 
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
@@ -77,5 +78,6 @@ def fit(scenes, output, form, as_json, markdown, **words):
         lines = [json.dumps(records, indent=2, ensure_ascii=False)]
     else:
         lines = [line for record in records for line in fitting.lines(record)]
-    for line in (*lines, *([] if as_json else [f"{folder}"])):
+        lines.append(str(folder))
+    for line in lines:
         click.echo(line)
