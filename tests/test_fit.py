@@ -220,8 +220,11 @@ def flat(**integrator):
     return {key: value for key, value in scene.items() if key not in ("a", "b")}
 
 
-def test_ambient_and_constant_light_cannot_be_told_apart(rgb):
-    verdicts, _ = verdicts_of(flat())
+@pytest.mark.parametrize("k_a", [0.2, 0.0], ids=["inside", "at its bound"])
+def test_ambient_and_constant_light_cannot_be_told_apart(k_a, rgb):
+    scene = flat()
+    scene["c"]["bsdf"]["k_a"] = k_a
+    verdicts, _ = verdicts_of(scene)
     assert verdicts["k_a of floor"].reason == verdicts["k_d of floor"].reason
     assert verdicts["k_a of floor"].reason == "others make up for it"
     assert 1 in verdicts["k_a of floor"].partners

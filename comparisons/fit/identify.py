@@ -9,8 +9,9 @@ one at which the search happened to stop. Two questions of the Jacobian's column
    been set to undo as much of it as they can: ``1 / sqrt((J^T J)^-1)`` on the diagonal, from the
    singular values of ``J``.
 
-Where either is under the loss's threshold, the parameter is not identifiable. To first order, at
-the fitted values: a parameter at its bound is fixed there, and no freedom to the others.
+Where either is under the loss's threshold, the parameter is not identifiable. Both are judged to
+first order, at the fitted values, and as if a parameter at its bound were free to leave it: it may
+be there for no reason but that the search began there. The covariance holds it there.
 
 The covariance carries the reference's noise to the parameters: noise ``e`` in a pixel's coordinates
 moves the gradient of the loss by ``J^T C e`` and its minimum by ``H^-1 J^T C e``, with the loss's
@@ -85,12 +86,12 @@ def identify(residuals, x, pixels, standard_error):
     root = np.sqrt(np.maximum(pixels, 1))
     changes = residuals.changes(x).reshape(-1, len(x))
     shows = np.linalg.norm(changes, axis=0) / root
-    free = ~at_bound & (shows >= threshold)
+    free = shows >= threshold
     inverse = _inverse_normal(changes[:, free])
     own = shows.copy()
     own[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
     determined = free & (own >= threshold)
-    covariance = _covariance(residuals, x, determined, standard_error)
+    covariance = _covariance(residuals, x, determined & ~at_bound, standard_error)
     lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
     verdicts = []
     for number in range(len(x)):
