@@ -100,8 +100,8 @@ def _by_blocks(function: Callable[..., Array], *arrays: Array, out: tuple[int, .
     return result.reshape(out)
 
 
-def _display_xyz(rgb: Array, viewing: Viewing) -> Array:
-    return np.clip(rgb * viewing.exposure, 0.0, 1.0) @ _rgb_to_xyz().T
+def _display_xyz(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
+    return np.clip(rgb * viewing.exposure, 0.0, white) @ _rgb_to_xyz().T
 
 
 def lab(rgb: ArrayLike, viewing: Viewing) -> Array:
@@ -112,18 +112,22 @@ def lab(rgb: ArrayLike, viewing: Viewing) -> Array:
     return _by_blocks(lambda block: XYZ_to_Lab(_display_xyz(block, viewing)), rgb, out=rgb.shape)
 
 
-def cam16ucs(rgb: ArrayLike, viewing: Viewing) -> Array:
-    """CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed; J' from 0 to 100."""
+def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
+    """CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed; J' from 0 to 100.
+
+    `white` is the largest value that the display shows, in units of the white that CAM16 adapts to;
+    beyond 1, J' goes beyond 100.
+    """
     from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
     from colour.models import JMh_CAM16_to_CAM16UCS
 
-    white = 100.0 * _rgb_to_xyz().sum(axis=1)
+    adapted = 100.0 * _rgb_to_xyz().sum(axis=1)
     adapting = 0.2 * viewing.ambient_illuminance / np.pi
     surround = VIEWING_CONDITIONS_CAM16["Average"]
 
     def convert(block: Array) -> Array:
-        xyz = 100.0 * _display_xyz(block, viewing)
-        model = XYZ_to_CAM16(xyz, white, adapting, viewing.background, surround, compute_H=False)
+        xyz = 100.0 * _display_xyz(block, viewing, white)
+        model = XYZ_to_CAM16(xyz, adapted, adapting, viewing.background, surround, compute_H=False)
         return JMh_CAM16_to_CAM16UCS(np.stack((model.J, model.M, model.h), axis=-1))
 
     rgb = np.asarray(rgb, np.float64)

@@ -134,10 +134,10 @@ def options(rendering):
     )
 
 
-def command(source, rendering):
-    """Return the command that repeats one comparison."""
+def command(source, rendering, name="compare"):
+    """Return the command that repeats one scene's part of a run."""
     scene = source.name if callable(source.content) else str(source.content)
-    words = ["fotismos", "compare", scene]
+    words = ["fotismos", name, scene]
     for key, value in rendering.items():
         if value is True:
             words.append(f"--{key.replace('_', '-')}")

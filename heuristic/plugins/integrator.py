@@ -155,7 +155,7 @@ class SceneMaterials:
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         present = present if self.prune else list(COEFFICIENTS)
         readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
-        *values, n, is_blinn = dr.switch(self._index(si, active), readers, si, active)
+        *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
         forms = sorted({bsdf.form for bsdf in self.bsdfs})
         is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
         coefficients = dict(zip(present, values, strict=True))
@@ -172,9 +172,10 @@ class SceneMaterials:
         sides = [bsdf.twosided for bsdf in self.bsdfs]
         if len(set(sides)) <= 1:
             return any(sides)
-        return dr.gather(mi.Bool, mi.Bool(sides), self._index(si, active), active)
+        return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
 
-    def _index(self, si, active):
+    def index(self, si, active):
+        """Return the number in ``bsdfs`` of the material at a surface interaction."""
         shape = dr.reinterpret_array(mi.UInt32, si.shape)
         return dr.gather(mi.UInt32, mi.UInt32(self.table), shape, active)
 

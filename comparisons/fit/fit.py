@@ -1,0 +1,207 @@
+"""Fitting the heuristic half of a scene to its reference.
+
+What is left of the departure at the best parameters is the *model error*: no values of them would
+remove it. What they removed is the *parameter error* of those that the pairing table gave.
+"""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from comparisons import record as comparison_record
+from comparisons.compare import prepare
+from comparisons.fit import record
+from comparisons.fit.identify import identify
+from comparisons.fit.loss import LOSSES
+from comparisons.fit.model import Model
+from comparisons.fit.optimise import Residuals, minimise
+from comparisons.fit.parameters import parameters
+from comparisons.fit.record import Fit, FitImages
+from comparisons.fit.rendering import BoxFiltered, render
+from comparisons.options import Options
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from heuristic.materials import FORMS
+
+RESOLUTION = (96, 96)
+SPP = 64
+"""A fit is a mean over all pixels, so that fewer and noisier ones than of a comparison do."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What can be chosen about a fit, beside the rendering.
+
+    Parameters
+    ----------
+    loss
+        A name in :data:`comparisons.fit.loss.LOSSES`.
+    forms
+        Of the lobe: any of :data:`heuristic.materials.FORMS`.
+    intensities
+        Whether to fit the lights' intensities too, each by one factor.
+
+    Raises
+    ------
+    InputError
+        For an unknown loss or form, or none.
+    """
+
+    loss: str = "perceptual"
+    forms: tuple[str, ...] = FORMS
+    intensities: bool = False
+
+    def __post_init__(self):
+        if self.loss not in LOSSES:
+            raise InputError(f"loss {self.loss!r} is not known: choose one of {', '.join(LOSSES)}.")
+        if not self.forms or not set(self.forms) <= set(FORMS):
+            raise InputError(f"forms {self.forms} are not known: choose of {', '.join(FORMS)}.")
+
+
+def fit(source, options=None, chosen=None, progress=None, command=""):
+    """Fit the heuristic half of a scene to its reference, in the current variant.
+
+    Parameters
+    ----------
+    source : reference.scene.Source
+        The scene.
+    options : comparisons.options.Options, optional
+        What is rendered; :data:`RESOLUTION` and :data:`SPP` where it does not say. Films get a box
+        filter, which keeps pixels independent.
+    chosen : FitOptions, optional
+        How it is fitted.
+    progress : callable, optional
+        Called as ``progress(stage, done, total)`` after each pass.
+    command
+        How to repeat the fit, for the record.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
+        Phong interpolation, or the camera sees no surface.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    begin = perf_counter()
+    chosen = chosen or FitOptions()
+    options = _completed(options or Options())
+    ready = prepare(BoxFiltered(source.name, source.content, source.parameters), options)
+    rendered = render(ready, options, progress or (lambda *_: None))
+    rendering = perf_counter() - begin
+    if not rendered.counted.any():
+        raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
+    attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
+    best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
+    data, maps = _measured(ready, rendered, attempts, best, chosen, options)
+    data |= {
+        "scene": source.name,
+        "time": {"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
+        "command": command,
+    }
+    after = attempts[best].image(rendered)
+    return Fit(data, FitImages(rendered.before, rendered.reference.mean, after, maps))
+
+
+def _completed(options):
+    """Fill in a fit's own defaults."""
+    if options.interpolation is not Interpolation.PHONG:
+        raise InputError(
+            f"interpolation {options.interpolation.value} cannot be fitted: its values are those of"
+            " vertices or faces. Give --interpolation phong."
+        )
+    return replace(options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP)
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """The best fit of one form."""
+
+    model: Model
+    solution: object
+    verdicts: list
+    covariance: np.ndarray
+
+    def image(self, rendered):
+        """Return the whole image, (H, W, 3)."""
+        model = Model(rendered.surface, self.model.form, self.model.parameters)
+        return model.image(self.solution.x).reshape(rendered.before.shape)
+
+
+def _attempt(rendered, form, chosen, viewing):
+    loss, counted = LOSSES[chosen.loss], rendered.counted
+    surface = rendered.surface.within(counted.ravel())
+    wanted = parameters(surface, form, loss.sees_colour, chosen.intensities)
+    model = Model(surface, form, wanted)
+    residuals = Residuals(model, rendered.reference.mean[counted], loss, viewing)
+    solution = minimise(residuals)
+    reached = [len(np.unique(samples.pixel)) for samples in surface.samples]
+    pixels = [
+        counted.sum() if parameter.name == "intensity" else reached[parameter.owner]
+        for parameter in wanted
+    ]
+    error = rendered.difference.standard_error[counted]
+    verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
+    return _Attempt(model, solution, verdicts, covariance)
+
+
+def _measured(ready, rendered, attempts, best, chosen, options):
+    """Return the record of all attempts, and the residual maps of the best one."""
+    physical = record.physical_materials(ready.pair.physical)
+    lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
+    fits, maps = [], []
+    for attempt in attempts:
+        departure, residual = record.departure(
+            rendered.before,
+            attempt.image(rendered),
+            rendered.reference.mean,
+            rendered.counted,
+            rendered.difference.noise,
+            options.viewing,
+        )
+        maps.append(residual)
+        fits += _fit_data(attempt, departure, physical, lights)
+    data = {
+        "variant": ready.reference.variant,
+        "seed": options.seed,
+        "resolution": list(options.resolution),
+        "spp": ready.reference.spp * ready.passes,
+        "passes": ready.passes,
+        "viewing": options.viewing.record(),
+        "pairing": options.convention.value,
+        "loss": {"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
+        "intensities": chosen.intensities,
+        "pixels": {"counted": int(rendered.counted.sum()), "total": rendered.counted.size},
+        "fits": fits,
+        "best": len(fits) // len(attempts) * best,
+        "warnings": list(ready.pair.warnings),
+        "versions": comparison_record.versions(),
+    }
+    return data, maps[best]
+
+
+def _light_names(scene):
+    """Return the names of the lights that the kernel knows, in its order."""
+    return [emitter.id() for emitter in scene.emitters() if hasattr(emitter, "light")]
+
+
+def _fit_data(attempt, departure, physical, lights):
+    """Return the data of a form as the chapters have it, and normalised: one fit, two ``k_s``."""
+    model, judged = attempt.model, (attempt.solution, attempt.verdicts, attempt.covariance)
+    return [
+        {
+            "form": model.form,
+            "normalised": normalised,
+            "loss": attempt.solution.loss,
+            "departure": departure,
+            "materials": record.materials_data(model, *judged, normalised, physical),
+            "lights": record.lights_data(model, *judged, lights) if lights else [],
+            "convergence": record.convergence_data(attempt.solution),
+        }
+        for normalised in (False, True)
+    ]

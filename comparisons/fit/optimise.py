@@ -1,0 +1,205 @@
+"""The search for the best parameters: a bounded Newton method from several starts.
+
+The loss is a sum over pixels of a convex function of the coordinates' differences, which are nearly
+linear in the parameters: its second derivative is that function's, carried over by the Jacobian, as
+in the method of Gauss and Newton. Each step minimises the quadratic that has these derivatives,
+damped as by Levenberg and Marquardt, within the bounds; SciPy's bounded-variable least squares
+finds that minimum exactly, so that a parameter reaches its bound and does not only approach it.
+(The method of Gauss and Newton on the roots of distances takes over a hundred steps where this
+takes ten: it sees a curvature where a distance has none.)
+
+A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
+several widths with the coefficients that suit each best.
+"""
+
+from dataclasses import dataclass
+from math import inf, isfinite, log
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from comparisons.fit import parameters as layout
+
+STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
+"""Exponents of the form ``phong`` to start from; of ``blinn`` they are four times as large."""
+
+FOLLOWED = 2
+"""The starts that are followed to their minimum, besides the paired one: those of least loss."""
+
+LARGEST_COUNT = 60
+"""Evaluations of one search."""
+
+TOLERANCE = 1e-7
+"""A search has converged when a step is expected to lower the loss by less than this part of it."""
+
+SMALLEST_GAIN = 1e-14
+"""And in the loss's own unit, for images that the model can make exactly."""
+
+LARGEST_DAMPING = 1e12
+
+
+@dataclass(frozen=True)
+class Start:
+    """One search: where it began, where it ended, and what it took.
+
+    ``loss`` is that of :meth:`Residuals.loss`; None at the end where a start was worse than others
+    and not followed. ``n`` is None for the paired parameters.
+    """
+
+    n: float | None
+    loss: float
+    final_loss: float | None = None
+    evaluations: int = 0
+    converged: bool = False
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The best parameters ``x``, the loss there, and all searches."""
+
+    x: np.ndarray
+    loss: float
+    starts: tuple[Start, ...]
+
+
+class Residuals:
+    """Differences in a loss's coordinates, and the derivatives of the loss.
+
+    The loss is the mean over pixels of ``r(d) = sqrt(d^2 + c^2) - c`` for distances ``d``, or of
+    ``d^2 / 2`` where ``c`` is infinite.
+
+    Parameters
+    ----------
+    model : comparisons.fit.model.Model
+        Of the pixels that count.
+    reference
+        (N, 3).
+    distance : comparisons.fit.loss.Loss
+        In whose coordinates.
+    viewing : comparisons.spaces.Viewing
+        How linear values are looked at.
+    """
+
+    def __init__(self, model, reference, distance, viewing):
+        self.model, self.reference = model, reference
+        self.distance, self.viewing = distance, viewing
+        self._wanted = distance.coordinates(reference, viewing)
+
+    def differences(self, x):
+        """Return the differences of the coordinates, (N, K)."""
+        return self.distance.coordinates(self.model.image(x), self.viewing) - self._wanted
+
+    def changes(self, x):
+        """Return their derivatives, (N, K, parameters)."""
+        slopes = self.distance.derivative(self.model.image(x), self.viewing)
+        return slopes @ self.model.columns(x).transpose(1, 2, 0)
+
+    def loss(self, x):
+        """Return the loss."""
+        square = np.sum(self.differences(x) ** 2, axis=1)
+        c = self.distance.rounding
+        # The same as sqrt(d^2 + c^2) - c, without the difference of like numbers.
+        values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
+        return float(values.mean())
+
+    def curvature(self, x):
+        """Return the second derivative of a pixel's loss by its coordinates, (N, K, K).
+
+        ``I / s - d d^T / s^3`` with ``s = sqrt(d^2 + c^2)``.
+        """
+        differences = self.differences(x)
+        identity = np.eye(differences.shape[1])
+        s = self._norm(differences)[..., None]
+        if not isfinite(self.distance.rounding):
+            return np.broadcast_to(identity, (len(differences), *identity.shape))
+        return identity / s - differences[:, :, None] * differences[:, None, :] / s**3
+
+    def quadratic(self, x):
+        """Return gradient (P,) and second derivative (P, P) of the loss by the parameters."""
+        changes, differences = self.changes(x), self.differences(x)
+        gradient = np.einsum("nkp,nk->p", changes, differences / self._norm(differences))
+        flat = changes.reshape(-1, len(x))
+        second = flat.T @ (self.curvature(x) @ changes).reshape(-1, len(x))
+        return gradient / len(differences), second / len(differences)
+
+    def _norm(self, differences):
+        """Return ``s``, (N, 1); 1 for squares."""
+        c = self.distance.rounding
+        square = np.sum(differences**2, axis=1, keepdims=True)
+        return np.sqrt(square + c * c) if isfinite(c) else np.ones_like(square)
+
+
+def minimise(residuals):
+    """Find the parameters of least loss.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Its model names the parameters.
+
+    Returns
+    -------
+    Solution
+    """
+    paired = layout.start(residuals.model.parameters)
+    candidates = [(None, paired)]
+    candidates += [(n, _best_coefficients(residuals, paired, n)) for n in STARTS]
+    losses = [residuals.loss(x) for _, x in candidates]
+    followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
+    starts, best = [], (inf, paired)
+    for place, (n, x) in enumerate(candidates):
+        if place in followed:
+            x, loss, evaluations, converged = _descend(residuals, x)
+            best = min(best, (loss, x), key=lambda pair: pair[0])
+            starts.append(Start(n, losses[place], loss, evaluations, converged))
+        else:
+            starts.append(Start(n, losses[place]))
+    return Solution(best[1], best[0], tuple(starts))
+
+
+def _descend(residuals, x):
+    """Return the minimum that a search from ``x`` finds, its loss, evaluations and convergence."""
+    low, high = layout.bounds(residuals.model.parameters)
+    loss, damping = residuals.loss(x), 1e-3
+    gradient, second = residuals.quadratic(x)
+    for evaluations in range(1, LARGEST_COUNT):
+        damped = second + damping * np.diag(np.diag(second))
+        step = _bounded_minimum(damped, gradient, low - x, high - x)
+        expected = -(gradient @ step + step @ damped @ step / 2)
+        if expected <= max(TOLERANCE * loss, SMALLEST_GAIN) or damping > LARGEST_DAMPING:
+            return x, loss, evaluations, True
+        trial = np.clip(x + step, low, high)
+        gained = loss - residuals.loss(trial)
+        if gained > 0:
+            x, loss = trial, loss - gained
+            gradient, second = residuals.quadratic(x)
+            damping *= 0.1 if gained > 0.5 * expected else 1
+        if gained <= 0.1 * expected:
+            damping *= 8
+    return x, loss, LARGEST_COUNT, False
+
+
+def _best_coefficients(residuals, x, n):
+    """Return parameters with one exponent, and the coefficients that suit it in linear RGB."""
+    model = residuals.model
+    low, high = layout.bounds(model.parameters)
+    at_n = np.array([parameter.name == "n" for parameter in model.parameters])
+    x = np.where(at_n, log(n * 4 if model.form == "blinn" else n), x)
+    linear = model.linear
+    columns = model.columns(x)[linear].reshape(linear.sum(), -1)
+    wanted = (residuals.reference - model.surface.fixed).ravel()
+    x[linear] = _bounded_minimum(columns @ columns.T, -columns @ wanted, low[linear], high[linear])
+    return x
+
+
+def _bounded_minimum(second, gradient, low, high):
+    """Return the minimum of ``g x + x H x / 2`` within bounds, by bounded least squares.
+
+    Directions without curvature stay where they are: they get the little that rounding would.
+    """
+    values, vectors = np.linalg.eigh(second)
+    roots = np.sqrt(np.maximum(values, max(1e-13 * values[-1], 1e-300)))
+    found = lsq_linear(
+        roots[:, None] * vectors.T, -(vectors.T @ gradient) / roots, (low, high), method="bvls"
+    )
+    return np.clip(found.x, low, high)

@@ -1,0 +1,187 @@
+"""Rendering the heuristic half for its surface: where each camera ray of each pass ends.
+
+The rays are those of the reference's passes: the same sampler, seeds and film.
+"""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.fit.samples import VECTORS, Samples, Surface, gathered
+from heuristic.materials import Material
+from heuristic.plugins.integrator import SceneMaterials
+from heuristic.shading import shade
+from reference.rendering import Accumulator, Renderer, variant
+
+COEFFICIENTS = ("k_a", "k_d", "k_s")
+"""Those that are fitted."""
+
+
+class Recorder:
+    """Renders passes of a heuristic half for their :class:`Surface`.
+
+    Parameters
+    ----------
+    renderer : reference.rendering.Renderer
+        Of the heuristic half, with Phong shading and a box filter.
+    """
+
+    def __init__(self, renderer):
+        self._variant = renderer.variant
+        with variant(self._variant):
+            shading = renderer.integrator
+            self._eye = _eye(shading)
+            self._materials = SceneMaterials(renderer.scene, prune=False)
+            point = dr.zeros(mi.SurfaceInteraction3f)
+            self._lights = shading.lights(renderer.scene, point, True)
+            self._ambient = shading.ambient_at(point, True)
+        self._renderer = Renderer(renderer.scene, self._eye, renderer.spp, "heuristic samples")
+        self._names = _names(renderer.scene, self._materials.bsdfs)
+        self._fixed = Accumulator()
+        self._parts = [[] for _ in self._names]
+        self._samples_a_pixel = 0
+
+    def render(self, seed):
+        """Keep the samples of the pass with this seed.
+
+        Raises
+        ------
+        NonFiniteError
+            For an emission or a background that is NaN or infinite.
+        """
+        image = self._renderer.render(seed)
+        self._fixed.add(image)
+        seen, self._eye.seen = self._eye.seen, None
+        spp = dr.width(seen["position"]) // (image.shape[0] * image.shape[1])
+        self._samples_a_pixel += spp
+        for number, parts in enumerate(self._parts):
+            index = dr.compress(seen["facing"] & (seen["material"] == number))
+            kept = {
+                key: gathered(value, index)
+                for key, value in seen.items()
+                if key not in ("facing", "material")
+            }
+            parts.append(kept | {"pixel": np.array(index) // spp})
+
+    def surface(self):
+        """Return what the passes so far have seen."""
+        samples = []
+        for bsdf, parts in zip(self._materials.bsdfs, self._parts, strict=True):
+            whole = {key: _joined([part[key] for part in parts]) for key in parts[0]}
+            shadows = sorted((key for key in whole if key.startswith("light ")), key=_light_number)
+            samples.append(
+                Samples(
+                    *(whole[key] for key in (*VECTORS, "pixel")),
+                    textures={name: whole[name] for name in _textured(bsdf)},
+                    visible=tuple(whole[key] for key in shadows),
+                )
+            )
+        fixed = self._fixed.estimate().mean.reshape(-1, 3)
+        return Surface(
+            tuple(self._names),
+            tuple(map(_described, self._materials.bsdfs)),
+            tuple(samples),
+            tuple(self._lights),
+            self._ambient,
+            fixed,
+            self._samples_a_pixel,
+        )
+
+
+def _eye(shading):
+    """Make an integrator that keeps what ``shading`` would shade, and shows emission alone."""
+
+    class Eye(type(shading)):
+        def shaded(self, scene, si, view, normal, active):
+            materials = SceneMaterials(scene, prune=False)
+            number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
+            facing = active & (self.twosided(scene, si, active) | (si.wi.z > 0))
+            seen = {
+                "position": mi.Vector3f(si.p),
+                "normal": mi.Vector3f(normal),
+                "view": mi.Vector3f(view),
+                "facing": facing,
+                "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
+            }
+            for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
+                seen[name] = _read(materials, number, name, si, active)
+            if shading.occlusion:
+                seen |= _visibility(shading, scene, si, active)
+            dr.schedule(seen)
+            self.seen = seen
+            return _read(materials, number, "k_i", si, active)
+
+    props = mi.Properties("heuristic")
+    props["hide_emitters"] = shading.hide_emitters
+    return Eye(props)
+
+
+def _read(materials, number, name, si, active):
+    """Return one coefficient of the material at each sample, as the scene gives it."""
+
+    def reader(bsdf):
+        return lambda si, active: mi.Color3f(getattr(bsdf, name).eval(si, active))
+
+    readers = [reader(bsdf) for bsdf in materials.bsdfs]
+    if len(readers) == 1:
+        return readers[0](si, active)
+    return dr.switch(number, readers, si, active)
+
+
+def _visibility(shading, scene, si, active):
+    """Return a mask for each light, in the order in which the kernel asks for them."""
+    test, masks = shading.visibility(scene, si, active), []
+
+    def keeping(toward, distance):
+        masks.append(test(toward, distance))
+        return masks[-1]
+
+    place = mi.Vector3f(si.p)
+    shade(place, place, place, Material(k_d=1), shading.lights(scene, si, active), 0, keeping)
+    return {f"light {number}": mask for number, mask in enumerate(masks)}
+
+
+def _textured(bsdf):
+    return [name for name in COEFFICIENTS if getattr(bsdf, name).is_spatially_varying()]
+
+
+def _described(bsdf):
+    """Return a ``phong`` as a material of plain numbers, 1 for what varies over the surface."""
+
+    def plain(values):
+        # The shortest decimals of single precision are what the scene says.
+        return tuple(float(str(np.float32(value))) for value in np.ravel(values))
+
+    point = dr.zeros(mi.SurfaceInteraction3f)
+    coefficients = {
+        name: (1.0,) * 3
+        if name in _textured(bsdf)
+        else plain(mi.Color3f(getattr(bsdf, name).eval(point)))
+        for name in COEFFICIENTS
+    }
+    return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
+
+
+def _light_number(key):
+    return int(key.removeprefix("light "))
+
+
+def _joined(parts):
+    """Concatenate the parts of the passes: Dr.Jit arrays of one or three rows, or NumPy's."""
+    if isinstance(parts[0], np.ndarray):
+        return np.concatenate(parts)
+    kind = type(parts[0])
+    parts = [part for part in parts if dr.width(part)]  # Dr.Jit cannot append nothing
+    if not parts:
+        return dr.zeros(kind, 0)
+    if dr.depth_v(kind) == 1:
+        return dr.concat(parts)
+    return kind(*(dr.concat(rows) for rows in zip(*parts, strict=True)))
+
+
+def _names(scene, bsdfs):
+    """Return a name for each material: its id, or that of the first shape that has it."""
+    shapes = {}
+    for shape in scene.shapes():
+        shapes.setdefault(shape.bsdf(), shape.id())
+    return [bsdf.id() or f"material of {shapes[bsdf]}" for bsdf in bsdfs]

@@ -1,0 +1,76 @@
+"""Rendering both halves of a scene for a fit."""
+
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+
+from comparisons.fit.recorder import Recorder
+from heuristic.errors import InputError
+from reference.gbuffer import gbuffer
+from reference.rendering import Accumulator, variant
+from reference.scene import Source, properties
+
+VARIANT = "llvm_ad_rgb"
+
+
+@dataclass(frozen=True)
+class BoxFiltered(Source):
+    """A scene whose films have a box filter."""
+
+    def parse(self):
+        graph = super().parse()
+        for film in graph.nodes(mi.ObjectType.Film):
+            for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
+                graph.detach(film, key)
+        for sensor in graph.nodes(mi.ObjectType.Sensor):
+            if not graph.children(sensor, mi.ObjectType.Film):
+                film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
+                graph.attach(sensor, "film", film)
+        for film in graph.nodes(mi.ObjectType.Film):
+            box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
+            graph.attach(film, "rfilter", box)
+        return graph
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """Both halves' passes: the image of the paired parameters, the reference, and the surface."""
+
+    before: np.ndarray
+    reference: object
+    difference: object
+    surface: object
+    counted: np.ndarray
+
+
+def render(ready, options, progress):
+    """Render the passes of both halves in turn, and keep the heuristic half's surface.
+
+    Raises
+    ------
+    InputError
+        When the heuristic half is not in RGB.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    if ready.heuristic.variant != VARIANT:
+        raise InputError(
+            f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
+            f" --heuristic-variant {VARIANT}."
+        )
+    recorder = Recorder(ready.heuristic)
+    sums = [Accumulator() for _ in range(3)]
+    for number in range(ready.passes):
+        progress("rendering", number, ready.passes)
+        seed = options.seed + number
+        images = [half.render(seed) for half in (ready.heuristic, ready.reference)]
+        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
+        for total, image in zip(sums, images, strict=True):
+            total.add(image)
+        recorder.render(seed)
+    progress("rendering", ready.passes, ready.passes)
+    before, reference, difference = (total.estimate() for total in sums)
+    seen = gbuffer(ready.scene, *options.resolution)
+    with variant(VARIANT):
+        return Rendered(before.mean, reference, difference, recorder.surface(), seen.hit)

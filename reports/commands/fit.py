@@ -1,0 +1,83 @@
+"""``fotismos fit``: the best heuristic parameters, and what they leave."""
+
+import json
+from pathlib import Path
+
+import click
+
+from reports import jobs
+
+
+@click.command()
+@click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
+@jobs.output_option("out/fit")
+@click.option(
+    "--loss",
+    default="perceptual",
+    show_default=True,
+    type=click.Choice(["perceptual", "linear", "log-luminance"]),
+    help="What is minimised: the mean colour difference in CAM16-UCS, or the mean square"
+    " of the difference in linear RGB or of the ratio of luminances.",
+)
+@click.option(
+    "--form",
+    default="all",
+    show_default=True,
+    type=click.Choice(["phong", "blinn", "all"]),
+    help="Form of the lobe, each also normalised.",
+)
+@click.option(
+    "--intensities",
+    is_flag=True,
+    help="Fit the lights' intensities too, against that of the first; and ambient light,"
+    " where the scene has none.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the records as JSON.")
+@click.option(
+    "--markdown",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the departures of all scenes as a table in Markdown, too.",
+)
+@jobs.rendering_options
+def fit(scenes, output, form, as_json, markdown, **words):
+    """Find the heuristic parameters that come nearest to the reference, and say what they leave.
+
+    The departure before less that after is the parameter error, the departure after the model
+    error: no parameters remove it. Writes OUTPUT/SCENE/fit.json and fit.png (before, reference,
+    after, residual). Unless told otherwise it renders 96x96 pixels with 64 samples each.
+
+    \b
+    Examples:
+      fotismos fit fig-8-9
+      fotismos fit my_scene.xml --loss linear --form phong --intensities
+    """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.check_installation()
+    from comparisons.fit.fit import FitOptions
+    from comparisons.fit.fit import fit as run
+    from heuristic.materials import FORMS
+    from reference.scene import set_variant
+    from reports import fitting, progress
+    from reports import output as files
+
+    fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
+    chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
+    folder = files.prepare(output)
+    records, names = [], []
+    with progress.shown() as bar:
+        for source, rendering in [jobs.job(name, words) for name in scenes]:
+            set_variant(rendering["variant"])
+            command = jobs.command(source, rendering | fitting_words | {"form": form}, "fit")
+            result = run(source, jobs.options(rendering), chosen, bar.of(source.name), command)
+            names.append(files.folder_name(source.name, names))
+            fitting.write(folder / names[-1], result)
+            records.append(result.data)
+    if markdown:
+        fitting.write_text(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
+    if as_json:
+        lines = [json.dumps(records, indent=2, ensure_ascii=False)]
+    else:
+        lines = [line for record in records for line in fitting.lines(record)]
+        lines.append(str(folder))
+    for line in lines:
+        click.echo(line)

@@ -1,0 +1,95 @@
+"""``fotismos fit``: files, tables, messages."""
+
+import json
+import shlex
+import sys
+from io import BytesIO
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from PIL import Image
+
+from reports import cli
+
+SCHEMA = json.loads((Path(cli.__file__).parent / "fit.schema.json").read_text(encoding="utf-8"))
+SMALL = ("--resolution", "16x12", "--spp", 4)
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process; returns exit code, output and messages."""
+
+    def command(*words):
+        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as leaving:
+            code = leaving.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+def test_fit_writes_a_record_that_its_schema_accepts_and_a_picture(run, tmp_path):
+    words = ("fig-8-6a", "-o", tmp_path, "--intensities", "--seed", 5, *SMALL)
+    code, printed, messages = run("fit", *words)
+    assert (code, messages) == (0, "")
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    data = json.loads((tmp_path / "fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    jsonschema.validate(data, SCHEMA)
+    assert [(fit["form"], fit["normalised"]) for fit in data["fits"]] == [
+        (form, normalised) for form in ("phong", "blinn") for normalised in (False, True)
+    ]
+    losses = [fit["loss"] for fit in data["fits"]]
+    assert losses[data["best"]] == min(losses)
+    assert data["fits"][0]["lights"][0]["reason"]
+    for word in ("paired", "blinn (normalised)", "noise floor", "parameter error", "model error"):
+        assert word in printed
+    assert "light 1" in printed
+    picture = np.array(Image.open(BytesIO((tmp_path / "fig-8-6a/fit.png").read_bytes())))
+    tiles = np.split(picture[-200:-20, 8:], 4, axis=1)
+    assert len(np.unique([tile.mean() for tile in tiles])) == 4
+
+
+def test_the_recorded_command_repeats_the_fit(run, tmp_path):
+    run("fit", "fig-8-6a", "-o", tmp_path / "a", "--form", "blinn", "--loss", "linear", *SMALL)
+    first = json.loads((tmp_path / "a/fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    code, _, _ = run(*shlex.split(first["command"])[1:], "-o", tmp_path / "b")
+    assert code == 0
+    second = json.loads((tmp_path / "b/fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    assert first["fits"] == second["fits"]
+
+
+def test_json_is_printed_alone_and_the_table_of_several_scenes_written(run, tmp_path):
+    table = tmp_path / "table.md"
+    words = ("fig-8-5a", "fig-8-6a", "--form", "phong", "--json", "--markdown", table)
+    code, printed, _ = run("fit", *words, "-o", tmp_path, *SMALL)
+    assert code == 0
+    records = json.loads(printed)
+    assert [record["scene"] for record in records] == ["fig-8-5a", "fig-8-6a"]
+    rows = [line for line in table.read_text(encoding="utf-8").splitlines() if "fig-8-6a" in line]
+    departure = records[1]["fits"][0]["departure"]["dE2000"]
+    assert f"{departure['before']:.3f} → {departure['after']:.3f}" in rows[1]
+    unlit = [
+        line for line in table.read_text(encoding="utf-8").splitlines() if "8-5a | phong" in line
+    ]
+    assert "0 → –" in unlit[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("fig-6-10",), "--interpolation phong"),
+        (("fig-8-6a", "--loss", "L1"), "perceptual"),
+        (("no-such-scene",), "built-in"),
+        ((), "Missing argument"),
+        (("fig-8-6a", "--variant", "llvm_ad_mono"), "--heuristic-variant llvm_ad_rgb"),
+    ],
+)
+def test_bad_words_are_refused(words, expected, run, tmp_path):
+    code, _, messages = run("fit", *words, "-o", tmp_path, *SMALL)
+    assert code == 2
+    assert expected in messages
