@@ -1,0 +1,287 @@
+"""Charts as Vega-Lite specifications: plain dictionaries, which a page shows and vl-convert draws.
+
+A specification carries its data and names no address, so that nothing is loaded.
+"""
+
+from math import log10
+
+SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
+
+WIDTH, HEIGHT = 560, 380
+"""Pixels of the plot itself; names stand to its right."""
+
+LABEL_GAP = 15
+"""Pixels from one name to the next, at least."""
+
+MARKS = {
+    "kernel": ("#b3450b", "square"),
+    "phong BSDF": ("#6a51a3", "triangle-up"),
+    "physical": ("#08519c", "circle"),
+}
+"""Colour and shape of each family; the shape tells them apart without colour."""
+
+INK, FAINT = "#222222", "#8a8a8a"
+
+
+def error_over_time(data):
+    """Return the chart of ``cost.json``: mean ΔE2000 over seconds, both logarithmic.
+
+    Points of the Pareto front are filled. Lines join the sample counts of one rung. The dashed line
+    is the slope −1/2 of plain Monte Carlo; the dotted one the reference's own noise, below which
+    nothing can be told.
+    """
+    points = [_row(point) for point in data["points"]]
+    floor = data["reference"]["noise_floor"]
+    times = [point["time"] for point in points]
+    errors = [point["error"] for point in points] + ([floor] if floor > 0 else [])
+    x = _Axis(min(times), max(times), WIDTH)
+    y = _Axis(max(min(errors), 1e-3), max(errors), HEIGHT, flipped=True)
+    for point in points:
+        point["error"] = max(point["error"], y.low)
+    layers = [
+        *_slope(points, x, y),
+        *_floor(floor, y),
+        _lines(points, x, y),
+        _symbols(points, x, y),
+        *_names(points, x, y),
+    ]
+    return {
+        "$schema": SCHEMA,
+        "description": f"Error against time of the methods on {data['scene']}",
+        "title": {
+            "text": f"{data['scene']}: error against time",
+            "subtitle": _subtitle(data),
+            "anchor": "start",
+        },
+        "width": WIDTH,
+        "height": HEIGHT,
+        "padding": {"left": 8, "right": 8, "top": 8, "bottom": 8},
+        "layer": layers,
+        "config": {
+            "font": "sans-serif",
+            "background": "white",
+            "axis": {"labelFontSize": 12, "titleFontSize": 13, "gridColor": "#e4e4e4"},
+            "title": {"fontSize": 15, "subtitleFontSize": 12, "subtitleColor": "#555555"},
+            "view": {"stroke": "#bbbbbb"},
+        },
+    }
+
+
+class _Axis:
+    """A logarithmic axis with room at both ends: its domain, and the pixels of its values."""
+
+    def __init__(self, low, high, length, flipped=False):
+        room = max(0.06 * log10(high / low), 0.05)
+        self.low, self.high = low * 10**-room, high * 10**room
+        self.length, self.flipped = length, flipped
+
+    def pixel(self, value):
+        share = log10(value / self.low) / log10(self.high / self.low)
+        return self.length * (1 - share if self.flipped else share)
+
+    def value(self, pixel):
+        share = pixel / self.length
+        return self.low * (self.high / self.low) ** (1 - share if self.flipped else share)
+
+    def scale(self):
+        return {"type": "log", "domain": [self.low, self.high], "nice": False}
+
+
+def _row(point):
+    family = "kernel" if "kernel" in point["rung"] else "physical"
+    if point["rung"].startswith("phong BSDF"):
+        family = "phong BSDF"
+    return {
+        "rung": point["rung"],
+        "family": family,
+        "spp": point["spp"],
+        "time": point["seconds"]["median"] * 1e3,
+        "low": point["seconds"]["low"] * 1e3,
+        "high": point["seconds"]["high"] * 1e3,
+        "error": point["error"],
+        "front": point["pareto"],
+    }
+
+
+def _subtitle(data):
+    width, height = data["resolution"]
+    machine = data["machine"]
+    return [
+        f"{width} × {height} pixels, {data['rounds']} rounds, {machine['cores']} cores,"
+        f" {machine['processor']}",
+        "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
+    ]
+
+
+def _lines(points, x, y):
+    return {
+        "data": {"values": points},
+        "mark": {"type": "line", "strokeWidth": 1.2, "opacity": 0.75},
+        "encoding": _encoding(x, y) | {"detail": {"field": "rung"}, "color": _colour()},
+    }
+
+
+def _symbols(points, x, y):
+    symbol = {
+        "mark": {"type": "point", "size": 55, "strokeWidth": 1.6, "opacity": 1},
+        "encoding": _encoding(x, y)
+        | {
+            "color": _colour(),
+            "shape": {
+                "field": "family",
+                "legend": None,
+                "scale": {"domain": list(MARKS), "range": [shape for _, shape in MARKS.values()]},
+            },
+            "fill": {
+                "condition": {"test": "datum.front", **_colour()},
+                "value": "white",
+            },
+            "tooltip": [
+                {"field": "rung", "title": "method"},
+                {"field": "spp", "title": "samples a pixel"},
+                {"field": "time", "title": "time (ms)", "format": ".3~g"},
+                {"field": "error", "title": "mean ΔE2000", "format": ".3~g"},
+            ],
+        },
+    }
+    interval = {
+        "mark": {"type": "rule", "strokeWidth": 1.2, "opacity": 0.8},
+        "encoding": {
+            "x": {"field": "low", "type": "quantitative", "scale": x.scale()},
+            "x2": {"field": "high"},
+            "y": _encoding(x, y)["y"],
+            "color": _colour(),
+        },
+    }
+    return {"data": {"values": points}, "layer": [interval, symbol]}
+
+
+def _encoding(x, y):
+    return {
+        "x": {
+            "field": "time",
+            "type": "quantitative",
+            "scale": x.scale(),
+            "title": "time for one image (ms, logarithmic)",
+            "axis": {"format": "~g", "tickCount": 6},
+        },
+        "y": {
+            "field": "error",
+            "type": "quantitative",
+            "scale": y.scale(),
+            "title": "mean ΔE2000 to the reference (logarithmic)",
+            "axis": {"format": "~g", "tickCount": 6},
+        },
+    }
+
+
+def _colour():
+    return {
+        "field": "family",
+        "type": "nominal",
+        "legend": None,
+        "scale": {"domain": list(MARKS), "range": [colour for colour, _ in MARKS.values()]},
+    }
+
+
+def _names(points, x, y):
+    """Return the rungs' names beside the plot, apart from each other, with lines to their points.
+
+    Each name belongs to its rung's slowest point.
+    """
+    last = {}
+    for point in sorted(points, key=lambda p: p["time"]):
+        last[point["rung"]] = point
+    ordered = sorted(last.values(), key=lambda p: y.pixel(p["error"]))
+    places = spread([y.pixel(p["error"]) for p in ordered], LABEL_GAP, HEIGHT)
+    layers = []
+    for point, place in zip(ordered, places, strict=True):
+        start = {"x": x.pixel(point["time"]) + 6, "y": y.pixel(point["error"])}
+        layers += [
+            _rule((start["x"], start["y"]), (WIDTH + 10, place), color="#c4c4c4", strokeWidth=0.7),
+            _text(point["rung"], WIDTH + 14, place, color=MARKS[point["family"]][0]),
+        ]
+    return layers
+
+
+def spread(wanted, gap, length):
+    """Move places on a line apart: at least ``gap`` between neighbours, in the same order.
+
+    ``wanted`` are pixels in ascending order. Neighbours that would touch become a block about the
+    mean of what they want; blocks stay within ``[0, length]`` where they fit.
+    """
+    blocks = []
+    for place in wanted:
+        blocks.append([place])
+        while len(blocks) > 1 and _top(blocks[-1], gap) < _top(blocks[-2], gap) + gap * len(
+            blocks[-2]
+        ):
+            blocks[-2] += blocks.pop()
+    places = [_top(block, gap) + gap * i for block in blocks for i in range(len(block))]
+    for i in reversed(range(len(places))):  # pushed up from the lower end, then down from the upper
+        limit = places[i + 1] - gap if i + 1 < len(places) else length
+        places[i] = min(places[i], limit)
+    for i in range(len(places)):
+        places[i] = max(places[i], places[i - 1] + gap if i else 0)
+    return places
+
+
+def _top(block, gap):
+    return sum(block) / len(block) - gap * (len(block) - 1) / 2
+
+
+def _slope(points, x, y):
+    """Return the line of slope −1/2 through the fewest samples of the last Monte Carlo rung."""
+    rungs = [p["rung"] for p in points]
+    sampled = [p for p in points if rungs.count(p["rung"]) > 1]
+    if not sampled:
+        return []
+    start = min((p for p in sampled if p["rung"] == sampled[-1]["rung"]), key=lambda p: p["time"])
+    end = min(x.high, start["time"] * (start["error"] / y.low) ** 2)
+    error = start["error"] * (end / start["time"]) ** -0.5
+    a = x.pixel(start["time"]), y.pixel(start["error"])
+    b = x.pixel(end), y.pixel(error)
+    middle = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+    return [
+        _rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4]),
+        _text("slope −1/2", middle[0] - 6, middle[1] + 10, color="#555555", align="right"),
+    ]
+
+
+def _floor(floor, y):
+    if floor <= y.low:
+        return []
+    place = y.pixel(floor)
+    return [
+        _rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3]),
+        _text("noise of the reference", 6, place - 8, color="#555555"),
+    ]
+
+
+def _rule(start, end, **style):
+    return {
+        "data": {"values": [{}]},
+        "mark": {"type": "rule", "clip": False, **style},
+        "encoding": {
+            "x": {"value": start[0]},
+            "y": {"value": start[1]},
+            "x2": {"value": end[0]},
+            "y2": {"value": end[1]},
+        },
+    }
+
+
+def _text(text, x, y, color, align="left"):
+    return {
+        "data": {"values": [{}]},
+        "mark": {
+            "type": "text",
+            "text": text,
+            "align": align,
+            "baseline": "middle",
+            "fontSize": 12,
+            "color": color,
+            "clip": False,
+        },
+        "encoding": {"x": {"value": x}, "y": {"value": y}},
+    }
