@@ -216,7 +216,8 @@ def spread(wanted, gap, length):
         while len(blocks) > 1 and _top(blocks[-1], gap) < _top(blocks[-2], gap) + gap * len(
             blocks[-2]
         ):
-            blocks[-2] += blocks.pop()
+            block = blocks.pop()
+            blocks[-1] += block
     places = [_top(block, gap) + gap * i for block in blocks for i in range(len(block))]
     for i in reversed(range(len(places))):  # pushed up from the lower end, then down from the upper
         limit = places[i + 1] - gap if i + 1 < len(places) else length
