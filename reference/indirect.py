@@ -16,9 +16,7 @@ SURVIVAL = 0.95
 
 
 @dr.syntax
-def indirect_light(
-    scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1
-):
+def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1):
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Parameters

@@ -32,7 +32,7 @@ def error_over_time(data):
     """
     points = [_row(point) for point in data["points"]]
     floor = data["reference"]["noise_floor"]
-    times = [point["time"] for point in points]
+    times = [point[bound] for point in points for bound in ("low", "high")]
     errors = [point["error"] for point in points] + ([floor] if floor > 0 else [])
     x = _Axis(min(times), max(times), WIDTH)
     y = _Axis(max(min(errors), 1e-3), max(errors), HEIGHT, flipped=True)
@@ -110,6 +110,7 @@ def _subtitle(data):
         f"{width} × {height} pixels, {data['rounds']} rounds, {machine['cores']} cores,"
         f" {machine['processor']}",
         "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
+        "dashed: slope −1/2, plain Monte Carlo; dotted: noise of the reference itself",
     ]
 
 
@@ -242,21 +243,14 @@ def _slope(points, x, y):
     error = start["error"] * (end / start["time"]) ** -0.5
     a = x.pixel(start["time"]), y.pixel(start["error"])
     b = x.pixel(end), y.pixel(error)
-    middle = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
-    return [
-        _rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4]),
-        _text("slope −1/2", middle[0] - 6, middle[1] + 10, color="#555555", align="right"),
-    ]
+    return [_rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
 
 
 def _floor(floor, y):
     if floor <= y.low:
         return []
     place = y.pixel(floor)
-    return [
-        _rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3]),
-        _text("noise of the reference", 6, place - 8, color="#555555"),
-    ]
+    return [_rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3])]
 
 
 def _rule(start, end, **style):
@@ -272,13 +266,13 @@ def _rule(start, end, **style):
     }
 
 
-def _text(text, x, y, color, align="left"):
+def _text(text, x, y, color):
     return {
         "data": {"values": [{}]},
         "mark": {
             "type": "text",
             "text": text,
-            "align": align,
+            "align": "left",
             "baseline": "middle",
             "fontSize": 12,
             "color": color,

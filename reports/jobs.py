@@ -134,10 +134,10 @@ def options(rendering):
     )
 
 
-def command(source, rendering):
-    """Return the command that repeats one comparison."""
+def command(source, rendering, verb="compare"):
+    """Return the command that repeats what was done with one scene."""
     scene = source.name if callable(source.content) else str(source.content)
-    words = ["fotismos", "compare", scene]
+    words = ["fotismos", verb, scene]
     for key, value in rendering.items():
         if value is True:
             words.append(f"--{key.replace('_', '-')}")

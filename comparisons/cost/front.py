@@ -7,6 +7,7 @@ the measured counts nothing is said.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import exp, log
 
 TIMES_S = (0.01, 0.1, 1.0, 10.0)
@@ -82,7 +83,7 @@ def _time(point):
 def _reached(method, points, error):
     if points[0].error <= error:
         return Reached(method, error, points[0].seconds, at_most=True)
-    for before, after in zip(points, points[1:], strict=False):
+    for before, after in pairwise(points):
         if after.error <= error < before.error:
             return Reached(method, error, _between(before, after, error))
     return Reached(method, error, None)

@@ -126,9 +126,7 @@ class Lattice:
         if key == KERNEL:
             return self._kernel(self._options)
         if key == PLAIN_KERNEL:
-            plain = replace(
-                self._options, interpolation=Interpolation.PHONG, tessellation=None
-            )
+            plain = replace(self._options, interpolation=Interpolation.PHONG, tessellation=None)
             return self._kernel(plain)
         is_current = Effect.SPECTRAL in key or Effect.SPECTRAL not in self.effects
         return self._in_variant(self.variant if is_current else self.heuristic_variant, key)
@@ -142,9 +140,7 @@ class Lattice:
     def _in_variant(self, name, effects):
         with variant(name):
             if name not in self._between:
-                plain = replace(
-                    self._options, interpolation=Interpolation.PHONG, tessellation=None
-                )
+                plain = replace(self._options, interpolation=Interpolation.PHONG, tessellation=None)
                 self._between[name] = Between(_pair(self._source, plain), self.ready.plan)
             return self._between[name].renderer(effects, self.spp)
 

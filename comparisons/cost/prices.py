@@ -138,9 +138,9 @@ def prices(lattice, judge, seed=0):
     own = lattice.of("reference")
     return Prices(
         effects=tuple(found),
-        departure=float(judge.map(lattice.simulating(nothing).images.mean(axis=0))[
-            judge.counted
-        ].mean()),
+        departure=float(
+            judge.map(lattice.simulating(nothing).images.mean(axis=0))[judge.counted].mean()
+        ),
         floor=judge.errors(own.images.mean(axis=0))[0],
         kernel_s=float(lattice.of("kernel").seconds.mean()),
         reference_s=float(own.seconds.mean()),

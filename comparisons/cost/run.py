@@ -3,6 +3,8 @@
 import os
 import platform
 from dataclasses import asdict, dataclass, replace
+from itertools import count as count_from
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +37,9 @@ class Effort:
     ----------
     rounds
         Timed repeats of each rung, at least 2. From 6 on the median has a 95 % interval.
-    counts
-        Samples a pixel of the Monte Carlo rungs: powers of 4, at which the sampler is fastest.
+    largest
+        Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
+        those the sampler is fastest.
     reference_spp
         Samples a pixel of each pass of the reference that errors are told against.
     replicate_spp
@@ -44,7 +47,7 @@ class Effort:
     """
 
     rounds: int = 7
-    counts: tuple[int, ...] = (4, 16, 64, 256)
+    largest: int = 64
     reference_spp: int = 64
     replicate_spp: int = 64
 
@@ -52,8 +55,14 @@ class Effort:
         if self.rounds < 2:
             raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
 
+    @property
+    def counts(self):
+        """The sample counts of the Monte Carlo rungs."""
+        powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
+        return tuple(powers) or (self.largest,)
 
-QUICK = Effort(rounds=6, counts=(4, 16, 64), reference_spp=64, replicate_spp=16)
+
+QUICK = Effort(rounds=6, largest=16, reference_spp=16, replicate_spp=16)
 """For many scenes in one report, at :data:`QUICK_WIDTH`."""
 
 QUICK_WIDTH = 64
@@ -113,8 +122,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     progress = progress or _silent
     options = replace(options, resolution=options.resolution or default_resolution(source, options))
     if options.spp is not None:
-        fewer = tuple(count for count in effort.counts if count <= options.spp)
-        effort = replace(effort, counts=fewer or (options.spp,))
+        effort = replace(effort, largest=options.spp)
     ready = prepare(source, replace(options, spp=None))
     width, height = (int(side) for side in ready.scene.sensors()[0].film().crop_size())
     counted = gbuffer(ready.scene, width, height).hit
@@ -157,9 +165,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
             {"name": rung.name, "names": list(rung.names), "monte_carlo": rung.monte_carlo}
             for rung in methods.rungs
         ],
-        "points": [
-            _without(m, "image") | {"pareto": (m.rung, m.spp) in front} for m in measured
-        ],
+        "points": [_without(m, "image") | {"pareto": (m.rung, m.spp) in front} for m in measured],
         "equal_time": [asdict(row) for row in equal_time(points)],
         "equal_error": [asdict(row) for row in equal_error(points)],
         "prices": {
@@ -203,7 +209,8 @@ def machine():
     """Return what times depend on: processor, cores that may be used, system."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
+        "cores": len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
         else os.cpu_count() or 1,
         "system": f"{platform.system()} {platform.machine()}",
     }
