@@ -125,6 +125,7 @@ def options(rendering):
     return Options(
         seed=rendering["seed"],
         spp=rendering["spp"],
+        noise=rendering.get("noise"),
         resolution=rendering["resolution"],
         convention=Convention(rendering["pairing"]),
         heuristic_variant=rendering["heuristic_variant"],

@@ -49,7 +49,7 @@ class Effort:
     rounds: int = 7
     largest: int = 64
     reference_spp: int = 64
-    replicate_spp: int = 64
+    replicate_spp: int = 16
 
     def __post_init__(self):
         if self.rounds < 2:
@@ -62,7 +62,7 @@ class Effort:
         return tuple(powers) or (self.largest,)
 
 
-QUICK = Effort(rounds=6, largest=16, reference_spp=16, replicate_spp=16)
+QUICK = Effort(rounds=6, largest=16, reference_spp=16)
 """For many scenes in one report, at :data:`QUICK_WIDTH`."""
 
 QUICK_WIDTH = 64
