@@ -145,10 +145,11 @@ def render(ready, options, counted, progress, kept=None):
             reached = noise_percentile(sums, counted, options.viewing)
         by = "target" if reached <= options.noise else "samples"
         stop = Stop(options.noise, reached, by, ready.passes * ready.reference.spp)
-    # Large images: the sums go one by one as their estimates come, the wavefront's memory first.
-    dr.flush_malloc_cache()
+    # The sums of a large image go one by one as their estimates come.
     difference, reference = (sums.pop().estimate() for _ in range(2))
-    return Rendered(sums.pop().mean(), reference, difference, done, done - before, stop)
+    heuristic = sums.pop().mean()
+    dr.flush_malloc_cache()
+    return Rendered(heuristic, reference, difference, done, done - before, stop)
 
 
 def is_checked(done, passes):

@@ -1,7 +1,7 @@
 """Passes of a long run, kept in a file so that an interruption loses little.
 
-``.SCENE.passes.npz`` lies beside the folder of a scene's results. It is written whole or not at all,
-belongs to one scene, one set of options and one set of versions, and goes away when the run
+``.SCENE.passes.npz`` lies beside the folder of a scene's results. It is written whole or not at
+all, belongs to one scene, one set of options and one set of versions, and goes away when the run
 succeeds.
 """
 
@@ -41,7 +41,7 @@ class KeptPasses:
     def load(self):
         """Return the state that was kept, a dictionary of arrays; None where there is none."""
         try:
-            with np.load(self.path, allow_pickle=False) as file:
+            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
                 if str(file["key"]) != self.key:
                     return None
                 return {name: file[name] for name in file.files if name != "key"}
