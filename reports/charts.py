@@ -10,6 +10,9 @@ SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
 WIDTH, HEIGHT = 560, 380
 """Pixels of the plot itself; names stand to its right."""
 
+LEAST_ERROR = 1e-3
+"""ΔE2000: smaller ones are drawn at the lower border, since a logarithmic axis has no 0."""
+
 LABEL_GAP = 15
 """Pixels from one name to the next, at least."""
 
@@ -35,7 +38,8 @@ def error_over_time(data):
     times = [point[bound] for point in points for bound in ("low", "high")]
     errors = [point["error"] for point in points] + ([floor] if floor > 0 else [])
     x = _Axis(min(times), max(times), WIDTH)
-    y = _Axis(max(min(errors), 1e-3), max(errors), HEIGHT, flipped=True)
+    lowest = max(min(errors), LEAST_ERROR)
+    y = _Axis(lowest, max(lowest, *errors), HEIGHT, flipped=True)
     for point in points:
         point["error"] = max(point["error"], y.low)
     layers = [
@@ -78,10 +82,6 @@ class _Axis:
     def pixel(self, value):
         share = log10(value / self.low) / log10(self.high / self.low)
         return self.length * (1 - share if self.flipped else share)
-
-    def value(self, pixel):
-        share = pixel / self.length
-        return self.low * (self.high / self.low) ** (1 - share if self.flipped else share)
 
     def scale(self):
         return {"type": "log", "domain": [self.low, self.high], "nice": False}
