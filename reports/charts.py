@@ -110,7 +110,8 @@ def _subtitle(data):
         f"{width} × {height} pixels, {data['rounds']} rounds, {machine['cores']} cores,"
         f" {machine['processor']}",
         "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
-        "dashed: slope −1/2, plain Monte Carlo; dotted: noise of the reference itself",
+        f"{'dashed: slope −1/2, plain Monte Carlo; ' if _sampled(data['points']) else ''}"
+        "dotted: noise of the reference itself",
     ]
 
 
@@ -233,17 +234,27 @@ def _top(block, gap):
 
 
 def _slope(points, x, y):
-    """Return the line of slope −1/2 through the fewest samples of the last Monte Carlo rung."""
-    rungs = [p["rung"] for p in points]
-    sampled = [p for p in points if rungs.count(p["rung"]) > 1]
+    """Return the line of slope −1/2 through the best point of any Monte Carlo rung."""
+    sampled = _sampled(points)
     if not sampled:
         return []
-    start = min((p for p in sampled if p["rung"] == sampled[-1]["rung"]), key=lambda p: p["time"])
-    end = min(x.high, start["time"] * (start["error"] / y.low) ** 2)
-    error = start["error"] * (end / start["time"]) ** -0.5
-    a = x.pixel(start["time"]), y.pixel(start["error"])
-    b = x.pixel(end), y.pixel(error)
+    last = min(sampled, key=lambda point: point["error"])
+
+    def at(error):
+        return last["time"] * (last["error"] / error) ** 2
+
+    begin, end = max(x.low, at(y.high)), min(x.high, at(y.low))
+    a, b = (
+        (x.pixel(time), y.pixel(last["error"] * (time / last["time"]) ** -0.5))
+        for time in (begin, end)
+    )
     return [_rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
+
+
+def _sampled(points):
+    """Return the points of rungs that have several sample counts."""
+    rungs = [point["rung"] for point in points]
+    return [point for point in points if rungs.count(point["rung"]) > 1]
 
 
 def _floor(floor, y):
