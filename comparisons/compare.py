@@ -7,7 +7,7 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 
-from comparisons import record, reference_limits, statistics
+from comparisons import passes, record, reference_limits, statistics
 from comparisons.metrics import METRICS
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
@@ -16,10 +16,13 @@ from reference import halves
 from reference.gbuffer import gbuffer
 from reference.halves import Pair
 from reference.plan import Plan, plan, sampler
-from reference.rendering import Accumulator, Estimate, Renderer, physical_integrator, variant
+from reference.rendering import Renderer, physical_integrator, variant
 
 LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
+
+ROWS = 256
+"""Of an image, tested for significance at a time."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -52,19 +55,20 @@ def prepare(source, options=None):
     chosen = plan(pair, physical, options.interpolation, options.everything)
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
     planning = perf_counter() - begin
-    passes, spp = _passes(options.spp or chosen.spp, chosen.passes)
+    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
+    planned = passes.schedule(chosen, width * height, options.spp, options.noise)
     return Prepared(
         pair=pair,
         plan=chosen,
         scene=physical,
-        heuristic=_heuristic_renderer(source, pair, chosen, spp, options),
-        reference=Renderer(physical, integrator, spp, "reference image"),
-        passes=passes,
+        heuristic=_heuristic_renderer(source, pair, chosen, planned.spp, options),
+        reference=Renderer(physical, integrator, planned.spp, "reference image"),
+        passes=planned.passes,
         planning_seconds=planning,
     )
 
 
-def compare(source, options=None, progress=None, command=""):
+def compare(source, options=None, progress=None, command="", kept=None):
     """Compare the heuristic with the physical half of a scene, in the current variant.
 
     Parameters
@@ -77,6 +81,9 @@ def compare(source, options=None, progress=None, command=""):
         Called as ``progress(stage, done, total)`` after each pass.
     command
         How to repeat the comparison, for the record.
+    kept : optional
+        Where the passes of an interrupted run are, and those of this one go
+        (:func:`comparisons.passes.render`).
 
     Returns
     -------
@@ -95,11 +102,13 @@ def compare(source, options=None, progress=None, command=""):
     heuristic, reference = ready.heuristic, ready.reference
     stages.done("scene and pairing", ready.planning_seconds)
     stages.seconds["planning"] = ready.planning_seconds
-    estimates = _render(ready, options.seed, progress or _silent)
-    stages.done("sums of passes", sum(heuristic.times) + sum(reference.times))
     width, height = (int(side) for side in ready.scene.sensors()[0].film().crop_size())
     surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
+    estimates = passes.render(ready, options, surface.hit, progress or _silent, kept)
+    # Passes of an earlier run took their time then, not now.
+    rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
+    stages.done("sums of passes", rendering if estimates.new else 0.0)
     metrics, images = _measure(estimates, surface, options)
     stages.done("metrics")
     limits = reference_limits.find(
@@ -117,7 +126,7 @@ def compare(source, options=None, progress=None, command=""):
         "interpolation": options.interpolation.value,
         "seed": options.seed,
         "resolution": [width, height],
-        "plan": record.plan_data(ready.plan, reference.spp * ready.passes, ready.passes),
+        "plan": record.plan_data(ready.plan, reference.spp * estimates.passes, estimates.passes),
         "viewing": options.viewing.record(),
         "metrics": metrics,
         "pixels": {"counted": int(images.counted.sum()), "total": width * height},
@@ -133,13 +142,9 @@ def compare(source, options=None, progress=None, command=""):
         "versions": record.versions(),
         "command": command,
     }
+    if estimates.stop is not None:
+        data["noise_target"] = asdict(estimates.stop)
     return Comparison(data, images)
-
-
-def _passes(spp, wanted):
-    """Return the number of passes, which is even, and the samples a pixel of each."""
-    passes = max(2, min(wanted, spp // 4 // 2 * 2))
-    return passes, max(1, spp // passes)
 
 
 def _pair(source, options):
@@ -162,32 +167,12 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         return Renderer(scene, None, spp, "heuristic image")
 
 
-@dataclass(frozen=True)
-class _Estimates:
-    heuristic: Estimate
-    reference: Estimate
-    difference: Estimate
-
-
-def _render(ready, seed, progress):
-    """Render the passes of both halves in turn, so that a drift of the machine hits both."""
-    sums = [Accumulator() for _ in range(3)]
-    for number in range(ready.passes):
-        progress("rendering", number, ready.passes)
-        images = [half.render(seed + number) for half in (ready.heuristic, ready.reference)]
-        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
-        for total, image in zip(sums, images, strict=True):
-            total.add(image)
-    progress("rendering", ready.passes, ready.passes)
-    return _Estimates(*(total.estimate() for total in sums))
-
-
 def _measure(estimates, surface, options):
     """Compute all metrics and maps over the pixels whose centre sees a surface.
 
     The doubt in question is that of the difference: what both halves share cancels in it.
     """
-    test, reference = estimates.heuristic.mean, estimates.reference.mean
+    test, reference = estimates.heuristic, estimates.reference.mean
     noise = estimates.difference.noise
     counted = surface.hit
     metrics, maps = {}, {}
@@ -199,14 +184,7 @@ def _measure(estimates, surface, options):
     metrics["rmse"] = asdict(statistics.summarise_rmse(test, reference, counted, noise))
     ratio, maps["log2_luminance"] = statistics.summarise_log2_luminance(test, reference, counted)
     metrics["log2_luminance"] = asdict(ratio)
-    significant = significance(
-        estimates.difference.mean,
-        estimates.difference.standard_error,
-        estimates.difference.passes,
-        max(int(counted.sum()), 1),
-        LEVEL,
-        magnitude=np.maximum(np.abs(test), np.abs(reference)),
-    )
+    significant = _significant(estimates, counted)
     fraction = float(significant[counted].mean()) if counted.any() else 0.0
     metrics["significant"] = {"fraction": fraction, "level": LEVEL}
     images = Images(
@@ -220,6 +198,23 @@ def _measure(estimates, surface, options):
         counted=counted,
     )
     return metrics, images
+
+
+def _significant(estimates, counted):
+    """Mark the pixels that differ by more than noise, some rows at a time to save memory."""
+    test, reference = estimates.heuristic, estimates.reference.mean
+    marked = np.empty(counted.shape, bool)
+    for start in range(0, len(counted), ROWS):
+        rows = slice(start, start + ROWS)
+        marked[rows] = significance(
+            estimates.difference.mean[rows],
+            estimates.difference.standard_error[rows],
+            estimates.difference.passes,
+            max(int(counted.sum()), 1),
+            LEVEL,
+            magnitude=np.maximum(np.abs(test[rows]), np.abs(reference[rows])),
+        )
+    return marked
 
 
 class _Stages:

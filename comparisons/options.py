@@ -18,7 +18,11 @@ class Options:
         Seed of the first pass; pass ``i`` has ``seed + i`` in both halves.
     spp
         Samples a pixel in all, in place of the plan's. They are split into the plan's number of
-        passes, or fewer where that leaves less than 4 a pass, at least 2.
+        passes, or fewer where that leaves less than 4 a pass, at least 2. With ``noise``, the
+        most that are taken.
+    noise
+        Go on until the 95th percentile of the noise in ΔE2000 is no more than this
+        (:mod:`comparisons.passes`).
     resolution
         ``(width, height)`` in place of the film's own.
     convention
@@ -36,11 +40,13 @@ class Options:
     Raises
     ------
     InputError
-        For fewer than 2 samples, a negative seed, or a resolution below 1.
+        For fewer than 2 samples, a noise target that is not positive, a negative seed, or a
+        resolution below 1.
     """
 
     seed: int = 0
     spp: int | None = None
+    noise: float | None = None
     resolution: tuple[int, int] | None = None
     convention: Convention = Convention.MATCHED
     interpolation: Interpolation = Interpolation.PHONG
@@ -53,6 +59,10 @@ class Options:
         if self.spp is not None and self.spp < 2:
             raise InputError(
                 f"spp = {self.spp} is not allowed: the noise needs at least 2 samples."
+            )
+        if self.noise is not None and not self.noise > 0:
+            raise InputError(
+                f"noise = {self.noise} is not allowed: give a ΔE2000 above 0, such as 0.5."
             )
         if self.seed < 0:
             raise InputError(f"seed = {self.seed} is not allowed: give 0 or more.")

@@ -11,6 +11,7 @@ noise is told by `comparisons.significance`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,9 @@ EXPOSURE_STOPS = 6.0
 
 #: Pixels on which the best exposure is sought, and those that bracket it first.
 _SEARCH_PIXELS, _BRACKET_PIXELS = 16_384, 2_048
+
+#: Pixels measured at a time: temporaries stay small whatever the image's size.
+_BLOCK_PIXELS = 2**20
 
 
 @dataclass(frozen=True)
@@ -108,23 +112,20 @@ def summarise(
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    reference_coordinates = metric.coordinates(reference, viewing)
-    distance = metric.difference(reference_coordinates, metric.coordinates(test, viewing))
-    # From here on only counted pixels: (N, 3).
-    test, reference, counted = test[mask], reference[mask], reference_coordinates[mask]
+    distance = _distance(metric, test, reference, viewing)
     numbers = _numbers(distance[mask])
 
-    factor = _best_exposure(metric, test, reference, counted, viewing)
+    factor = _best_exposure(metric, test, reference, mask, viewing)
     after = numbers
     if factor != 1.0:
-        after = _numbers(metric.difference(counted, metric.coordinates(factor * test, viewing)))
+        exposed = _distance(metric, test, reference, viewing, factor)
+        after = _numbers(exposed[mask])
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
 
+    floor = float(noise) if np.ndim(noise) == 0 else 0.0
     if np.ndim(noise):
-        floor = _noise_floor(metric, reference, counted, np.asarray(noise)[mask], viewing)
-    else:
-        floor = float(noise)
+        floor = _noise_floor(metric, reference, np.asarray(noise), mask, viewing)
     exposed = ExposedSummary(exposure=factor, **after)
     return MetricSummary(**numbers, noise_floor=floor, after_exposure=exposed), distance
 
@@ -175,9 +176,7 @@ def best_exposure(
     Raises as `comparisons.metrics.delta_e_2000`.
     """
     test, reference = checked_pair(test, reference)
-    mask = np.asarray(mask, bool)
-    test, reference = test[mask], reference[mask]
-    return _best_exposure(metric, test, reference, metric.coordinates(reference, viewing), viewing)
+    return _best_exposure(metric, test, reference, np.asarray(mask, bool), viewing)
 
 
 def best_exposure_rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike) -> float:
@@ -205,9 +204,7 @@ def noise_floor(
     taken with alternating signs. A result near this value cannot be told from none.
     """
     reference, noise = checked_pair(reference, noise)
-    mask = np.asarray(mask, bool)
-    reference, noise = reference[mask], noise[mask]
-    return _noise_floor(metric, reference, metric.coordinates(reference, viewing), noise, viewing)
+    return _noise_floor(metric, reference, noise, np.asarray(mask, bool), viewing)
 
 
 def _numbers(values: Array) -> dict[str, float]:
@@ -222,13 +219,40 @@ def _numbers(values: Array) -> dict[str, float]:
     }
 
 
+def _distance(
+    metric: Metric, test: Array, reference: Array, viewing: Viewing, factor: float = 1.0
+) -> Array:
+    """The map of `metric` after `factor` on the test image; a block of rows at a time."""
+    distance = np.empty(test.shape[:-1])
+    for rows in _blocks(test):
+        distance[rows] = metric.difference(
+            metric.coordinates(reference[rows], viewing),
+            metric.coordinates(factor * test[rows], viewing),
+        )
+    return distance
+
+
+def _blocks(image: Array) -> Iterator[slice]:
+    """Slices of rows that hold about `_BLOCK_PIXELS` pixels."""
+    step = max(1, _BLOCK_PIXELS * len(image) // max(image.size // 3, 1))
+    return (slice(start, start + step) for start in range(0, len(image), step))
+
+
 def _noise_floor(
-    metric: Metric, reference: Array, coordinates: Array, noise: Array, viewing: Viewing
+    metric: Metric, reference: Array, noise: Array, mask: Array, viewing: Viewing
 ) -> float:
-    if not noise.any():
+    if not mask.any() or not noise.any():
         return 0.0
-    noisy = metric.coordinates(reference + noise, viewing)
-    return float(metric.difference(coordinates, noisy).mean())
+    values = np.empty(np.count_nonzero(mask))
+    place = 0
+    for rows in _blocks(reference):
+        here = reference[rows][mask[rows]]
+        noisy = here + noise[rows][mask[rows]]
+        values[place : place + len(here)] = metric.difference(
+            metric.coordinates(here, viewing), metric.coordinates(noisy, viewing)
+        )
+        place += len(here)
+    return float(values.mean())
 
 
 def _least_squares_factor(test: Array, reference: Array) -> float:
@@ -237,17 +261,19 @@ def _least_squares_factor(test: Array, reference: Array) -> float:
 
 
 def _best_exposure(
-    metric: Metric, test: Array, reference: Array, coordinates: Array, viewing: Viewing
+    metric: Metric, test: Array, reference: Array, mask: Array, viewing: Viewing
 ) -> float:
-    """`best_exposure` of counted pixels (N, 3), the reference's coordinates given."""
     from scipy.optimize import minimize_scalar
 
-    if not ((test > 0.0).any() and (reference > 0.0).any()):
+    lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
+    if not all(lit):
         return 1.0
     # A random draw, not every n-th pixel: a stride would fall in step with the columns.
-    count = min(len(test), _SEARCH_PIXELS)
-    drawn = np.random.default_rng(0).choice(len(test), count, replace=False)
-    test, reference, coordinates = test[drawn], reference[drawn], coordinates[drawn]
+    places = np.flatnonzero(mask)
+    count = min(len(places), _SEARCH_PIXELS)
+    drawn = places[np.random.default_rng(0).choice(len(places), count, replace=False)]
+    test, reference = test.reshape(-1, 3)[drawn], reference.reshape(-1, 3)[drawn]
+    coordinates = metric.coordinates(reference, viewing)
 
     def mean_at(stops: float, count: int | None = None) -> float:
         exposed = metric.coordinates(2.0**stops * test[:count], viewing)

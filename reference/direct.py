@@ -11,7 +11,11 @@ and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mits
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``hide_emitters``   boolean (false)     as of Mitsuba's ``direct``
-``shadows``         boolean (true)      trace shadow rays; off only where nothing can be hidden
+``shadows``         boolean (true)      trace shadow rays; off where nothing can be hidden, or
+                                        where shadows are to be missing
+``bsdf_samples``    integer (1)         samples of the BSDF that look for lights, 0 or 1. Such a
+                                        ray meets what hides a light: without shadows, 0 where
+                                        something does
 ``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:mod:`reference.indirect`)
 ==================  ==================  ===========================================================
@@ -39,6 +43,7 @@ def _define():
         def __init__(self, props):
             super().__init__(props)
             self.shadows = props.get("shadows", True)
+            self.bsdf_samples = props.get("bsdf_samples", 1)
             self.max_depth = props.get("max_depth", 2)
             self.environment_albedo = None
             """An :class:`reference.environment.AlbedoTable` in place of sampling the environment,
@@ -66,10 +71,12 @@ def _define():
                 colour += self._from_emitter(
                     scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
                 )
-            if extended:
+            if extended and self.bsdf_samples:
                 colour += _from_bsdf(scene, si, bsdf, context, sampler, hit)
             if self.max_depth != 2:
-                colour += indirect_light(scene, sampler, si, bsdf, self.max_depth, hit)
+                colour += indirect_light(
+                    scene, sampler, si, bsdf, self.max_depth, hit, self.shadows, self.bsdf_samples
+                )
             environment = scene.environment() is not None and not self.hide_emitters
             return colour, active if environment else hit, []
 
@@ -89,7 +96,7 @@ def _define():
             if self.shadows:
                 active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
             wo = si.to_local(ds.d)
-            if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
+            if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) or not self.bsdf_samples:
                 return dr.select(active, bsdf.eval(context, si, wo, active) * weight, 0)
             value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
             return dr.select(active, value * weight * ds.pdf / (ds.pdf + bsdf_pdf), 0)

@@ -16,7 +16,7 @@ SURVIVAL = 0.95
 
 
 @dr.syntax
-def indirect_light(scene, sampler, si, bsdf, max_depth, active):
+def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1):
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Parameters
@@ -25,6 +25,8 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active):
         As of Mitsuba's integrators.
     max_depth
         As Mitsuba counts: 2 is direct light, for which the result is 0; -1 is no limit.
+    shadows, bsdf_samples
+        As of :mod:`reference.direct`, at every later vertex too.
 
     Returns
     -------
@@ -47,7 +49,7 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active):
         # What the first ray meets shines directly on the surface that it left, which is not ours.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
-        seen = active & (depth > 2)
+        seen = active & (depth > 2) & (bsdf_samples > 0)
         emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen)
         share = previous_pdf / (previous_pdf + emitter_pdf)
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
@@ -55,11 +57,11 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active):
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), True, direct)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
         direct &= ds.pdf > 0
         wo = si.to_local(ds.d)
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
-        share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
         light += dr.select(direct, throughput * value * weight * share, 0)
 
         bs, weight = vertex.sample(

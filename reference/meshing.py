@@ -1,7 +1,9 @@
 """Replacing the shapes of a scene by triangle meshes, for flat and Gouraud shading."""
 
+import shutil
+import weakref
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 import mitsuba as mi
 
@@ -32,7 +34,7 @@ def replace_shapes(graph, scene, resolution, interpolation):
     InputError
         Naming a shape that cannot be made into triangles.
     """
-    folder = TemporaryDirectory(prefix="fotismos-")
+    folder = _Folder()
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(SHAPE):
         given = graph.props(index)
@@ -42,7 +44,7 @@ def replace_shapes(graph, scene, resolution, interpolation):
                 mesh = meshes.split_faces(mesh)
         elif not mesh.has_vertex_normals():
             mesh = meshes.with_vertex_normals(mesh)
-        path = Path(folder.name) / f"{index}.ply"
+        path = folder.path / f"{index}.ply"
         mesh.write_ply(str(path))
         children = {key: value for key, value in given.items() if isinstance(value, Reference)}
         # The file holds world coordinates; flat faces are told by the lack of vertex normals.
@@ -51,3 +53,11 @@ def replace_shapes(graph, scene, resolution, interpolation):
             derived["face_normals"] = True
         graph.replace(index, derived)
     graph.folders.append(folder)
+
+
+class _Folder:
+    """A temporary folder that goes away with the last graph that names it, without a warning."""
+
+    def __init__(self):
+        self.path = Path(mkdtemp(prefix="fotismos-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

@@ -57,11 +57,13 @@ class Estimate:
     passes: int
 
 
-class Accumulator:
-    """Running sums of passes, for an :class:`Estimate`.
+class Mean:
+    """The running mean of passes.
 
     Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering.
     """
+
+    SUMS = ("mean",)
 
     def __init__(self):
         self.count = 0
@@ -70,22 +72,54 @@ class Accumulator:
         """Add a pass: a tensor (H, W, 3)."""
         image = mi.TensorXd(image)
         if self.count == 0:
-            self._mean, self._squares, self._signed = (dr.zeros_like(image) for _ in range(3))
+            for name in self.SUMS:
+                setattr(self, f"_{name}", dr.zeros_like(image))
         self.count += 1
+        self._step(image)
+        dr.eval(*(getattr(self, f"_{name}") for name in self.SUMS))
+
+    def mean(self):
+        """Return the mean of the passes so far."""
+        return np.array(self._mean)
+
+    def state(self):
+        """Return the sums as arrays, for :meth:`restore`."""
+        sums = {name: np.array(getattr(self, f"_{name}")) for name in self.SUMS}
+        return {"count": np.array(self.count)} | sums
+
+    def restore(self, state):
+        """Go on from the :meth:`state` of another one."""
+        self.count = int(state["count"])
+        for name in self.SUMS:
+            setattr(self, f"_{name}", mi.TensorXd(state[name]))
+
+    def _step(self, image):
+        self._mean += (image - self._mean) / dr.opaque(mi.Float64, self.count)
+
+
+class Accumulator(Mean):
+    """Running sums of passes, for an :class:`Estimate`."""
+
+    SUMS = ("mean", "squares", "signed")
+
+    def _step(self, image):
         step = image - self._mean
-        self._mean += step / dr.opaque(mi.Float64, self.count)
+        super()._step(image)
         self._squares += step * (image - self._mean)
         self._signed += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
-        dr.eval(self._mean, self._squares, self._signed)
+
+    def noise(self):
+        """Return the noise image of :class:`Estimate`; the number of passes should be even."""
+        return np.array(self._signed) / self.count
 
     def estimate(self):
         """Return what the passes so far say; their number should be even and at least 2."""
-        mean, squares, signed = map(np.array, (self._mean, self._squares, self._signed))
-        variance = squares / max(self.count - 1, 1)
+        variance = np.array(self._squares)
+        variance /= max(self.count - 1, 1) * self.count
         return Estimate(
-            mean=mean,
-            standard_error=np.sqrt(variance / self.count),
-            noise=signed / self.count,
+            mean=self.mean(),
+            standard_error=np.sqrt(variance, out=variance),
+            noise=self.noise(),
             passes=self.count,
         )
 

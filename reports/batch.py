@@ -15,7 +15,7 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
     from comparisons.compare import compare
     from comparisons.hard import record
     from reference.scene import set_variant
-    from reports import hard_cases, output, progress
+    from reports import hard_cases, output, passes, progress
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
@@ -24,12 +24,15 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
         for source, chosen in wanted:
             start_up = perf_counter() - START if not views else 0.0
             set_variant(chosen["variant"])
+            name = output.folder_name(source.name, views)
+            options = jobs.options(chosen)
+            kept = passes.of_scene(folder, name, source, options, chosen["variant"])
             result = compare(
-                source, jobs.options(chosen), bar.of(source.name), jobs.command(source, chosen)
+                source, options, bar.of(source.name), jobs.command(source, chosen), kept
             )
             begin = perf_counter()
-            name = output.folder_name(source.name, views)
             views[name] = output.write_scene(folder, name, result)
+            kept.remove()
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()

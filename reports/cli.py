@@ -10,7 +10,7 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import compare, doctor, fit, plan, report, scenes
+from reports.commands import compare, cost, doctor, fit, plan, report, scenes
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -22,6 +22,7 @@ def cli():
 for command in (
     compare.compare,
     plan.plan,
+    cost.cost,
     fit.fit,
     report.report,
     scenes.scenes,

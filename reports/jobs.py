@@ -125,6 +125,7 @@ def options(rendering):
     return Options(
         seed=rendering["seed"],
         spp=rendering["spp"],
+        noise=rendering.get("noise"),
         resolution=rendering["resolution"],
         convention=Convention(rendering["pairing"]),
         heuristic_variant=rendering["heuristic_variant"],
@@ -134,10 +135,10 @@ def options(rendering):
     )
 
 
-def command(source, rendering, name="compare"):
-    """Return the command that repeats one scene's part of a run."""
+def command(source, rendering, verb="compare"):
+    """Return the command that repeats what was done with one scene."""
     scene = source.name if callable(source.content) else str(source.content)
-    words = ["fotismos", name, scene]
+    words = ["fotismos", verb, scene]
     for key, value in rendering.items():
         if value is True:
             words.append(f"--{key.replace('_', '-')}")

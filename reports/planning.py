@@ -36,7 +36,7 @@ def data(scene, ready, variant):
 
 def lines(plan):
     """Yield the lines of a plan: the table of effects, then what will be simulated."""
-    table = _table("effect", "called for", "rule", "evidence", "what it costs")
+    table = ruled("effect", "called for", "rule", "evidence", "what it costs")
     for effect in plan["effects"]:
         table.add_row(
             effect["name"],
@@ -45,7 +45,7 @@ def lines(plan):
             effect["evidence"],
             effect["cost"],
         )
-    yield from _printed(table)
+    yield from printed(table)
     depth = "no limit" if plan["max_depth"] < 0 else plan["max_depth"]
     rays = "" if plan["shadows"] else ", no shadow rays"
     rays += ", environment from a table" if plan["tabulated_environment"] else ""
@@ -59,7 +59,7 @@ def lines(plan):
 
 def verification_lines(results):
     """Yield a table of verifications: differences, noise, and time at equal noise."""
-    table = _table("scene", "planned", "significant", "of pixels", "kernel", "faster", "planning")
+    table = ruled("scene", "planned", "significant", "of pixels", "kernel", "faster", "planning")
     for result in results:
         table.add_row(
             result["scene"],
@@ -70,20 +70,22 @@ def verification_lines(results):
             f"{result['gain']:.3g} x",
             f"{result['planning_s'] * 1e3:.0f} ms of {result['saved_s']:.3g} s saved",
         )
-    yield from _printed(table)
+    yield from printed(table)
     yield "significant: pixels that differ by more than both sides' noise"
     yield "kernel: largest difference that the terms left out of the kernel make"
     yield "faster: how many times sooner the plan reaches the same noise"
 
 
-def _table(*headings):
+def ruled(*headings):
+    """Return an empty table with these headings, without lines."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in headings:
         table.add_column(heading, overflow="fold")
     return table
 
 
-def _printed(table):
+def printed(table):
+    """Yield the lines of a table as a terminal shows them."""
     console = Console(width=120)
     with console.capture() as capture:
         console.print(table)

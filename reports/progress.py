@@ -55,3 +55,18 @@ def summary(records):
             f"  {record['metrics']['significant']['fraction']:>11.1%}"
             f"  {time['heuristic']['total_s']:>7.2f} s  {time['reference']['total_s']:>7.2f} s"
         )
+    for record in records:
+        if "noise_target" in record:
+            yield _noise(record)
+
+
+def _noise(record):
+    """Say what a noise target came to, and what stopped the run."""
+    stop, plan = record["noise_target"], record["plan"]
+    asked = f"target {stop['target']:g}"
+    if stop["stopped_by"] == "samples":
+        asked += f" not reached: stopped by the limit of {stop['limit_spp']} samples a pixel"
+    return (
+        f"{record['scene']}: 95 % of pixels have noise under ΔE2000 = {stop['reached']:.3g}"
+        f" after {plan['spp']} samples a pixel ({asked})"
+    )

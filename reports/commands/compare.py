@@ -9,15 +9,24 @@ from reports import batch, jobs
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
 @jobs.output_option("out")
 @jobs.rendering_options
+@click.option(
+    "--noise",
+    type=float,
+    metavar="DE",
+    help="Go on until 95 % of pixels have noise under this ΔE2000; --spp is then the most samples"
+    " a pixel. [default limit: 4096]",
+)
 def compare(scenes, output, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`) or a Mitsuba file (.xml). Writes OUTPUT/index.html
-    and, for each scene, comparison.json, comparison.exr and pictures.
+    and, for each scene, comparison.json, comparison.exr and pictures. An interrupted run keeps its
+    passes: the same command goes on where it stopped, to the same image.
 
     \b
     Examples:
       fotismos compare fig-8-9
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
+      fotismos compare cornell-box --noise 0.5 --spp 2048
     """  # noqa: D301 click reads the \b as: keep these lines
     batch.run(scenes, output, rendering)

@@ -7,11 +7,12 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights, stability, terms
+from tests.benchmarks import kernel, lights, scaling, stability, terms
 
 BENCHMARKS = {
     "kernel": kernel.run,
     "lights": lights.run,
+    "scaling": scaling.run,
     "stability": stability.run,
     "terms": terms.run,
 }

@@ -1,0 +1,201 @@
+"""Rendering both halves of a comparison pass by pass, until it is enough.
+
+Passes are bounded in two ways. A wavefront, the samples that are under way at once, stays under
+:data:`WAVEFRONT`, which bounds the memory of large images. And with a noise target, passes go on
+until the noise is under it, or a limit on samples stops them.
+
+The state after each pass can be kept, so that an interrupted run goes on where it stopped. Pass
+``i`` has the seed ``seed + i`` and is added to the same sums in the same order, interrupted or not:
+the result is the same bit for bit.
+"""
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.metrics import METRICS
+from reference.rendering import Accumulator, Estimate, Mean
+
+WAVEFRONT = 2**24
+"""Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
+
+LIMIT_SPP = 4096
+"""Samples a pixel at which a run with a noise target stops, unless another limit is given."""
+
+PERCENTILE = 95
+"""Of the noise over the counted pixels, which the target is for."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Samples a pixel of each pass, and the number of passes, which is even and at least 2."""
+
+    spp: int
+    passes: int
+
+
+def schedule(plan, pixels, spp=None, noise=None):
+    """Return the :class:`Schedule` of a plan.
+
+    Parameters
+    ----------
+    plan : reference.plan.Plan
+        Its samples and passes, which hold where nothing else is asked for.
+    pixels
+        Of the image.
+    spp
+        Samples a pixel in all. With a noise target, the most of them.
+    noise
+        The target, None where there is none.
+    """
+    largest = max(1, WAVEFRONT // pixels)
+    if noise is not None:
+        each = min(max(1, plan.spp // plan.passes), largest)
+        each = max(1, min(each, (spp or LIMIT_SPP) // 2))
+        return Schedule(each, max(2, (spp or LIMIT_SPP) // each // 2 * 2))
+    spp = spp or plan.spp
+    passes = max(2, min(plan.passes, spp // 4 // 2 * 2))
+    each = max(1, spp // passes)
+    if each > largest:
+        each, passes = largest, max(2, -(-spp // largest // 2) * 2)
+    return Schedule(each, passes)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a run with a noise target ended.
+
+    Attributes
+    ----------
+    target, reached
+        95th percentile over the counted pixels of the noise in ΔE2000: asked for, and predicted
+        from the spread of the passes.
+    stopped_by
+        ``target``, or ``samples`` where the limit came first.
+    limit_spp
+        The limit, in samples a pixel.
+    """
+
+    target: float
+    reached: float
+    stopped_by: str
+    limit_spp: int
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """The passes of both halves and of their difference, and where they stopped (or None).
+
+    ``heuristic`` is a mean alone, (H, W, 3), since the doubt in question is the difference's.
+    ``passes`` counts all of them, ``new`` those that were rendered now and not kept before.
+    """
+
+    heuristic: np.ndarray
+    reference: Estimate
+    difference: Estimate
+    passes: int
+    new: int
+    stop: Stop | None
+
+
+def render(ready, options, counted, progress, kept=None):
+    """Render the passes of both halves in turn, so that a drift of the machine hits both.
+
+    Parameters
+    ----------
+    ready : comparisons.compare.Prepared
+        Both halves and their schedule.
+    options : comparisons.options.Options
+        Seed, noise target and viewing.
+    counted
+        (H, W): the pixels whose noise counts.
+    progress : callable
+        ``progress(stage, done, total)``; of a run with a target, ``total`` is the limit.
+    kept : optional
+        What holds the state of an interrupted run: ``load()`` returns a dictionary of arrays or
+        None, ``offer(count, state)`` is called after each pass with a function that returns one.
+
+    Returns
+    -------
+    Rendered
+    """
+    halves = (ready.heuristic, ready.reference)
+    sums = [Mean(), Accumulator(), Accumulator()]
+    done = before = _restore(kept.load() if kept else None, sums, halves)
+    reached = None
+    while done < ready.passes:
+        progress("rendering", done, ready.passes)
+        images = [half.render(options.seed + done) for half in halves]
+        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
+        for total, image in zip(sums, images, strict=True):
+            total.add(image)
+        done += 1
+        if kept:
+            kept.offer(done, lambda: _state(sums, halves))
+        if options.noise is not None and is_checked(done, ready.passes):
+            reached = noise_percentile(sums, counted, options.viewing)
+            if reached <= options.noise:
+                break
+    progress("rendering", done, done)
+    stop = None
+    if options.noise is not None:
+        if reached is None:
+            reached = noise_percentile(sums, counted, options.viewing)
+        by = "target" if reached <= options.noise else "samples"
+        stop = Stop(options.noise, reached, by, ready.passes * ready.reference.spp)
+    # The sums of a large image go one by one as their estimates come.
+    difference, reference = (sums.pop().estimate() for _ in range(2))
+    heuristic = sums.pop().mean()
+    dr.flush_malloc_cache()
+    return Rendered(heuristic, reference, difference, done, done - before, stop)
+
+
+def is_checked(done, passes):
+    """Tell whether the noise is looked at after so many passes: 4, 6, 8, 12, 16, 24, …, and last.
+
+    Each look takes as long as a pass or two; the steps cost at most half as many passes again as
+    are needed. They do not depend on the images, so that resuming changes nothing.
+    """
+    power = 1 << (done.bit_length() - 1)
+    return done >= passes or (done >= 4 and done in (power, power + power // 2))
+
+
+def noise_percentile(sums, counted, viewing):
+    """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
+
+    The noise image is that of the difference of the halves, what both share cancelled.
+    """
+    metric = METRICS["dE2000"]
+    reference, noise = sums[1].mean()[counted], sums[2].noise()[counted]
+    if not counted.any() or not noise.any():
+        return 0.0
+    coordinates = [metric.coordinates(image, viewing) for image in (reference, reference + noise)]
+    return float(np.percentile(metric.difference(*coordinates), PERCENTILE))
+
+
+def _state(sums, halves):
+    """Return all that later passes build upon, as arrays."""
+    state = {}
+    for number, total in enumerate(sums):
+        state |= {f"sum{number}_{name}": array for name, array in total.state().items()}
+    for number, half in enumerate(halves):
+        state[f"times{number}"] = np.array(half.times)
+        state[f"compilation{number}"] = np.array(half.compilation)
+    return state
+
+
+def _restore(state, sums, halves):
+    """Put a state back in place; returns the number of passes that it holds."""
+    if state is None:
+        return 0
+    for number, total in enumerate(sums):
+        prefix = f"sum{number}_"
+        total.restore(
+            {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
+        )
+    for number, half in enumerate(halves):
+        half.times = state[f"times{number}"].tolist()
+        half.compilation = float(state[f"compilation{number}"])
+    return sums[0].count

@@ -1,0 +1,51 @@
+"""``fotismos cost``: what each step of accuracy costs in time."""
+
+import json
+
+import click
+
+from reports import jobs
+
+
+@click.command()
+@click.argument("scene", metavar="SCENE")
+@jobs.output_option("out")
+@jobs.rendering_options
+@click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON in place of tables.")
+def cost(scene, output, rounds, as_json, **rendering):
+    """Say what each step of accuracy costs in time, and which effect is worth paying for.
+
+    Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
+    prices each effect in which textbook shading differs. Writes OUTPUT/SCENE/cost.json, cost.svg
+    and pictures. Without --resolution the film is reduced to 128 pixels of width; --spp gives the
+    samples a pixel of the largest count, 64 where it is not given.
+
+    \b
+    Examples:
+      fotismos cost cornell-box
+      fotismos cost my_scene.xml --resolution 256x256 --rounds 11
+    """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.check_installation()
+    from comparisons.cost.run import Effort
+    from comparisons.cost.run import cost as run
+    from reference.scene import set_variant
+    from reports import cost as results
+    from reports import output as folders
+    from reports import progress
+
+    folder = folders.prepare(output)
+    source, chosen = jobs.job(scene, rendering)
+    set_variant(chosen["variant"])
+    effort = Effort() if rounds is None else Effort(rounds=rounds)
+    words = jobs.command(source, chosen, "cost") + (f" --rounds {rounds}" if rounds else "")
+    with progress.shown() as bar:
+        study = run(source, jobs.options(chosen), effort, bar.of(source.name), words)
+    place = folder / folders.folder_name(source.name, ())
+    results.write(place, study)
+    if as_json:
+        click.echo(json.dumps(study.data, indent=2, ensure_ascii=False))
+        return
+    for line in results.lines(study.data):
+        click.echo(line)
+    click.echo(f"\n{place / 'cost.svg'}")

@@ -1,0 +1,98 @@
+"""Passes of a long run, kept in a file so that an interruption loses little.
+
+``.SCENE.passes.npz`` lies beside the folder of a scene's results. It is written whole or not at
+all, belongs to one scene, one set of options and one set of versions, and goes away when the run
+succeeds.
+"""
+
+import hashlib
+import json
+import os
+import zipfile
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+INTERVAL_S = 10.0
+"""Seconds from one writing to the next, at least: short runs write nothing."""
+
+SHARE = 0.05
+"""Of the time, at most, that writing may take."""
+
+
+class KeptPasses:
+    """The kept passes of one scene.
+
+    Parameters
+    ----------
+    path
+        The file.
+    key
+        What the passes depend on (:func:`key_of`); a file with another key is not used.
+    interval
+        Seconds between writings, at least.
+    """
+
+    def __init__(self, path, key, interval=INTERVAL_S):
+        self.path, self.key, self.interval = Path(path), key, interval
+        self._next = perf_counter() + interval
+
+    def load(self):
+        """Return the state that was kept, a dictionary of arrays; None where there is none."""
+        try:
+            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+                if str(file["key"]) != self.key:
+                    return None
+                return {name: file[name] for name in file.files if name != "key"}
+        except (FileNotFoundError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+            return None  # nothing kept, or nothing of ours
+
+    def offer(self, count, state):
+        """Write ``state()`` if it is time to; ``count`` is the number of passes that it holds."""
+        begin = perf_counter()
+        if begin < self._next:
+            return
+        partial = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
+        with partial.open("wb") as file:
+            np.savez(file, key=np.array(self.key), **state())
+        partial.replace(self.path)
+        end = perf_counter()
+        self._next = end + max(self.interval, (end - begin) / SHARE)
+
+    def remove(self):
+        """Delete the file, and what interrupted writings left of it."""
+        for path in (self.path, *self.path.parent.glob(f"{self.path.name}.*.partial")):
+            path.unlink(missing_ok=True)
+
+
+def of_scene(folder, name, source, options, variant):
+    """Return the :class:`KeptPasses` of a comparison whose results go to ``folder/name``.
+
+    The file lies beside that folder, which a finished result replaces as a whole.
+    """
+    from comparisons import record
+
+    key = key_of(source, options, variant, record.versions())
+    return KeptPasses(folder / f".{name}.passes.npz", key)
+
+
+def key_of(source, options, variant, versions):
+    """Return a digest of all that the passes of a comparison depend on.
+
+    These are the scene as Mitsuba reads it, the content of every file that it names, the options
+    but for the ones that only say how long to go on, variant and versions.
+    """
+    digest = hashlib.sha256()
+    graph = source.parse()
+    for index in graph.nodes_in_use():
+        props = graph.props(index)
+        digest.update(str(props).encode())
+        for name, value in props.items():
+            path = Path(value) if isinstance(value, str) and name == "filename" else None
+            if path is not None and path.is_file():
+                digest.update(hashlib.sha256(path.read_bytes()).digest())
+    told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
+    told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
+    digest.update(json.dumps(told, sort_keys=True).encode())
+    return digest.hexdigest()

@@ -1,0 +1,307 @@
+"""The cost of accuracy on real scenes: rungs, sums, record, command."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from comparisons.compare import prepare
+from comparisons.cost.between import Between
+from comparisons.cost.ladder import Method, ladder
+from comparisons.cost.methods import Methods
+from comparisons.cost.run import Effort, cost, default_resolution
+from comparisons.options import Options
+from comparisons.scenes import SCENES
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from reference.effects import Effect
+from reference.rendering import Accumulator
+from reference.scene import set_variant
+from reports import cli
+from reports import cost as results
+from tests.test_plan import scene as described
+
+SCHEMA = json.loads(
+    (Path(results.__file__).parent / "cost.schema.json").read_text(encoding="utf-8")
+)
+TINY = Effort(rounds=2, largest=4, reference_spp=4, replicate_spp=4)
+
+
+def options(name, size=24):
+    scene = SCENES[name]
+    return Options(
+        resolution=(size, size),
+        heuristic_variant=scene.heuristic_variant,
+        interpolation=Interpolation(scene.interpolation),
+        tessellation=scene.tessellation,
+    )
+
+
+ALWAYS = {"implementation", "BSDF form", "transport"}
+MADE_OF = {
+    "cornell-box": (
+        {"occlusion", "extended lights", "interreflection"},
+        ALWAYS | {"visibility", "light form"},
+    ),
+    "fig-6-10": (
+        {
+            "distance attenuation",
+            "polygon interpolation",
+            "microfacets and Fresnel",
+            "environment",
+        },
+        ALWAYS | {"interpolation", "light form"},
+    ),
+    "narrow-band-lamp": (
+        {"microfacets and Fresnel", "occlusion", "interreflection", "spectral"},
+        ALWAYS | {"visibility", "spectral"},
+    ),
+}
+"""Effects and parts of scenes that between them have all that the built-in ones have."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=["cornell-box", "fig-6-10", pytest.param("narrow-band-lamp", marks=pytest.mark.slow)],
+)
+def study(request):
+    """A small study of one scene."""
+    set_variant(SCENES[request.param].variant)
+    yield cost(SCENES[request.param].source(), options(request.param), TINY)
+    set_variant("llvm_ad_rgb")
+
+
+def test_prices_add_up_to_the_departure_in_the_mean_and_in_every_pixel(study):
+    prices = study.data["prices"]
+    removed = [price["removes"]["value"] for price in prices["effects"]]
+    assert sum(removed) == pytest.approx(prices["departure"], abs=1e-9)
+    total = sum(study.effects.values())
+    assert total[study.counted].mean() == pytest.approx(prices["departure"], abs=1e-9)
+    assert total.min() > -1e-9, "the sum in a pixel is its ΔE2000"
+    added = [price["adds_s"]["value"] for price in prices["effects"]]
+    assert sum(added) == pytest.approx(prices["reference_s"] - prices["kernel_s"], abs=1e-9)
+
+
+def test_parts_add_up_to_the_departure_and_the_implementation_is_nothing(study):
+    split = study.data["split"]
+    total = sum(part["mean"] for part in split["parts"])
+    assert total == pytest.approx(split["departure"]["mean"], abs=1e-12)
+    parts = {part["name"]: part for part in split["parts"]}
+    # Single precision: a few units in the last place of values around 1.
+    assert np.abs(study.parts["implementation"]).max() < 2e-5
+    assert parts["implementation"]["dE2000"] < 1e-3
+    assert split["departure"]["dE2000"] > 0.1
+
+
+def test_parts_add_up_to_the_difference_of_kernel_and_reference_in_every_pixel(study):
+    kernel = study.rungs[study.data["rungs"][0]["name"]]
+    assert kernel.shape == study.reference.shape
+    total = sum(study.parts.values())
+    rendered = study.reference - study.rungs[_asked_for(study)]
+    # Both are noisy, from seeds of their own: their means agree.
+    assert total.mean() == pytest.approx(rendered.mean(), abs=0.02 * np.abs(rendered).max())
+
+
+def _asked_for(study):
+    names = {"flat": "flat kernel", "gouraud": "Gouraud kernel", "phong": "Phong kernel"}
+    return names[study.data["interpolation"]]
+
+
+def test_scenes_have_the_effects_and_parts_that_they_are_made_of(study):
+    effects, parts = MADE_OF[study.data["scene"]]
+    assert set(study.effects) == effects
+    assert set(study.parts) == parts
+
+
+def test_the_record_holds_to_its_schema_and_survives_json(study):
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    made = results.files(study)
+    record = json.loads(made["cost.json"])
+    jsonschema.Draft202012Validator(SCHEMA).validate(record)
+    assert made["cost.svg"].startswith(b"<svg")
+    rungs = {name for name in made if name.startswith("rung-")}
+    assert len(rungs) == len(record["rungs"])
+
+
+def test_every_method_and_effect_is_in_the_tables(study):
+    text = "\n".join(results.lines(study.data))
+    for rung in study.data["rungs"]:
+        assert rung["name"].split(",")[0] in text
+    for price in study.data["prices"]["effects"]:
+        assert price["effect"] in text
+
+
+def whole(renderer, passes=8, seed=40):
+    total = Accumulator()
+    for number in range(passes):
+        total.add(renderer.render(seed + number))
+    return total.estimate()
+
+
+@pytest.mark.parametrize("name", ["fig-8-9", "cornell-box", "open floor"])
+def test_merged_rungs_are_equal_images(rgb, name):
+    """Every name that a rung swallowed, rendered as if the scene could tell it apart."""
+    if name == "open floor":
+        # A convex diffuse shape alone: nothing shadows it, nothing lights it again, phong is exact.
+        ball = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": 0.6}}
+        lamp = {"type": "point", "position": (3, -4, 5), "intensity": 60.0}
+        source = type(SCENES["fig-8-9"].source())(name, described(ball=ball, lamp=lamp, size=24))
+    else:
+        source = SCENES[name].source()
+    chosen = Options(resolution=(24, 24))
+    ready = prepare(source, chosen)
+    methods = Methods(source, chosen, ready)
+    merged = [rung for rung in methods.rungs if len(rung.names) > 1]
+    assert merged
+    # A scope that has everything tells all methods apart.
+    full = replace(
+        methods.scope,
+        occlusion=True,
+        interreflection=True,
+        kernel_occlusion=False,
+        exact_bsdfs=False,
+    )
+    apart = {rung.names[0]: rung.method for rung in ladder(full)}
+    for rung in merged:
+        expected = whole(methods.renderer(rung.method, 16))
+        methods.scope, before = full, methods.scope
+        for other in set(rung.names) & set(apart):
+            found = whole(methods.renderer(apart[other], 16), seed=80)
+            noise = np.hypot(expected.standard_error, found.standard_error)
+            # Five standard errors of eight passes, and the pixel filter's own spread at edges.
+            difference = np.abs(expected.mean - found.mean)
+            assert (difference > 7 * noise + 1e-5).mean() < 5e-3, (rung.name, other)
+            mean = np.abs((expected.mean - found.mean).mean())
+            assert mean < 4 * np.sqrt(np.mean(noise**2) / noise.size) + 1e-6, (rung.name, other)
+        methods.scope = before
+
+
+def test_a_scene_that_has_everything_keeps_its_rungs_apart(rgb):
+    source = SCENES["plastic-spheres"].source()
+    chosen = Options(resolution=(16, 16))
+    methods = Methods(source, chosen, prepare(source, chosen))
+    assert [rung.names for rung in methods.rungs] == [
+        ("flat kernel",),
+        ("Gouraud kernel",),
+        ("Phong kernel",),
+        ("kernel with shadows",),
+        ("phong BSDF, full transport",),
+        ("direct",),
+        ("path 3",),
+        ("path 4",),
+        ("path 5",),
+        ("full plan",),
+    ]
+
+
+def test_with_no_effect_the_plugins_give_the_kernels_image(rgb):
+    for name in ("fig-8-9", "cornell-box", "plastic-spheres", "fig-6-5-m40"):
+        ready = prepare(SCENES[name].source(), Options(resolution=(24, 24)))
+        between = Between(ready.pair, ready.plan)
+        images = [
+            np.array(renderer.render(3))
+            for renderer in (between.renderer((), ready.heuristic.spp), ready.heuristic)
+        ]
+        assert images[1].max() > 0.1
+        np.testing.assert_allclose(*images, atol=2e-5)
+
+
+def test_with_all_effects_it_gives_the_reference(rgb):
+    for name in ("fig-8-9", "cornell-box"):
+        ready = prepare(SCENES[name].source(), Options(resolution=(24, 24)))
+        between = Between(ready.pair, ready.plan)
+        found = whole(between.renderer(between.differences, 64))
+        ready.reference.spp = 64
+        expected = whole(ready.reference, seed=90)
+        noise = np.hypot(found.standard_error, expected.standard_error)
+        assert (np.abs(found.mean - expected.mean) > 7 * noise + 1e-5).mean() < 5e-3
+        mean_noise = np.sqrt(np.mean(noise**2) / noise.size)
+        assert abs((found.mean - expected.mean).mean()) < 4 * mean_noise + 1e-6
+
+
+def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
+    """A lamp behind a board: black with shadows, and without them what the lamp gives alone."""
+    floor = {
+        "type": "rectangle",
+        "to_world": _scaled(2),
+        "bsdf": {"type": "diffuse", "reflectance": 0.5},
+    }
+    board = {
+        "type": "rectangle",
+        "to_world": _scaled(4, (0, 0, 2)),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+    }
+    lamp = {
+        "type": "rectangle",
+        "to_world": _scaled(0.5, (0, 0, 3), turned=True),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {"type": "area", "radiance": 20.0},
+    }
+    images = {}
+    # The camera stands under the board, which it does not see.
+    view = {"viewer": (0, -3, 1.5), "size": 16, "floor": floor, "lamp": lamp}
+    for key, parts in {"open": view, "hidden": view | {"board": board}}.items():
+        source = type(SCENES["fig-8-9"].source())(key, described(**parts))
+        ready = prepare(source, Options())
+        between = Between(ready.pair, ready.plan)
+        everything = set(between.differences)
+        lit = whole(between.renderer(everything, 64)).mean
+        unshadowed = whole(between.renderer(everything - {Effect.OCCLUSION}, 64))
+        images[key] = lit, unshadowed
+    assert images["open"][0].max() > 0.1
+    assert images["hidden"][0].max() < 1e-6
+    noise = images["hidden"][1].standard_error
+    np.testing.assert_allclose(
+        images["hidden"][1].mean, images["open"][0], atol=8 * noise.max() + 1e-4
+    )
+
+
+def _scaled(factor, place=(0, 0, 0), turned=False):
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f().translate(place)
+    return (transform.rotate((1, 0, 0), 180) if turned else transform).scale(factor)
+
+
+def test_the_default_size_keeps_the_films_shape(rgb):
+    assert default_resolution(SCENES["fig-8-9"].source(), Options()) == (128, 128)
+    wide = described(ball={"type": "sphere"}, size=64)
+    wide["sensor"]["film"] |= {"width": 400, "height": 100}
+    source = type(SCENES["fig-8-9"].source())("wide", wide)
+    assert default_resolution(source, Options()) == (128, 32)
+    wide["sensor"]["film"] |= {"width": 60, "height": 10}
+    source = type(SCENES["fig-8-9"].source())("small", wide)
+    assert default_resolution(source, Options()) == (60, 10)
+
+
+def test_sample_counts_are_powers_of_four():
+    assert Effort(largest=64).counts == (4, 16, 64)
+    assert Effort(largest=100).counts == (4, 16, 64)
+    assert Effort(largest=2).counts == (2,)
+    with pytest.raises(InputError, match="rounds"):
+        Effort(rounds=1)
+
+
+def test_a_kernel_draws_no_random_numbers():
+    assert Method(Interpolation.FLAT).is_kernel
+    assert not Method().is_kernel
+
+
+def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
+    words = ["cost", "fig-8-9", "--resolution", "16x16", "--rounds", "2", "-o", str(tmp_path)]
+    monkeypatch.setattr("sys.argv", ["fotismos", *words])
+    cli.main()
+    printed = capsys.readouterr().out
+    place = tmp_path / "fig-8-9"
+    record = json.loads((place / "cost.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(SCHEMA).validate(record)
+    assert "Price of an effect" in printed
+    assert record["command"].startswith("fotismos cost fig-8-9")
+    assert "--rounds 2" in record["command"]
+    assert {"cost.svg", "reference.png", "rung-phong-kernel.png"} <= {
+        path.name for path in place.iterdir()
+    }
+    assert not list(place.glob("*.partial"))

@@ -1,0 +1,66 @@
+"""The chart: names that do not collide, and a specification that Vega-Lite takes without a word."""
+
+import numpy as np
+import pytest
+import vl_convert
+
+from reports import charts
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_names_stand_apart_in_order_and_inside(seed):
+    wanted = np.sort(np.random.default_rng(seed).uniform(0, 380, 3 + seed))
+    places = charts.spread(list(wanted), 15, 380)
+    assert np.all(np.diff(places) >= 15 - 1e-9)
+    assert min(places) >= 0
+    assert max(places) <= 380 + 1e-9
+
+
+def test_names_with_room_stay_where_they_want_to_be():
+    assert charts.spread([10, 50, 300], 15, 380) == [10, 50, 300]
+    assert charts.spread([100, 102], 15, 380) == [93.5, 108.5]
+
+
+def point(rung, spp, time, error, pareto=False):
+    seconds = {"median": time, "low": 0.9 * time, "high": 1.2 * time}
+    return {"rung": rung, "spp": spp, "seconds": seconds, "error": error, "pareto": pareto}
+
+
+def data(points, floor=0.4):
+    return {
+        "scene": "synthetic",
+        "points": points,
+        "reference": {"noise_floor": floor},
+        "resolution": [64, 48],
+        "rounds": 3,
+        "machine": {"cores": 2, "processor": "a processor"},
+    }
+
+
+@pytest.mark.parametrize(
+    ("points", "floor"),
+    [
+        ([point("Phong kernel", 16, 0.01, 12.0, True)], 0.0),
+        ([point("Phong kernel", 16, 0.01, 0.0, True)], 0.0),
+        (
+            [point("Phong kernel", 16, 0.01, 12.0, True)]
+            + [point("full plan", n, 0.02 * n, 8 / n**0.5, True) for n in (4, 16, 64)],
+            0.4,
+        ),
+    ],
+    ids=["one point", "no error at all", "ladder"],
+)
+def test_it_draws_and_names_axes_units_and_every_rung(points, floor):
+    svg = vl_convert.vegalite_to_svg(charts.error_over_time(data(points, floor)))
+    for word in ("time for one image (ms", "mean ΔE2000", "Pareto", *(p["rung"] for p in points)):
+        assert word in svg
+    assert "NaN" not in svg
+
+
+def test_points_lie_where_their_axes_say():
+    points = [point("full plan", n, 0.02 * n, 8 / n**0.5) for n in (4, 16, 64)]
+    rows = [charts._row(p) for p in points]
+    x = charts._Axis(min(r["low"] for r in rows), max(r["high"] for r in rows), charts.WIDTH)
+    pixels = [x.pixel(row["time"]) for row in rows]
+    assert np.diff(pixels)[0] == pytest.approx(np.diff(pixels)[1])
+    assert 0 < pixels[0] < pixels[-1] < charts.WIDTH
