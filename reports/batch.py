@@ -34,7 +34,13 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
     shown = hard_cases.view(hard_record.collect()) if with_hard_cases else None
-    output.write_page(folder, list(views.values()), equations, verifications, shown)
+    output.write_page(
+        folder,
+        list(views.values()),
+        equations=equations,
+        verifications=verifications,
+        hard_cases=shown,
+    )
     share = (perf_counter() - begin) / len(views)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share
