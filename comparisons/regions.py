@@ -106,9 +106,7 @@ def _pixels(cells: slice, side: int) -> slice:
     return slice(cells.start * side, cells.stop * side)
 
 
-def _region(
-    error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float
-) -> Region:
+def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
     """The region of a box, drawn in to the counted pixels that it holds."""
     inside = counted[rows, columns]
     y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))

@@ -128,7 +128,9 @@ def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:
 
 def _scaled(size: NDArray, power: NDArray) -> NDArray:
     # By powers of ten that are exact, so that a tie stays one.
-    return np.where(power >= 0, size * 10.0 ** np.maximum(power, 0), size / 10.0 ** -np.minimum(power, 0))
+    return np.where(
+        power >= 0, size * 10.0 ** np.maximum(power, 0), size / 10.0 ** -np.minimum(power, 0)
+    )
 
 
 def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:

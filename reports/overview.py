@@ -62,7 +62,7 @@ def is_significant(record: Mapping[str, Any]) -> bool:
 
 def identifier(name: str, taken: set[str]) -> str:
     """A name for a scene in the page's address: plain characters; added to `taken`."""
-    plain = "".join(c if c.isascii() and c.isalnum() or c in "-_." else "-" for c in name)
+    plain = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
     chosen, count = plain or "scene", 1
     while chosen in taken:
         count += 1

@@ -92,19 +92,23 @@ def render(
     charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
     scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
-    return _environment().get_template("page.html.j2").render(
-        title=title,
-        style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
-        scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
-        page_data=_page_data(scenes, failed),
-        scenes=scenes,
-        failures=failed,
-        metrics=METRICS,
-        columns=overview.COLUMNS,
-        legends=legends(),
-        equations=equations,
-        hard_cases=hard_cases,
-        verifications=verifications,
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
+            scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
+            page_data=_page_data(scenes, failed),
+            scenes=scenes,
+            failures=failed,
+            metrics=METRICS,
+            columns=overview.COLUMNS,
+            legends=legends(),
+            equations=equations,
+            hard_cases=hard_cases,
+            verifications=verifications,
+        )
     )
 
 

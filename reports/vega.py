@@ -82,6 +82,7 @@ def _merged(default, own):
 
 
 def _inline(svg: str) -> Markup:
-    """The SVG with ids of its own: several of them share one page."""
+    """The SVG with ids of its own, since several share one page; described by its figure."""
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
-    return Markup(re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg))
+    owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)
+    return Markup(owned.replace("<svg ", '<svg aria-hidden="true" ', 1))

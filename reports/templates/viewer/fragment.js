@@ -53,7 +53,7 @@ function parseFragment(text) {
   /** @type {any} */
   const view = { ...DEFAULT_VIEW };
   for (const [key, value] of new URLSearchParams(text.replace(/^#/, ""))) {
-    if (!(key in DEFAULT_VIEW)) continue;
+    if (!Object.hasOwn(DEFAULT_VIEW, key)) continue;
     const read = READERS[key] ? READERS[key](value) : value;
     if (read !== null && (!ALLOWED[key] || ALLOWED[key].includes(read))) view[key] = read;
   }
