@@ -1,9 +1,14 @@
-"""Comparing scenes one after another, and writing their results and the page."""
+"""Comparing scenes one after another, and writing their results and the page.
+
+A scene that cannot be compared does not keep the others from it: the page names it with its error,
+and the command ends with that error's exit code.
+"""
 
 from time import perf_counter
 
 import click
 
+from heuristic.errors import FotismosError
 from reports import jobs
 
 START = perf_counter()
@@ -19,14 +24,20 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
-    views = {}
+    views, failures = {}, {}
     with progress.shown() as bar:
         for source, chosen in wanted:
             start_up = perf_counter() - START if not views else 0.0
             set_variant(chosen["variant"])
-            result = compare(
-                source, jobs.options(chosen), bar.of(source.name), jobs.command(source, chosen)
-            )
+            try:
+                result = compare(
+                    source, jobs.options(chosen), bar.of(source.name), jobs.command(source, chosen)
+                )
+            except FotismosError as error:
+                if len(wanted) == 1:
+                    raise
+                failures[source.name] = error
+                continue
             begin = perf_counter()
             name = output.folder_name(source.name, views)
             views[name] = output.write_scene(folder, name, result)
@@ -40,11 +51,17 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
         equations=equations,
         verifications=verifications,
         hard_cases=shown,
+        failures=[(name, str(error)) for name, error in failures.items()],
     )
-    share = (perf_counter() - begin) / len(views)
+    share = (perf_counter() - begin) / max(len(views), 1)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share
         output.rewrite_record(folder, name, view["record"])
-    for line in progress.summary(view["record"] for view in views.values()):
-        click.echo(line)
+    if views:
+        for line in progress.summary(view["record"] for view in views.values()):
+            click.echo(line)
     click.echo(f"\n{folder / 'index.html'}")
+    if failures:
+        name, error = next(iter(failures.items()))
+        count = f"{len(failures)} of {len(wanted)} scenes failed, "
+        raise type(error)(f"{count}the first of them {name}: {error}") from error
