@@ -22,8 +22,8 @@ Bytes = NDArray[np.uint8]
 #: Colour maps by purpose.
 ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
 
-#: Pixels of a thumbnail's longer side, which a card shows at about half of that.
-THUMBNAIL = 200
+#: Pixels of a thumbnail's longer side, which a card shows at two thirds of that.
+THUMBNAIL = 160
 
 #: Colours of `mask_map`: marked, not marked, not counted (sRGB).
 MARKED, UNMARKED, UNCOUNTED = (213, 94, 0), (222, 226, 230), (130, 136, 143)
