@@ -166,7 +166,7 @@ def test_error_maps_have_their_colours_and_their_bar(visitor, report):
 
 def test_zooming_enlarges_pixels_to_squares(visitor, report):
     page = visitor.open(f"{SCENE}&mode=flicker")
-    left, top = visitor.place_of(30, 12)
+    left, top = visitor.place_of(8, 28)
     visitor.canvas().hover(position={"x": left, "y": top})
     for _ in range(6):
         page.mouse.wheel(0, -120)
@@ -174,14 +174,14 @@ def test_zooming_enlarges_pixels_to_squares(visitor, report):
     state = visitor.state()
     zoom = float(state["zoom"])
     assert zoom > 3 * visitor.canvas().bounding_box()["width"] / WIDTH
-    assert visitor.inspected()["position"] == "30, 12"  # what is under the pointer stays there
+    assert visitor.inspected()["position"] == "8, 28"  # what is under the pointer stays there
     centre = float(state["x"]), float(state["y"])
-    x, y = visitor.place_of(30, 12, zoom=zoom, centre=centre)
+    x, y = visitor.place_of(8, 28, zoom=zoom, centre=centre)
     half = 0.4 * zoom
     corners = [visitor.colour_at(x + dx, y + dy) for dx in (-half, half) for dy in (-half, half)]
     assert len(set(corners)) == 1
     exposure = report.records[NOISY]["viewing"]["exposure"]
-    expected = displayed(rgb(report.channels[NOISY], "heuristic", 30, 12), exposure)
+    expected = displayed(rgb(report.channels[NOISY], "heuristic", 8, 28), exposure)
     np.testing.assert_allclose(corners[0], expected, atol=2)
 
 
