@@ -70,7 +70,7 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         region = _region(error, counted, _pixels(rows, cell), _pixels(columns, cell), total)
         if region.share >= LEAST_SHARE:
             found.append(region)
-        elif value < LEAST_SHARE * total / MOST:
+        elif value < LEAST_SHARE * total / MOST:  # only specks are left
             break
     return tuple(found)
 

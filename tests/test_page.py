@@ -12,7 +12,7 @@ import pytest
 import reports
 from comparisons.metrics import METRICS
 from heuristic.equations import Entry
-from reports import images, page, printing
+from reports import embedding, images, page, printing
 from tests import records
 
 SCHEMA = json.loads(
@@ -170,6 +170,23 @@ def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
         assert metric_.definition in shown.text
         assert f"≥ {metric_.map_range[1]:g}" in shown.text
     assert "not counted" in shown.text
+
+
+def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, monkeypatch):
+    channels = {
+        f"{half}.{c}": np.ones((4, 6)) for half in ("heuristic", "reference") for c in "RGB"
+    }
+    channels |= {f"reference_stderr.{colour}": np.zeros((4, 6)) for colour in "RGB"}
+    channels |= {f"{name}.Y": np.ones((4, 6)) for name in (*METRICS, "significant")}
+
+    def shown():
+        embedded = embedding.embed(channels, np.ones((4, 6), bool))
+        view = {"record": record, "images": pictures, "embedded": embedded}
+        return Page(page.render([view])).text
+
+    assert "means over" not in shown()
+    monkeypatch.setattr(embedding, "LONGEST", 3)
+    assert "means over 2 × 2 pixels" in shown()
 
 
 def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):

@@ -12,7 +12,7 @@ function inspect(painter, scene, [x, y]) {
   const flags = images.codes.flags[place];
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
   return {
-    position: `${x}, ${y}`,
+    position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
     heuristic: ["R", "G", "B"].map((colour) => shown(`heuristic.${colour}`)),
     reference: ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)),
     dE2000: shown("dE2000"),

@@ -93,7 +93,7 @@ class Painter {
   paintError(pixels, metric) {
     const top = this.page.ranges[metric];
     const colour = Uint32Array.from(VALUES, (value) => this.tables.error[clamp(Math.floor((256 * value) / top), 0, 255)]);
-    const codes = this.images.codes[`${metric}`];
+    const codes = this.images.codes[metric];
     for (let i = 0; i < pixels.length; i++) pixels[i] = colour[codes[i]];
   }
 
