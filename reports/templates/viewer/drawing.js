@@ -130,6 +130,9 @@ class Drawing {
     context.beginPath();
     context.arc(at, pane.top + pane.height / 2, 7, 0, 2 * Math.PI);
     context.fill();
+    context.strokeStyle = OVERLAY.edge;
+    context.lineWidth = 1.5;
+    context.stroke();
   }
 
   /** @param {Box} pane @param {any[]} content */
