@@ -7,7 +7,8 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 
-from comparisons import passes, record, reference_limits, statistics
+from comparisons import passes, record, reference_limits, regions, statistics
+from comparisons.histograms import histogram
 from comparisons.metrics import METRICS
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
@@ -118,6 +119,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         images.counted,
     )
     stages.done("limits of the reference")
+    found = regions.find(images.maps["dE2000"], images.counted)
 
     data = {
         "scene": source.name,
@@ -131,6 +133,10 @@ def compare(source, options=None, progress=None, command="", kept=None):
         "metrics": metrics,
         "pixels": {"counted": int(images.counted.sum()), "total": width * height},
         "limits": limits.data(),
+        "regions": [region.data() for region in found],
+        "histograms": {
+            name: histogram(images.maps[name][images.counted]).data() for name in METRICS
+        },
         "pairing": record.pairing_data(ready.pair),
         "time": {
             "heuristic": record.times_data(heuristic.pass_times()),

@@ -1,9 +1,14 @@
-"""Comparing scenes one after another, and writing their results and the page."""
+"""Comparing scenes one after another, and writing their results and the page.
+
+A scene that cannot be compared does not keep the others from it: the page names it with its error,
+and the command ends with that error's exit code.
+"""
 
 from time import perf_counter
 
 import click
 
+from heuristic.errors import FotismosError
 from reports import jobs
 
 START = perf_counter()
@@ -19,7 +24,7 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
-    views = {}
+    views, failures = {}, {}
     with progress.shown() as bar:
         for source, chosen in wanted:
             start_up = perf_counter() - START if not views else 0.0
@@ -27,9 +32,15 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
             name = output.folder_name(source.name, views)
             options = jobs.options(chosen)
             kept = passes.of_scene(folder, name, source, options, chosen["variant"])
-            result = compare(
-                source, options, bar.of(source.name), jobs.command(source, chosen), kept
-            )
+            try:
+                result = compare(
+                    source, options, bar.of(source.name), jobs.command(source, chosen), kept
+                )
+            except FotismosError as error:
+                if len(wanted) == 1:
+                    raise
+                failures[source.name] = error
+                continue
             begin = perf_counter()
             views[name] = output.write_scene(folder, name, result)
             kept.remove()
@@ -37,11 +48,23 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
     begin = perf_counter()
     shown = hard_cases.view(record.collect()) if with_hard_cases else None
-    output.write_page(folder, list(views.values()), equations, verifications, shown)
-    share = (perf_counter() - begin) / len(views)
+    output.write_page(
+        folder,
+        list(views.values()),
+        equations=equations,
+        verifications=verifications,
+        hard_cases=shown,
+        failures=[(name, str(error)) for name, error in failures.items()],
+    )
+    share = (perf_counter() - begin) / max(len(views), 1)
     for name, view in views.items():
         view["record"]["time"]["stages"]["page"] = share
         output.rewrite_record(folder, name, view["record"])
-    for line in progress.summary(view["record"] for view in views.values()):
-        click.echo(line)
+    if views:
+        for line in progress.summary(view["record"] for view in views.values()):
+            click.echo(line)
     click.echo(f"\n{folder / 'index.html'}")
+    if failures:
+        name, error = next(iter(failures.items()))
+        count = f"{len(failures)} of {len(wanted)} scenes failed, "
+        raise type(error)(f"{count}the first of them {name}: {error}") from error

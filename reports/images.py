@@ -20,7 +20,10 @@ from comparisons.metrics import LOG2_RANGE, METRICS
 Bytes = NDArray[np.uint8]
 
 #: Colour maps by purpose.
-ERROR_COLOURS, SIGNED_COLOURS = "magma", "RdBu_r"
+ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
+
+#: Pixels of a thumbnail's longer side, which a card shows at two thirds of that.
+THUMBNAIL = 160
 
 #: Colours of `mask_map`: marked, not marked, not counted (sRGB).
 MARKED, UNMARKED, UNCOUNTED = (213, 94, 0), (222, 226, 230), (130, 136, 143)
@@ -56,6 +59,11 @@ def colour_bar(colormap: str, stops: int = 17) -> str:
     table = _table(colormap)
     chosen = table[np.linspace(0, len(table) - 1, stops).round().astype(int)]
     return f"linear-gradient(to right, {', '.join(css_colour(colour) for colour in chosen)})"
+
+
+def colour_table(colormap: str) -> str:
+    """The 256 colours of a map as hexadecimal digits, six a colour."""
+    return _table(colormap).tobytes().hex()
 
 
 def css_colour(colour: ArrayLike) -> str:
@@ -108,6 +116,18 @@ def pictures(
         else:
             made[name] = error_map(values, METRICS[name].map_range[1])
     return {name: png(picture, longest) for name, picture in made.items()}
+
+
+def thumbnails(
+    heuristic: ArrayLike, reference: ArrayLike, error: ArrayLike, exposure: float = 1.0
+) -> dict[str, bytes]:
+    """Small PNG files of both halves and of the map of ΔE2000, as cards show them."""
+    made = {
+        "heuristic": tonemap(heuristic, exposure),
+        "reference": tonemap(reference, exposure),
+        "dE2000": error_map(error, METRICS["dE2000"].map_range[1]),
+    }
+    return {name: png(picture, THUMBNAIL) for name, picture in made.items()}
 
 
 def _coloured(fraction: NDArray[np.float64], colormap: str) -> Image.Image:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from comparisons.metrics import METRICS
 from heuristic.errors import InputError
-from reports import exr, images, page
+from reports import embedding, exr, images, page
 
-LONGEST_IN_PAGE = 1600
+LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
 
 
@@ -58,26 +58,28 @@ def write_scene(folder, name, comparison):
             longest=longest,
         )
 
+    layers = _layers(shown)
     files = pictures()
     with _replacing(folder / name) as place:
         for key, png in files.items():
             (place / f"{key}.png").write_bytes(png)
-        exr.write(place / "comparison.exr", _layers(shown), _header(data))
+        exr.write(place / "comparison.exr", layers, _header(data))
         (place / "comparison.json").write_text(_json(data), encoding="utf-8")
     largest = max(data["resolution"])
     return {
         "record": data,
         "images": files if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
+        "thumbnails": images.thumbnails(
+            shown.heuristic, shown.reference, shown.maps["dE2000"], exposure
+        ),
+        "embedded": embedding.embed(exr.channels(layers), shown.counted),
         "files": {file: f"{name}/{file}" for file in ("comparison.json", "comparison.exr")},
     }
 
 
-def write_page(folder, views, equations=(), verifications=(), hard_cases=None):
-    """Write ``index.html`` for the scenes of a run, and what else a report shows."""
-    _write(
-        folder / "index.html",
-        page.render(views, equations=equations, verifications=verifications, hard_cases=hard_cases),
-    )
+def write_page(folder, views, **shown):
+    """Write ``index.html`` for the scenes of a run, and what else `reports.page.render` shows."""
+    _write(folder / "index.html", page.render(views, **shown))
 
 
 def rewrite_record(folder, name, data):

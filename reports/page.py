@@ -1,48 +1,55 @@
 """The report: one offline HTML file with the pictures, maps and numbers of a run.
 
 `render` reads the records of `comparison.json` (schema: ``reports/comparison.schema.json``) and
-PNG files; it computes nothing that is not in them but how to print a number. Names and messages
-come from users' files, so everything is escaped, and the page may load nothing: its pictures are
-inside, and a content security policy forbids the rest.
+images that are encoded already; it computes nothing that is not in them but how to print a number.
+Names and messages come from users' files, so everything is escaped, and the page may load nothing:
+a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
+
+The page is whole without JavaScript: pictures, numbers and charts, one scene after another. With
+it, ``templates/viewer`` shows one scene at a time, by its embedded numbers.
 """
 
 from __future__ import annotations
 
 import base64
-import math
+import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from comparisons.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
+from comparisons.spaces import luminance
 from heuristic.equations import Entry
-from reports import images
+from reports import histograms, images, overview, vega
+from reports.legends import legends
+from reports.printing import about_noise, code_spans, number, parameter, percent, seconds
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
 
-#: A mean up to this many times its noise floor is said to be about noise.
-NOISE_MARGIN = 1.1
-
 #: Pictures narrower than this are enlarged without smoothing.
 PIXELATED_BELOW = 400
 
+#: A region that is opened from its link gets about so many screen pixels.
+REGION_SIZE = 420
 
-@dataclass(frozen=True)
-class Legend:
-    """A map's colour bar: title, CSS background, labels from low to high, and a sentence."""
+TEMPLATES = Path(__file__).parent / "templates"
 
-    name: str
-    title: str
-    bar: str
-    labels: tuple[str, ...]
-    note: str
+#: The parts of the page's style and of its script, in their order.
+STYLES = ("base", "overview", "scene", "viewer", "print")
+SCRIPTS = (
+    "numbers", "decoding", "tonemaps", "painting", "fragment", "viewport", "drawing", "inspector",
+    "pointer", "viewer", "keyboard", "overview", "charts", "main",
+)  # fmt: skip
+
+#: Run before anything is drawn: what is for scripts alone is shown only where they run.
+EARLY = 'document.documentElement.className = "js";'
 
 
 def render(
@@ -51,6 +58,7 @@ def render(
     equations: Sequence[Entry] = (),
     verifications: Sequence[Mapping[str, Any]] = (),
     hard_cases: Mapping[str, Any] | None = None,
+    failures: Sequence[tuple[str, str]] = (),
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
@@ -61,137 +69,128 @@ def render(
     images
         PNG bytes by name: "heuristic", "reference", the metrics' names, "log2_luminance" and
         "significant". `reports.images.pictures` makes them. A missing one is left out.
+    thumbnails (optional)
+        Small PNG bytes by name: "heuristic", "reference" and "dE2000".
+    embedded (optional)
+        The scene's `reports.embedding.Embedded`, without which it has no viewer.
+    charts (optional)
+        `reports.vega.Figure` records to show beside the histograms, such as what accuracy costs.
     files (optional)
         Paths relative to the page by label, shown as links.
 
     `equations` is the index of `heuristic.equations`, `verifications` the data of
     `comparisons.verification`, `hard_cases` what `reports.hard_cases.view` returns; each is a
-    section of its own, left out where it is empty.
+    section of its own, left out where it is empty. `failures` are the scenes that could not be
+    compared, each with its message.
     """
-    scenes = [
-        {
-            "id": f"scene-{number}",
-            "record": comparison["record"],
-            "images": {name: _data_uri(png) for name, png in comparison["images"].items()},
-            "files": {
-                label: "./" + quote(str(path))
-                for label, path in comparison.get("files", {}).items()
-            },
-        }
-        for number, comparison in enumerate(comparisons, 1)
+    taken: set[str] = set()
+    scenes = [_scene(comparison, taken) for comparison in comparisons]
+    failed = [
+        {"id": overview.identifier(name, taken), "name": name, "message": message}
+        for name, message in failures
     ]
-    page = _environment().get_template("page.html.j2")
-    return page.render(
-        title=title,
-        scenes=scenes,
-        metrics=METRICS,
-        legends=legends(),
-        equations=equations,
-        hard_cases=hard_cases,
-        verifications=verifications,
-    )
-
-
-def legends() -> tuple[Legend, ...]:
-    """The maps in the order of the page."""
-    maps = [
-        Legend(
-            metric.name,
-            metric.label,
-            images.colour_bar(images.ERROR_COLOURS),
-            _labels(*metric.map_range),
-            metric.unit,
-        )
-        for metric in METRICS.values()
-    ]
+    charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
+    code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
+    scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
     return (
-        *maps,
-        Legend(
-            "log2_luminance",
-            "Luminance ratio",
-            images.colour_bar(images.SIGNED_COLOURS),
-            (f"≤ −{LOG2_RANGE:g}", "0", f"≥ +{LOG2_RANGE:g} stops"),
-            f"log2 of heuristic over reference, red where the heuristic is brighter; "
-            f"ε = {LOG2_EPSILON:g}",
-        ),
-        Legend(
-            "significant",
-            "Significant difference",
-            "",
-            (),
-            "more than the reference's noise",
-        ),
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
+            scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
+            page_data=_page_data(scenes, failed),
+            scenes=scenes,
+            failures=failed,
+            metrics=METRICS,
+            columns=overview.COLUMNS,
+            legends=legends(),
+            equations=equations,
+            hard_cases=hard_cases,
+            verifications=verifications,
+        )
     )
 
 
-def number(value: float | None) -> str:
-    """Three significant digits, in powers of ten below 0.001 and from a million on."""
-    if value is None:
-        return "–"
-    size = abs(float(f"{value:.2e}"))  # rounded first: 9.999 is 10.0, not 10.00
-    if size == 0:
-        return "0"
-    if not 1e-3 <= size < 1e6:
-        mantissa, exponent = f"{value:.1e}".split("e")
-        return f"{_minus(mantissa)} × 10{_superscript(int(exponent))}"
-    decimals = max(0, 2 - math.floor(math.log10(size)))
-    return _minus(f"{value:,.{decimals}f}")
+def _scene(comparison: Mapping[str, Any], taken: set[str]) -> dict[str, Any]:
+    """What the templates show of a comparison."""
+    record = comparison["record"]
+    return {
+        "id": overview.identifier(record["scene"], taken),
+        "record": record,
+        "images": {name: _data_uri(png) for name, png in comparison["images"].items()},
+        "thumbnails": {
+            name: _data_uri(png) for name, png in comparison.get("thumbnails", {}).items()
+        },
+        "embedded": comparison.get("embedded"),
+        "histograms": histograms.figures(record),
+        "charts": comparison.get("charts", ()),
+        "files": {
+            label: "./" + quote(str(path)) for label, path in comparison.get("files", {}).items()
+        },
+    }
 
 
-def parameter(value: float) -> str:
-    """A value that was set, not measured: up to four significant digits, no trailing zeros."""
-    return _minus(f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
+def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
+    """What the page's script needs: the scenes, and how maps are drawn."""
+    return {
+        "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
+        "titles": {legend.name: legend.title for legend in legends()},
+        "ranges": {name: metric.map_range[1] for name, metric in METRICS.items()}
+        | {"log2_luminance": LOG2_RANGE},
+        "colours": {
+            "error": images.colour_table(images.ERROR_COLOURS),
+            "signed": images.colour_table(images.SIGNED_COLOURS),
+            "value": images.colour_table(images.VALUE_COLOURS),
+        },
+        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED],
+        "luminance": luminance(np.eye(3)).tolist(),
+        "epsilon": LOG2_EPSILON,
+    }
 
 
-def seconds(value: float | None) -> str:
-    """A time with its unit: µs, ms or s."""
-    if value is None:
-        return "–"
-    for scale, unit in ((1.0, "s"), (1e-3, "ms")):
-        if value >= scale:
-            return f"{number(value / scale)} {unit}"
-    return f"{number(value / 1e-6)} µs" if value else "0 s"
+def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
+    record, embedded = scene["record"], scene["embedded"]
+    return {
+        "id": scene["id"],
+        "name": record["scene"],
+        "width": record["resolution"][0],
+        "height": record["resolution"][1],
+        "exposure": record["viewing"]["exposure"],
+        "regions": record.get("regions", []),
+        "images": embedded.manifest() if embedded else None,
+        "keys": overview.keys(record),
+        "significant": overview.is_significant(record),
+        "failed": False,
+    }
 
 
-def percent(value: float) -> str:
-    """A fraction as a percentage."""
-    return f"{number(100 * value)} %"
+def _failed_data(failure: Mapping[str, str]) -> dict[str, Any]:
+    return {"id": failure["id"], "name": failure["name"], "significant": False, "failed": True}
 
 
-def code_spans(text: str) -> Markup:
-    """A docstring's ````code```` as HTML, everything else escaped."""
-    parts = text.split("``")
-    return Markup("").join(
-        Markup("<code>{}</code>").format(part) if place % 2 else part
-        for place, part in enumerate(parts)
-    )
-
-
-def about_noise(metric: Mapping[str, float]) -> bool:
-    """Whether a metric's mean is about what its noise floor gives (see `NOISE_MARGIN`)."""
-    return metric["noise_floor"] > 0 and metric["mean"] <= NOISE_MARGIN * metric["noise_floor"]
-
-
-def _labels(low: float, high: float) -> tuple[str, ...]:
-    return f"{low:g}", f"{(low + high) / 2:g}", f"≥ {high:g}"
-
-
-def _minus(digits: str) -> str:
-    return digits.replace("-", "−")
-
-
-def _superscript(exponent: int) -> str:
-    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+def _zoom_to(region: Mapping[str, int]) -> float:
+    """Screen pixels for one of the image, where a region is looked at."""
+    return round(min(16.0, REGION_SIZE / max(region["width"], region["height"])), 2)
 
 
 def _data_uri(png: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 
+def _hash(script: str) -> Markup:
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return Markup(f"'sha256-{digest}'")
+
+
+def _source(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -203,12 +202,14 @@ def _environment() -> Environment:
         seconds=seconds,
         percent=percent,
         code_spans=code_spans,
+        zoom_to=_zoom_to,
     )
     environment.tests["about_noise"] = about_noise
     environment.globals.update(
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),
+        value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
     )
     return environment

@@ -172,6 +172,20 @@ def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypat
     assert sorted(path.name for path in out.iterdir()) == ["index.html", "my-scene"]
 
 
+def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
+    broken = tmp_path / "broken.xml"
+    broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'), encoding="utf-8")
+    out = tmp_path / "out"
+    code, printed, messages = run("compare", broken, scene_file, "-o", out, "--spp", 4)
+    assert code == 2
+    assert "1 of 2 scenes failed" in messages
+    assert "my scene" in printed
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "<b>Failed:</b>" in page
+    assert (out / "my-scene/comparison.json").is_file()
+    assert not (out / "broken").exists()
+
+
 def test_plan_prints_a_table_and_json(run):
     code, printed, _ = run("plan", "fig-8-9")
     assert code == 0

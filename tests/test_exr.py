@@ -69,8 +69,34 @@ def test_mitsuba_reads_it_too(tmp_path, layers):
 def test_mitsuba_splits_it_into_layers(tmp_path, layers):
     path = tmp_path / "comparison.exr"
     exr.write(path, layers, {})
-    names = {name for name, _ in mi.Bitmap(str(path)).split()}
-    assert {"heuristic", "reference", "reference_stderr", "P", "N", "dE2000"} <= names
+    formats = {
+        **dict.fromkeys(("heuristic", "reference", "reference_stderr"), mi.Bitmap.PixelFormat.RGB),
+        **dict.fromkeys(("P", "N"), mi.Bitmap.PixelFormat.XYZ),
+        **dict.fromkeys(("dE2000", "dE_ITP", "dE_CAM16UCS"), mi.Bitmap.PixelFormat.Y),
+        "significant": mi.Bitmap.PixelFormat.Y,
+    }
+    split = dict(mi.Bitmap(str(path)).split())
+    assert {name: part.pixel_format() for name, part in split.items()} == formats
+    for name in sorted(exr.FULL_PRECISION):
+        np.testing.assert_array_equal(np.array(split[name]), layers[name].astype(np.float32))
+    for name in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
+        np.testing.assert_allclose(np.array(split[name]).squeeze(), layers[name], rtol=2**-11)
+
+
+def test_viewers_find_the_layers_by_the_only_dot_of_a_name(tmp_path, layers):
+    """tev and Blender split a name at its last dot, and take a second one for a group."""
+    path = tmp_path / "comparison.exr"
+    exr.write(path, layers, {})
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        assert len(file.parts) == 1
+        names = list(file.channels())
+    assert {name.count(".") for name in names} == {1}
+    found = {}
+    for layer, channel in (name.split(".") for name in names):
+        found.setdefault(layer, set()).add(channel)
+    assert found["heuristic"] == found["reference"] == set("RGB")
+    assert found["P"] == found["N"] == set("XYZ")
+    assert found["dE2000"] == found["significant"] == {"Y"}
 
 
 def test_a_value_beyond_half_stays_finite(tmp_path):

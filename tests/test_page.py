@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import reports
-from comparisons.metrics import METRICS, Viewing
+from comparisons.metrics import METRICS
 from heuristic.equations import Entry
-from reports import images, page
+from reports import embedding, images, page, printing
+from tests import records
 
 SCHEMA = json.loads(
     (Path(page.__file__).parent / "comparison.schema.json").read_text(encoding="utf-8")
@@ -20,67 +21,9 @@ SCHEMA = json.loads(
 HOSTILE = "../\"><script>alert('x')</script><img src=http://example.org/x onerror=alert(1)>"
 
 
-def metric(mean):
-    after = {"exposure": 1.25 + mean / 100, "mean": 0.71 * mean, "p50": 0.5 * mean}
-    return {
-        "mean": mean,
-        "p50": 0.8 * mean,
-        "p95": 2.1 * mean,
-        "max": 3.3 * mean,
-        "noise_floor": 0.0123 * mean,
-        "after_exposure": after | {"p95": 1.9 * mean, "max": 3.1 * mean},
-    }
-
-
 @pytest.fixture
 def record():
-    side = {"median_s": 0.0042, "passes": 16, "first_s": 0.31, "total_s": 0.375, "compile_s": None}
-    return {
-        "scene": "fig-8-9",
-        "variant": "llvm_ad_rgb",
-        "seed": 7,
-        "resolution": [6, 4],
-        "plan": {
-            "effects": [
-                {"name": "diffuse", "called_for": True, "rule": "k_d > 0"},
-                {"name": "emission", "called_for": False, "rule": "no surface emits"},
-            ],
-            "integrator": "path",
-            "max_depth": -1,
-            "spp": 256,
-            "passes": 16,
-            "sampler": "multijitter",
-        },
-        "viewing": Viewing(exposure=0.5).record(),
-        "metrics": {
-            "dE2000": metric(4.327),
-            "dE_ITP": metric(12.91),
-            "dE_CAM16UCS": metric(3.638),
-            "rmse": {
-                "value": 0.04871,
-                "noise_floor": 0.000812,
-                "after_exposure": {"exposure": 1.31, "value": 0.0312},
-            },
-            "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
-            "significant": {"fraction": 0.632, "level": 0.01},
-        },
-        "pixels": {"counted": 20, "total": 24},
-        "pairing": {
-            "convention": "matched",
-            "bsdfs": [{"id": "ball", "physical": "roughplastic", "k_d": [0.4, 0.3, 0.2]}],
-            "emitters": [{"physical": "point", "intensity": 12.566}],
-            "misses": [{"what": "specular albedo", "wanted": 0.238, "reached": 0.0562}],
-        },
-        "time": {
-            "heuristic": side,
-            "reference": {**side, "total_s": 2.79},
-            "stages": {"page": 0.1},
-        },
-        "unrepresentable": ["dielectric: refraction"],
-        "warnings": ["material reflects more than it receives"],
-        "versions": {"mitsuba": "3.9.1"},
-        "command": "fotismos compare fig-8-9 --seed 7",
-    }
+    return records.record()
 
 
 @pytest.fixture
@@ -113,7 +56,7 @@ class Page(HTMLParser):
 def numbers_in(node):
     if isinstance(node, dict):
         return [n for item in node.values() for n in numbers_in(item)]
-    if isinstance(node, list):
+    if isinstance(node, list | tuple):
         return [n for item in node for n in numbers_in(item)]
     return [node] if isinstance(node, int | float) and not isinstance(node, bool) else []
 
@@ -145,8 +88,8 @@ def test_the_schema_refuses(record, path, value):
         jsonschema.Draft202012Validator(SCHEMA).validate(record)
 
 
-def test_every_top_level_key_is_required(record):
-    for key in record:
+def test_no_required_key_may_be_missing(record):
+    for key in SCHEMA["required"]:
         partial = {k: v for k, v in record.items() if k != key}
         assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(partial), key
 
@@ -154,7 +97,9 @@ def test_every_top_level_key_is_required(record):
 def test_the_numbers_on_the_page_are_the_records(record, pictures):
     shown = Page(page.render([{"record": record, "images": pictures}]))
     values = {value for value, _ in shown.values}
-    parts = [record[key] for key in ("metrics", "viewing", "pixels", "pairing", "time")]
+    keys = ("metrics", "viewing", "pixels", "pairing", "time")
+    parts = [record[key] for key in keys]
+    parts += [(region["share"], region["mean_dE2000"]) for region in record["regions"]]
     # The level of the test is printed, as "1 %", without a machine-readable value.
     missing = {n for n in numbers_in(parts) if n not in values} - {0.01}
     assert not missing
@@ -175,8 +120,9 @@ def test_two_scenes_keep_their_order_and_their_anchors(record, pictures):
     ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
     assert len(ids) == len(set(ids))
     targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
-    assert targets == ["scene-1", "scene-2"]
-    assert set(targets) < set(ids)
+    scenes = [target for target in dict.fromkeys(targets) if target and "&" not in target]
+    assert scenes == ["scene=fig-8-9", "scene=second"]
+    assert set(scenes) < set(ids)
 
 
 def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
@@ -185,26 +131,33 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record["warnings"] = record["unrepresentable"] = [HOSTILE]
     record["versions"] = {HOSTILE: HOSTILE}
     record["plan"]["effects"][0]["rule"] = HOSTILE
+    record["regions"][0]["effect"] = HOSTILE
     record["pairing"]["misses"][0][HOSTILE] = {HOSTILE: [HOSTILE]}
     html = page.render(
         [{"record": record, "images": pictures, "files": {HOSTILE: "javascript:" + HOSTILE}}],
         title=HOSTILE,
+        failures=[(HOSTILE, HOSTILE)],
     )
     shown = Page(html)
-    assert [tag for tag, _ in shown.tags].count("script") == 1
+    scripts = [attrs.get("type", "") for tag, attrs in shown.tags if tag == "script"]
+    assert scripts.count("") == 1
+    assert scripts.count("module") == 2
+    assert set(scripts) == {"", "module", "application/json"}
     assert not {"link", "iframe", "object", "base"} & {tag for tag, _ in shown.tags}
     for tag, attrs in shown.tags:
         assert not [name for name in attrs if name.startswith("on")], tag
         if "src" in attrs:
             assert attrs["src"].startswith("data:image/png;base64,")
         if "href" in attrs:
-            assert attrs["href"].startswith(("#scene-", "./"))
+            assert attrs["href"] == "#" or attrs["href"].startswith(("#scene=", "./"))
     assert HOSTILE in shown.text
     style = html[html.index("<style>") : html.index("</style>")]
     assert "url(" not in style
     assert "@import" not in style
     policies = [a["content"] for _, a in shown.tags if a.get("http-equiv")]
-    assert policies[0].startswith("default-src 'none'")
+    policy = dict(part.split(None, 1) for part in policies[0].split(";"))
+    assert policy["default-src"] == "'none'"
+    assert all(source.startswith("'sha256-") for source in policy["script-src"].split())
 
 
 def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
@@ -217,6 +170,23 @@ def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
         assert metric_.definition in shown.text
         assert f"≥ {metric_.map_range[1]:g}" in shown.text
     assert "not counted" in shown.text
+
+
+def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, monkeypatch):
+    channels = {
+        f"{half}.{c}": np.ones((4, 6)) for half in ("heuristic", "reference") for c in "RGB"
+    }
+    channels |= {f"reference_stderr.{colour}": np.zeros((4, 6)) for colour in "RGB"}
+    channels |= {f"{name}.Y": np.ones((4, 6)) for name in (*METRICS, "significant")}
+
+    def shown():
+        embedded = embedding.embed(channels, np.ones((4, 6), bool))
+        view = {"record": record, "images": pictures, "embedded": embedded}
+        return Page(page.render([view])).text
+
+    assert "means over" not in shown()
+    monkeypatch.setattr(embedding, "LONGEST", 3)
+    assert "means over 2 × 2 pixels" in shown()
 
 
 def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):
@@ -241,7 +211,7 @@ def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):
     ],
 )
 def test_numbers_are_printed_to_three_digits(value, text):
-    assert page.number(value) == text
+    assert printing.number(value) == text
 
 
 @pytest.mark.parametrize(
@@ -249,13 +219,17 @@ def test_numbers_are_printed_to_three_digits(value, text):
     [(0.0, "0 s"), (2e-5, "20.0 µs"), (0.0042, "4.20 ms"), (75.0, "75.0 s"), (None, "–")],
 )
 def test_times_have_their_unit(value, text):
-    assert page.seconds(value) == text
+    assert printing.seconds(value) == text
 
 
 def test_the_package_holds_its_templates():
     folder = Path(reports.__path__[0])
-    for name in ("page.html.j2", "scene.html.j2", "macros.html.j2", "page.css", "page.js"):
+    styles = [f"styles/{name}.css" for name in page.STYLES]
+    scripts = [f"viewer/{name}.js" for name in page.SCRIPTS]
+    for name in ("page.html.j2", "scene.html.j2", "macros.html.j2", *styles, *scripts):
         assert (folder / "templates" / name).is_file()
+    assert {path.stem for path in (folder / "templates" / "viewer").iterdir()} == set(page.SCRIPTS)
+    assert {path.stem for path in (folder / "templates" / "styles").iterdir()} == set(page.STYLES)
 
 
 def test_the_index_of_equations_is_printed_with_code_and_escaped(record, pictures):

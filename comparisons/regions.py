@@ -1,0 +1,121 @@
+"""Where the departure is largest: the few boxes of an image that hold most of its error.
+
+A box is worth the error in it beyond what its counted pixels would hold if each had `CONTRAST`
+times the image's mean. The box of greatest worth is found exactly on a grid of cells (the
+maximum-sum subarray in two dimensions: Kadane's algorithm over the columns, for all pairs of rows);
+its cells are then taken out, and the next one is sought. So boxes never overlap, their shares add
+up to at most 1, and evenly spread error has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: Cells along the longer side of the image.
+CELLS = 48
+
+#: A region stands out where its error is more than this many times the image's mean.
+CONTRAST = 1.25
+
+#: At most so many regions, each with at least this share of the image's error.
+MOST, LEAST_SHARE = 4, 0.04
+
+
+@dataclass(frozen=True)
+class Region:
+    """A box of pixels: x, y count from the top left, and include the first pixel.
+
+    share
+        Of the sum of the error over all counted pixels, 0 to 1.
+    mean_dE2000
+        Mean over the box's counted pixels.
+    effect
+        The effect that dominates there, in words, where that is known.
+    """
+
+    x: int
+    y: int
+    width: int
+    height: int
+    share: float
+    mean_dE2000: float
+    effect: str | None = None
+
+    def data(self) -> dict[str, int | float | str]:
+        """The region as in ``comparison.json``; an unknown effect is left out."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+
+def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
+    """The regions of a map of ΔE2000 (H, W) ≥ 0, of greatest worth first.
+
+    Only pixels of `counted` (H, W) matter. Without error there is no region.
+    """
+    counted = np.asarray(counted, bool)
+    error = np.where(counted, np.asarray(error, np.float64), 0.0)
+    total, pixels = error.sum(), counted.sum()
+    if not total > 0.0:
+        return ()
+    cell = -(-max(error.shape) // CELLS)
+    worth = _cells(error, cell) - CONTRAST * total / pixels * _cells(counted, cell)
+    found = []
+    while len(found) < MOST:
+        rows, columns, value = _best_box(worth)
+        if not value > 0.0:
+            break
+        worth[rows, columns] = -total  # no box that touches these is worth anything
+        region = _region(error, counted, _pixels(rows, cell), _pixels(columns, cell), total)
+        if region.share >= LEAST_SHARE:
+            found.append(region)
+        elif value < LEAST_SHARE * total / MOST:  # only specks are left
+            break
+    return tuple(found)
+
+
+def _cells(image: NDArray, side: int) -> NDArray[np.float64]:
+    """Sums over square cells; those at the right and at the bottom may be smaller."""
+    rows = np.add.reduceat(image.astype(np.float64), np.arange(0, image.shape[0], side), axis=0)
+    return np.add.reduceat(rows, np.arange(0, image.shape[1], side), axis=1)
+
+
+def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
+    """The box of cells with the greatest sum, the first of equal ones, and that sum."""
+    below = np.vstack([np.zeros(worth.shape[1]), worth.cumsum(axis=0)])
+    top, bottom = np.triu_indices(len(below), 1)
+    strips = below[bottom] - below[top]  # a row for each pair: the sums of its columns
+    running = np.full(len(strips), -np.inf)
+    start = np.zeros(len(strips), int)
+    best = (-np.inf, 0, 0, 0)
+    for column, strip in enumerate(strips.T):
+        fresh = running <= 0.0
+        running, start = np.where(fresh, strip, running + strip), np.where(fresh, column, start)
+        pair = int(running.argmax())
+        best = max(best, (float(running[pair]), pair, int(start[pair]), column), key=_first)
+    value, pair, first, last = best
+    return slice(int(top[pair]), int(bottom[pair])), slice(first, last + 1), value
+
+
+def _first(candidate: tuple) -> float:
+    return candidate[0]
+
+
+def _pixels(cells: slice, side: int) -> slice:
+    return slice(cells.start * side, cells.stop * side)
+
+
+def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
+    """The region of a box, drawn in to the counted pixels that it holds."""
+    inside = counted[rows, columns]
+    y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    held = error[rows, columns].sum()
+    return Region(
+        x=int(columns.start + x[0]),
+        y=int(rows.start + y[0]),
+        width=int(x[-1] - x[0] + 1),
+        height=int(y[-1] - y[0] + 1),
+        share=float(held / total),
+        mean_dE2000=float(held / inside.sum()),
+    )

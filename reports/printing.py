@@ -1,0 +1,67 @@
+"""How values are printed, the same on every page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from markupsafe import Markup
+
+#: A mean up to this many times its noise floor is said to be about noise.
+NOISE_MARGIN = 1.1
+
+
+def number(value: float | None) -> str:
+    """Three significant digits, in powers of ten below 0.001 and from a million on."""
+    if value is None:
+        return "–"
+    size = abs(float(f"{value:.2e}"))  # rounded first: 9.999 is 10.0, not 10.00
+    if size == 0:
+        return "0"
+    if not 1e-3 <= size < 1e6:
+        mantissa, exponent = f"{value:.1e}".split("e")
+        return f"{_minus(mantissa)} × 10{_superscript(int(exponent))}"
+    decimals = max(0, 2 - math.floor(math.log10(size)))
+    return _minus(f"{value:,.{decimals}f}")
+
+
+def parameter(value: float) -> str:
+    """A value that was set, not measured: up to four significant digits, no trailing zeros."""
+    return _minus(f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
+
+
+def seconds(value: float | None) -> str:
+    """A time with its unit: µs, ms or s."""
+    if value is None:
+        return "–"
+    for scale, unit in ((1.0, "s"), (1e-3, "ms")):
+        if value >= scale:
+            return f"{number(value / scale)} {unit}"
+    return f"{number(value / 1e-6)} µs" if value else "0 s"
+
+
+def percent(value: float) -> str:
+    """A fraction as a percentage."""
+    return f"{number(100 * value)} %"
+
+
+def code_spans(text: str) -> Markup:
+    """A docstring's ````code```` as HTML, everything else escaped."""
+    parts = text.split("``")
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if place % 2 else part
+        for place, part in enumerate(parts)
+    )
+
+
+def about_noise(metric: Mapping[str, float]) -> bool:
+    """Whether a metric's mean is about what its noise floor gives (see `NOISE_MARGIN`)."""
+    return metric["noise_floor"] > 0 and metric["mean"] <= NOISE_MARGIN * metric["noise_floor"]
+
+
+def _minus(digits: str) -> str:
+    return digits.replace("-", "−")
+
+
+def _superscript(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

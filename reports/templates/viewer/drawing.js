@@ -1,0 +1,157 @@
+// The viewer's canvas: pictures through the viewport, and what lies over them.
+
+/** Words over a pane. @type {Record<string, string>} */
+const PANE_TITLES = { heuristic: "textbook", reference: "physical" };
+
+/** Colours of what lies over a picture, legible on any of them. */
+const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", label: "#000b" };
+
+/** Draws a view of a scene; knows nothing of events. */
+class Drawing {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  }
+
+  /**
+   * @param {View} view
+   * @param {Viewport} viewport
+   * @param {Painter} painter
+   * @param {{swapped: boolean, regions: any[], title: string}} extra
+   */
+  draw(view, viewport, painter, extra) {
+    this.view = view;
+    this.viewport = viewport;
+    this.painter = painter;
+    const panes = this.contents(extra);
+    const width = this.canvas.clientWidth;
+    const height = viewport.arrange(panes.length, width);
+    this.resize(width, height);
+    panes.forEach((content, place) => this.pane(viewport.panes[place], content));
+    viewport.panes.forEach((pane) => this.clipped(pane, () => this.overlay(pane, extra.regions)));
+    if (view.mode === "split") this.divide(viewport.panes[0]);
+    panes.forEach((content, place) => this.titles(viewport.panes[place], content));
+  }
+
+  /** What each pane shows: one picture, or two divided. @param {{swapped: boolean, title: string}} extra */
+  contents({ swapped, title }) {
+    const error = { picture: "map", title };
+    const halves = ["heuristic", "reference"].map((half) => ({ picture: half, title: PANE_TITLES[half] }));
+    switch (this.view.mode) {
+      case "side": return [...halves, error].map((one) => [one]);
+      case "error": return [[error]];
+      case "flicker": return [[halves[swapped ? 1 : 0]]];
+      default: return [halves];
+    }
+  }
+
+  /** @param {number} width @param {number} height */
+  resize(width, height) {
+    const density = window.devicePixelRatio || 1;
+    const wanted = [Math.round(width * density), Math.round(height * density)];
+    if (this.canvas.width !== wanted[0]) this.canvas.width = wanted[0];
+    if (this.canvas.height !== wanted[1]) this.canvas.height = wanted[1];
+    this.canvas.style.height = `${height}px`;
+    this.context.setTransform(density, 0, 0, density, 0, 0);
+    this.context.clearRect(0, 0, width, height);
+  }
+
+  /** @param {Box} box @param {() => void} paint */
+  clipped(box, paint) {
+    this.context.save();
+    this.context.beginPath();
+    this.context.rect(box.left, box.top, box.width, box.height);
+    this.context.clip();
+    paint();
+    this.context.restore();
+  }
+
+  /** @param {Box} pane @param {any[]} content */
+  pane(pane, content) {
+    this.clipped(pane, () => this.picture(pane, content.length === 1 ? content[0].picture : "reference"));
+    if (content.length === 1) return;
+    const above = { ...pane, width: pane.width * this.view.split };
+    this.clipped(above, () => this.picture(pane, "heuristic"));
+  }
+
+  /** @param {Box} pane @param {string} name */
+  picture(pane, name) {
+    const { view, viewport, painter } = this;
+    const source = name === "map" ? painter.map(view.map) : painter.rendering(name, view.tone, view.ev);
+    const zoom = viewport.zoom(view) * (window.devicePixelRatio || 1);
+    const [left, top] = viewport.toScreen(view, pane, 0, 0);
+    const [right, bottom] = viewport.toScreen(view, pane, viewport.width, viewport.height);
+    this.context.imageSmoothingEnabled = zoom * painter.images.block < 1;
+    this.context.imageSmoothingQuality = "high";
+    this.context.drawImage(source, left, top, right - left, bottom - top);
+  }
+
+  /** Regions and the marked pixel. @param {Box} pane @param {any[]} regions */
+  overlay(pane, regions) {
+    if (this.view.boxes) regions.forEach((region, place) => this.region(pane, region, place + 1));
+    if (this.view.pixel) this.mark(pane, this.view.pixel);
+  }
+
+  /** @param {Box} pane @param {any} region @param {number} number */
+  region(pane, region, number) {
+    const [left, top] = this.viewport.toScreen(this.view, pane, region.x, region.y);
+    const [right, bottom] = this.viewport.toScreen(this.view, pane, region.x + region.width, region.y + region.height);
+    this.outline(left, top, right - left, bottom - top, OVERLAY.box);
+    this.label(String(number), left + 1, top + 1, OVERLAY.box);
+  }
+
+  /** @param {Box} pane @param {number[]} pixel */
+  mark(pane, [x, y]) {
+    const zoom = this.viewport.zoom(this.view);
+    const [left, top] = this.viewport.toScreen(this.view, pane, x, y);
+    const margin = Math.max(0, 4 - zoom / 2);
+    this.outline(left - margin, top - margin, zoom + 2 * margin, zoom + 2 * margin, OVERLAY.line);
+  }
+
+  /** @param {number} left @param {number} top @param {number} width @param {number} height @param {string} colour */
+  outline(left, top, width, height, colour) {
+    const { context } = this;
+    for (const [stroke, thickness] of [[OVERLAY.edge, 3], [colour, 1.25]]) {
+      context.strokeStyle = /** @type {string} */ (stroke);
+      context.lineWidth = /** @type {number} */ (thickness);
+      context.strokeRect(left, top, width, height);
+    }
+  }
+
+  /** @param {Box} pane */
+  divide(pane) {
+    const { context } = this;
+    const at = pane.left + pane.width * this.view.split;
+    context.fillStyle = OVERLAY.edge;
+    context.fillRect(at - 2, pane.top, 4, pane.height);
+    context.fillStyle = OVERLAY.line;
+    context.fillRect(at - 1, pane.top, 2, pane.height);
+    context.beginPath();
+    context.arc(at, pane.top + pane.height / 2, 7, 0, 2 * Math.PI);
+    context.fill();
+    context.strokeStyle = OVERLAY.edge;
+    context.lineWidth = 1.5;
+    context.stroke();
+  }
+
+  /** @param {Box} pane @param {any[]} content */
+  titles(pane, content) {
+    const bottom = pane.top + pane.height - 23;
+    this.label(content[0].title, pane.left + 6, bottom);
+    if (content[1]) this.label(content[1].title, pane.left + pane.width - 6, bottom, OVERLAY.line, "right");
+  }
+
+  /** @param {string} text @param {number} left @param {number} top @param {string} colour @param {"left" | "right"} align */
+  label(text, left, top, colour = OVERLAY.line, align = "left") {
+    const { context } = this;
+    context.font = "12px system-ui, sans-serif";
+    const width = context.measureText(text).width + 10;
+    const start = align === "left" ? left : left - width;
+    context.fillStyle = OVERLAY.label;
+    context.fillRect(start, top, width, 17);
+    context.fillStyle = colour;
+    context.textBaseline = "middle";
+    context.fillText(text, start + 5, top + 9);
+  }
+}

@@ -1,0 +1,76 @@
+// What is seen, as the fragment of the address: it can be sent to somebody else.
+
+/**
+ * @typedef {object} View
+ * @property {string} scene       the id of a scene; empty for the overview
+ * @property {string} mode        split, flicker, side or error
+ * @property {string} map         a map's name
+ * @property {string} tone        a tone map's name
+ * @property {number} ev          exposure in stops, beyond that of the comparison
+ * @property {number | null} zoom screen pixels for each of the image; null to fit
+ * @property {number | null} x    the view's centre in pixels of the image, where it is zoomed
+ * @property {number | null} y
+ * @property {number} split       place of the divide, 0 to 1
+ * @property {number[] | null} pixel the marked pixel
+ * @property {boolean} boxes      whether regions are boxed
+ * @property {string} sort        the overview's order
+ * @property {string} only        the overview's filter: "", significant or failed
+ * @property {string} q           the overview's search
+ * @property {string} list        cards or table
+ */
+
+/** @type {View} */
+const DEFAULT_VIEW = Object.freeze({
+  scene: "", mode: "split", map: "dE2000", tone: "clip", ev: 0, zoom: null, x: null, y: null, split: 0.5,
+  pixel: null, boxes: true, sort: "run", only: "", q: "", list: "cards",
+});
+
+/** The values that a property with few of them may have. @type {Record<string, string[]>} */
+const ALLOWED = {
+  mode: ["split", "flicker", "side", "error"],
+  tone: ["clip", "reinhard", "filmic", "false"],
+  only: ["", "significant", "failed"],
+  list: ["cards", "table"],
+};
+
+/** How each property is read; null where the text makes no sense. @type {Record<string, (text: string) => any>} */
+const READERS = {
+  ev: numberIn(-16, 16), zoom: numberIn(1e-3, 1e3), x: numberIn(0, 1e6), y: numberIn(0, 1e6), split: numberIn(0, 1),
+  boxes: (text) => text !== "0",
+  pixel: (text) => (/^\d+,\d+$/.test(text) ? text.split(",").map(Number) : null),
+};
+
+/** @param {number} low @param {number} high */
+function numberIn(low, high) {
+  return (/** @type {string} */ text) => {
+    const value = text.trim() ? Number(text) : NaN;
+    return value >= low && value <= high ? value : null;
+  };
+}
+
+/** The view that a fragment stands for; what it does not say, or says wrongly, is as usual. @param {string} text @returns {View} */
+function parseFragment(text) {
+  /** @type {any} */
+  const view = { ...DEFAULT_VIEW };
+  for (const [key, value] of new URLSearchParams(text.replace(/^#/, ""))) {
+    if (!Object.hasOwn(DEFAULT_VIEW, key)) continue;
+    const read = READERS[key] ? READERS[key](value) : value;
+    if (read !== null && (!ALLOWED[key] || ALLOWED[key].includes(read))) view[key] = read;
+  }
+  return view;
+}
+
+/** The fragment of a view, with what is not as usual. @param {View} view */
+function fragmentOf(view) {
+  const parts = new URLSearchParams();
+  for (const [key, value] of Object.entries(view)) {
+    if (String(value) === String(DEFAULT_VIEW[/** @type {keyof View} */ (key)])) continue;
+    parts.set(key, typeof value === "boolean" ? (value ? "1" : "0") : rounded(value));
+  }
+  return `#${String(parts).replaceAll("%2C", ",")}`;
+}
+
+/** @param {any} value */
+function rounded(value) {
+  return typeof value === "number" ? String(Number(value.toFixed(3))) : String(value);
+}

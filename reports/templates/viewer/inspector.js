@@ -1,0 +1,51 @@
+// The pixel inspector: what the images hold at one pixel, with as many digits as they are kept to.
+
+/**
+ * Lines of text for a pixel, by the name of their place in the page.
+ * @param {Painter} painter
+ * @param {any} scene
+ * @param {number[]} pixel in pixels of the image
+ */
+function inspect(painter, scene, [x, y]) {
+  const { images } = painter;
+  const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
+  const flags = images.codes.flags[place];
+  const shown = (/** @type {string} */ name) => valueText(images, name, place);
+  return {
+    position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
+    heuristic: ["R", "G", "B"].map((colour) => shown(`heuristic.${colour}`)),
+    reference: ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)),
+    dE2000: shown("dE2000"),
+    dE_ITP: shown("dE_ITP"),
+    dE_CAM16UCS: shown("dE_CAM16UCS"),
+    log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
+    standard_error: shown("standard_error"),
+    significant: flags & COUNTED ? (flags & SIGNIFICANT ? "yes" : "no") : "not counted",
+    effect: effectAt(scene.regions, x, y),
+  };
+}
+
+/** @param {Images} images @param {string} name @param {number} place */
+function valueText(images, name, place) {
+  const plane = /** @type {Plane} */ (images.planes.find((one) => one.name === name));
+  return significant(decimal(images.codes[name][place], plane.digits), plane.digits);
+}
+
+/** The effect that dominates a region, where that is known. @param {any[]} regions @param {number} x @param {number} y */
+function effectAt(regions, x, y) {
+  const inside = regions.find(
+    (region) => x >= region.x && y >= region.y && x < region.x + region.width && y < region.y + region.height,
+  );
+  return inside?.effect ?? "";
+}
+
+/** Writes a pixel's lines into the page. @param {HTMLElement} panel @param {ReturnType<typeof inspect> | null} lines */
+function showInspection(panel, lines) {
+  for (const cell of panel.querySelectorAll("[data-value]")) {
+    const [name, index] = /** @type {HTMLElement} */ (cell).dataset.value?.split(".") ?? [];
+    const value = lines?.[/** @type {keyof typeof lines} */ (name)];
+    cell.textContent = (index && value ? value[Number(index)] : /** @type {string} */ (value)) ?? "–";
+  }
+  const effect = /** @type {HTMLElement | null} */ (panel.querySelector(".effect"));
+  if (effect) effect.hidden = !lines?.effect;
+}

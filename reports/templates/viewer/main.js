@@ -1,0 +1,70 @@
+// The page: which scene is seen, and how, is what the address's fragment says.
+
+const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
+const overview = makeOverview(byId("overview-section"), page.scenes, change);
+const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);
+/** @type {View} */
+let view = DEFAULT_VIEW;
+
+/** See something else, and say so in the address. @param {Partial<View>} changes */
+function change(changes) {
+  view = { ...view, ...changes };
+  history.replaceState(null, "", fragmentOf(view));
+  show();
+}
+
+/** See what the address says. */
+function follow() {
+  const before = view.scene;
+  view = parseFragment(location.hash);
+  if (!page.scenes.some((/** @type {any} */ scene) => scene.id === view.scene)) view.scene = "";
+  show();
+  if (view.scene !== before) arrive(view.scene || before);
+}
+
+function show() {
+  const scene = page.scenes.find((/** @type {any} */ one) => one.id === view.scene);
+  document.documentElement.dataset.view = scene ? "scene" : "overview";
+  for (const section of document.querySelectorAll(".scene")) {
+    section.classList.toggle("open", section.id === `scene=${view.scene}`);
+  }
+  if (!scene) overview.show(view);
+  if (!scene?.images) return;
+  if (viewer.scene !== scene) openScene(scene);
+  viewer.show(view);
+}
+
+/** @param {any} scene */
+function openScene(scene) {
+  const section = byId(`scene=${scene.id}`);
+  void viewer.open(scene, section);
+  void enliven(section);
+}
+
+/** @param {string} id @returns {HTMLElement} */
+function byId(id) {
+  return /** @type {HTMLElement} */ (document.getElementById(id));
+}
+
+/** A scene begins at its heading, the overview where one left it. @param {string} id */
+function arrive(id) {
+  if (view.scene) {
+    window.scrollTo(0, 0);
+    document.querySelector(".scene.open h2")?.focus({ preventScroll: true });
+  } else {
+    document.querySelector(`.card[data-scene="${CSS.escape(id)}"]`)?.scrollIntoView({ block: "center" });
+  }
+}
+
+/** @param {number} step */
+function turn(step) {
+  const seen = page.scenes.filter((/** @type {any} */ scene) => scene.images);
+  const place = seen.findIndex((/** @type {any} */ scene) => scene.id === view.scene);
+  const { mode, map, tone } = view;
+  const next = seen[(place + step + seen.length) % seen.length];
+  location.hash = fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, scene: next.id });
+}
+
+listenToKeys(viewer, turn, () => (location.hash = "#"));
+window.addEventListener("hashchange", follow);
+follow();

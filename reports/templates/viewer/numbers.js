@@ -1,0 +1,48 @@
+// Numbers as the page prints them, and the 16-bit codes that embedded images are made of.
+
+const LOWEST_EXPONENT = -18;
+const NEGATIVE = 0x8000;
+
+/**
+ * The value of a decimal code: 0 for 0, else ± m · 10^(e − digits + 1) with m of so many digits.
+ * @param {number} code
+ * @param {number} digits
+ */
+function decimal(code, digits) {
+  const magnitude = code & (NEGATIVE - 1);
+  if (!magnitude) return 0;
+  const unit = 10 ** (digits - 1);
+  const place = magnitude - 1;
+  const exponent = Math.floor(place / (9 * unit)) + LOWEST_EXPONENT - digits + 1;
+  const mantissa = (place % (9 * unit)) + unit;
+  return Number(`${code & NEGATIVE ? "-" : ""}${mantissa}e${exponent}`);
+}
+
+/** The values of all codes of three digits: images are painted by looking codes up. */
+const VALUES = Float64Array.from({ length: 65536 }, (_, code) => decimal(code, 3));
+
+/**
+ * A value with so many significant digits, as a person writes it.
+ * @param {number} value
+ * @param {number} digits
+ */
+function significant(value, digits = 3) {
+  if (!value) return "0";
+  const [mantissa, power] = value.toExponential(digits - 1).split("e");
+  const exponent = Number(power);
+  const plain = exponent >= -3 && exponent < Math.max(digits, 3);
+  const text = plain
+    ? value.toFixed(Math.max(0, digits - 1 - exponent))
+    : `${mantissa} × 10${superscript(exponent)}`;
+  return text.replace("-", "−");
+}
+
+/** @param {number} exponent */
+function superscript(exponent) {
+  return [...String(exponent)].map((sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)])).join("");
+}
+
+/** @param {number} value @param {number} low @param {number} high */
+function clamp(value, low, high) {
+  return Math.min(Math.max(value, low), high);
+}

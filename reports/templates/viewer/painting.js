@@ -1,0 +1,133 @@
+// Pictures out of numbers: the two renderings and the maps, one canvas each, kept until they change.
+
+/** Significant and counted, as in the plane "flags". */
+const SIGNIFICANT = 1, COUNTED = 2;
+
+/** An opaque pixel as the canvas keeps it, on machines of little-endian order (all that browsers run on). */
+const rgba = (/** @type {number} */ r, /** @type {number} */ g, /** @type {number} */ b) =>
+  (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
+
+/** A table of 256 colours out of "rrggbb" after "rrggbb". @param {string} hexadecimal */
+function colourTable(hexadecimal) {
+  return Uint32Array.from({ length: 256 }, (_, place) => {
+    const colour = parseInt(hexadecimal.slice(6 * place, 6 * place + 6), 16);
+    return rgba(colour >> 16, (colour >> 8) & 255, colour & 255);
+  });
+}
+
+/** Pictures of one scene. */
+class Painter {
+  /**
+   * @param {Images} images
+   * @param {number} exposure the factor that the comparison was viewed at
+   * @param {any} page what the page says about its maps: colours, ranges, luminance
+   */
+  constructor(images, exposure, page) {
+    this.images = images;
+    this.exposure = exposure;
+    this.page = page;
+    this.tables = Object.fromEntries(
+      Object.entries(page.colours).map(([name, colours]) => [name, colourTable(colours)]),
+    );
+    /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
+    this.pictures = new Map();
+  }
+
+  /** "heuristic" or "reference" through a tone map. @param {string} half @param {string} tone @param {number} stops */
+  rendering(half, tone, stops) {
+    const factor = this.exposure * 2 ** stops;
+    return this.picture(half, `${tone} ${factor}`, (pixels) =>
+      tone === "false" ? this.paintStops(pixels, half, factor) : this.paintLevels(pixels, half, levels(tone, factor)),
+    );
+  }
+
+  /** A map by its name. @param {string} name */
+  map(name) {
+    return this.picture("map", name, (pixels) => {
+      if (name === "log2_luminance") this.paintRatio(pixels);
+      else if (name === "significant") this.paintFlags(pixels);
+      else this.paintError(pixels, name);
+    });
+  }
+
+  /**
+   * The canvas in a slot, painted again where its key has changed.
+   * @param {string} slot
+   * @param {string} key
+   * @param {(pixels: Uint32Array) => void} paint
+   */
+  picture(slot, key, paint) {
+    const kept = this.pictures.get(slot);
+    if (kept?.key === key) return kept.canvas;
+    const { width, height } = this.images;
+    const canvas = kept?.canvas ?? Object.assign(document.createElement("canvas"), { width, height });
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    const data = new ImageData(width, height);
+    paint(new Uint32Array(data.data.buffer));
+    context.putImageData(data, 0, 0);
+    this.pictures.set(slot, { key, canvas });
+    return canvas;
+  }
+
+  /** @param {string} half */
+  channels(half) {
+    return ["R", "G", "B"].map((colour) => this.images.codes[`${half}.${colour}`]);
+  }
+
+  /** @param {Uint32Array} pixels @param {string} half @param {Uint8Array} level */
+  paintLevels(pixels, half, level) {
+    const [r, g, b] = this.channels(half);
+    for (let i = 0; i < pixels.length; i++) pixels[i] = rgba(level[r[i]], level[g[i]], level[b[i]]);
+  }
+
+  /** @param {Uint32Array} pixels @param {string} half @param {number} factor */
+  paintStops(pixels, half, factor) {
+    const [low, high] = FALSE_COLOUR_STOPS;
+    for (let i = 0; i < pixels.length; i++) {
+      const stops = Math.log2(Math.max(factor * this.luminance(half, i), 1e-30));
+      pixels[i] = this.tables.value[clamp(Math.floor((256 * (stops - low)) / (high - low)), 0, 255)];
+    }
+  }
+
+  /** @param {Uint32Array} pixels @param {string} metric */
+  paintError(pixels, metric) {
+    const top = this.page.ranges[metric];
+    const colour = Uint32Array.from(VALUES, (value) => this.tables.error[clamp(Math.floor((256 * value) / top), 0, 255)]);
+    const codes = this.images.codes[metric];
+    for (let i = 0; i < pixels.length; i++) pixels[i] = colour[codes[i]];
+  }
+
+  /** @param {Uint32Array} pixels */
+  paintRatio(pixels) {
+    const range = this.page.ranges.log2_luminance;
+    for (let i = 0; i < pixels.length; i++) {
+      pixels[i] = this.tables.signed[clamp(Math.floor(128 + (128 * this.ratio(i)) / range), 0, 255)];
+    }
+  }
+
+  /** @param {Uint32Array} pixels */
+  paintFlags(pixels) {
+    const flags = this.images.codes.flags;
+    const [marked, unmarked, uncounted] = this.page.mask.map((/** @type {number[]} */ c) => rgba(c[0], c[1], c[2]));
+    for (let i = 0; i < pixels.length; i++) {
+      pixels[i] = flags[i] & COUNTED ? (flags[i] & SIGNIFICANT ? marked : unmarked) : uncounted;
+    }
+  }
+
+  /** Relative luminance of a pixel. @param {string} half @param {number} place */
+  luminance(half, place) {
+    return this.page.luminance.reduce(
+      (/** @type {number} */ sum, /** @type {number} */ weight, /** @type {number} */ channel) =>
+        sum + weight * VALUES[this.channels(half)[channel][place]],
+      0,
+    );
+  }
+
+  /** Luminance of the heuristic over that of the reference, in stops. @param {number} place */
+  ratio(place) {
+    const [test, reference] = ["heuristic", "reference"].map(
+      (half) => Math.max(this.luminance(half, place), 0) + this.page.epsilon,
+    );
+    return Math.log2(test / reference);
+  }
+}

@@ -1,0 +1,69 @@
+// Mouse, pen and fingers on the canvas: the divide, pan, wheel and pinch, hover and tap.
+
+/** A press that moves less than this is a tap; the divide is caught from this far (CSS pixels). */
+const TAP = 5, REACH = 14;
+
+/** @param {Viewer} viewer */
+function listenToPointers(viewer) {
+  const { canvas } = viewer;
+  /** Pointers that are down, by id. @type {Map<number, number[]>} */
+  const down = new Map();
+  let moved = 0;
+  let dividing = false;
+
+  const place = (/** @type {MouseEvent} */ event) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+
+  canvas.addEventListener("pointerdown", (event) => {
+    const at = place(event);
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, at);
+    if (down.size > 1) return;
+    moved = 0;
+    dividing = viewer.dividesAt(at[0], REACH);
+  });
+
+  canvas.addEventListener("pointermove", (event) => {
+    const at = place(event);
+    const before = down.get(event.pointerId);
+    if (!before) {
+      viewer.hover(at);
+      return;
+    }
+    moved += Math.hypot(at[0] - before[0], at[1] - before[1]);
+    if (down.size > 1) pinch(viewer, [...down.values()], before, at);
+    else if (dividing) viewer.change({ split: viewer.divideAt(at[0]) });
+    else if (moved > TAP) viewer.change(viewer.viewport.panned(viewer.view, at[0] - before[0], at[1] - before[1]));
+    down.set(event.pointerId, at);
+  });
+
+  canvas.addEventListener("pointerup", (event) => {
+    if (moved <= TAP && down.size === 1) viewer.tap(place(event));
+  });
+  for (const end of ["pointerup", "pointercancel"]) {
+    canvas.addEventListener(end, (event) => down.delete(/** @type {PointerEvent} */ (event).pointerId));
+  }
+  canvas.addEventListener("pointerleave", () => viewer.hover(null));
+
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    viewer.change(viewer.viewport.zoomed(viewer.view, 2 ** (-event.deltaY / 240), place(event)));
+  }, { passive: false });
+}
+
+/**
+ * Two fingers: the one that moved changes their distance and their middle.
+ * @param {Viewer} viewer
+ * @param {number[][]} fingers
+ * @param {number[]} before
+ * @param {number[]} after
+ */
+function pinch(viewer, fingers, before, after) {
+  const other = fingers.find((finger) => finger !== before) ?? after;
+  const distance = (/** @type {number[]} */ finger) => Math.hypot(finger[0] - other[0], finger[1] - other[1]);
+  const middle = [(after[0] + other[0]) / 2, (after[1] + other[1]) / 2];
+  viewer.change(viewer.viewport.zoomed(viewer.view, distance(after) / Math.max(distance(before), 1), middle));
+  viewer.change(viewer.viewport.panned(viewer.view, (after[0] - before[0]) / 2, (after[1] - before[1]) / 2));
+}

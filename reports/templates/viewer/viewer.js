@@ -1,0 +1,205 @@
+// The viewer of one scene: its state, its controls, and when it is drawn.
+
+class Viewer {
+  /**
+   * @param {HTMLElement} element the canvas and its controls
+   * @param {HTMLElement} panel the pixel inspector
+   * @param {any} page
+   * @param {(changes: Partial<View>) => void} change tells the page what is to be seen
+   */
+  constructor(element, panel, page, change) {
+    this.element = element;
+    this.panel = panel;
+    this.page = page;
+    this.change = change;
+    this.canvas = /** @type {HTMLCanvasElement} */ (element.querySelector("canvas"));
+    this.drawing = new Drawing(this.canvas);
+    this.viewport = new Viewport(1, 1);
+    /** @type {View} */
+    this.view = DEFAULT_VIEW;
+    /** @type {Painter | null} */
+    this.painter = null;
+    /** @type {number[] | null} */
+    this.hovered = null;
+    this.swapped = false;
+    this.pending = false;
+    listenToPointers(this);
+    this.listenToControls();
+    new ResizeObserver(() => this.redraw()).observe(element);
+  }
+
+  /** Open a scene in its section of the page. @param {any} scene @param {HTMLElement} section */
+  async open(scene, section) {
+    this.scene = scene;
+    this.painter = null;
+    this.hovered = null;
+    this.swapped = false;
+    this.viewport = new Viewport(scene.width, scene.height);
+    section.querySelector(".viewer-slot")?.append(this.element);
+    section.querySelector(".side")?.prepend(this.panel);
+    this.element.hidden = this.panel.hidden = false;
+    this.element.dataset.ready = "";
+    const images = await imagesOf(scene.id, scene.images);
+    if (this.scene !== scene) return; // another one was opened meanwhile
+    this.painter = new Painter(images, scene.exposure, this.page);
+    this.element.dataset.ready = scene.id;
+    this.redraw();
+  }
+
+  /** @param {View} view */
+  show(view) {
+    this.view = view;
+    this.element.dataset.mode = view.mode;
+    this.showControls();
+    this.showLegend();
+    this.redraw();
+  }
+
+  /** Draw once before the next frame, however often it is asked for. */
+  redraw() {
+    if (this.pending || !this.painter) return;
+    this.pending = true;
+    requestAnimationFrame(() => {
+      this.pending = false;
+      this.paint();
+    });
+  }
+
+  paint() {
+    if (!this.painter || !this.canvas.clientWidth) return;
+    const extra = { swapped: this.swapped, regions: this.scene.regions, title: this.page.titles[this.view.map] };
+    this.drawing.draw(this.view, this.viewport, this.painter, extra);
+    this.canvas.style.touchAction = this.view.zoom === null ? "pan-y" : "none";
+    this.canvas.setAttribute("aria-label", this.description());
+    this.inspectPixel();
+  }
+
+  description() {
+    const modes = {
+      split: "textbook shading on the left, physical reference on the right",
+      flicker: this.swapped ? "physical reference" : "textbook shading",
+      side: `textbook shading, physical reference and ${this.page.titles[this.view.map]}`,
+      error: this.page.titles[this.view.map],
+    };
+    return `${this.scene.name}: ${modes[/** @type {keyof modes} */ (this.view.mode)]}. Press ? for the keys.`;
+  }
+
+  /** Show the numbers of the pixel under the pointer, else of the marked one. */
+  inspectPixel() {
+    const pixel = this.hovered ?? this.view.pixel;
+    const known = pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height;
+    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, pixel) : null);
+  }
+
+  /** @param {number[] | null} place */
+  hover(place) {
+    this.hovered = place && this.viewport.pixelAt(this.view, place[0], place[1]);
+    if (this.painter) this.inspectPixel();
+  }
+
+  /** Mark a pixel; swap the halves where they flicker. @param {number[]} place */
+  tap(place) {
+    if (this.view.mode === "flicker") this.swap();
+    this.change({ pixel: this.viewport.pixelAt(this.view, place[0], place[1]) });
+  }
+
+  swap() {
+    this.swapped = !this.swapped;
+    this.redraw();
+  }
+
+  /** Whether a press there takes the divide: near it, or anywhere while the whole image is seen. @param {number} left @param {number} reach */
+  dividesAt(left, reach) {
+    if (this.view.mode !== "split") return false;
+    const pane = this.viewport.panes[0];
+    return this.view.zoom === null || Math.abs(left - pane.width * this.view.split) < reach;
+  }
+
+  /** @param {number} left */
+  divideAt(left) {
+    return clamp(left / this.viewport.panes[0].width, 0, 1);
+  }
+
+  /** Zoom about the marked pixel where it is seen, else about the middle. @param {number} factor */
+  zoomBy(factor) {
+    const pane = this.viewport.panes[0];
+    const [x, y] = this.view.pixel ?? this.viewport.centre(this.view);
+    const [left, top] = this.viewport.toScreen(this.view, pane, x + 0.5, y + 0.5);
+    const seen = left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
+    const about = this.view.pixel && seen ? [left, top] : [pane.width / 2, pane.height / 2];
+    this.change(this.viewport.zoomed(this.view, factor, about));
+  }
+
+  /** Move the marked pixel, and the view with it where it would leave. @param {number} right @param {number} down */
+  step(right, down) {
+    const { width, height } = this.viewport;
+    const [cx, cy] = this.viewport.centre(this.view).map(Math.floor);
+    const [x, y] = this.view.pixel ?? [cx - right, cy - down];
+    const pixel = [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)];
+    this.hovered = null;
+    this.change({ pixel, ...this.following(pixel) });
+  }
+
+  /** @param {number[]} pixel */
+  following([x, y]) {
+    if (this.view.zoom === null) return {};
+    const pane = this.viewport.panes[0];
+    const [left, top] = this.viewport.toScreen(this.view, { ...pane, left: 0, top: 0 }, x + 0.5, y + 0.5);
+    const seen = left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
+    return seen ? {} : { x: x + 0.5, y: y + 0.5 };
+  }
+
+  /** The controls tell the page what they are set to; `showControls` does the reverse. */
+  listenToControls() {
+    this.element.addEventListener("click", (event) => {
+      const button = /** @type {HTMLElement} */ (event.target).closest("button");
+      if (button?.dataset.mode) this.change({ mode: button.dataset.mode });
+      if (button?.dataset.action) this.act(button.dataset.action);
+    });
+    for (const control of this.element.querySelectorAll("[data-control]")) {
+      control.addEventListener("input", () => {
+        const { value, dataset } = /** @type {HTMLInputElement & {dataset: {control: string}}} */ (control);
+        this.change({ [dataset.control]: dataset.control === "ev" ? Number(value) : value });
+      });
+    }
+  }
+
+  /** What buttons and keys do. @param {string} action */
+  act(action) {
+    /** @type {Record<string, () => void>} */
+    const actions = {
+      "zoom-in": () => this.zoomBy(2),
+      "zoom-out": () => this.zoomBy(0.5),
+      fit: () => this.change({ zoom: null, x: null, y: null }),
+      pixels: () => this.zoomBy(1 / this.viewport.zoom(this.view)),
+      boxes: () => this.change({ boxes: !this.view.boxes }),
+      "ev-reset": () => this.change({ ev: 0 }),
+      swap: () => this.swap(),
+      help: () => openHelp(),
+    };
+    actions[action]?.();
+  }
+
+  showControls() {
+    for (const button of this.element.querySelectorAll("button[data-mode]")) {
+      button.setAttribute("aria-pressed", String(/** @type {HTMLElement} */ (button).dataset.mode === this.view.mode));
+    }
+    this.element.querySelector("[data-action=boxes]")?.setAttribute("aria-pressed", String(this.view.boxes));
+    for (const control of this.element.querySelectorAll("[data-control]")) {
+      const field = /** @type {HTMLInputElement} */ (control);
+      field.value = String(this.view[/** @type {keyof View} */ (field.dataset.control)]);
+    }
+    const output = this.element.querySelector("output");
+    if (output) output.textContent = `${this.view.ev > 0 ? "+" : ""}${this.view.ev}`.replace("-", "−");
+  }
+
+  /** The colour bar of what is seen. */
+  showLegend() {
+    const seen = { error: [this.view.map], side: [this.view.map] }[this.view.mode] ?? [];
+    if (this.view.tone === "false" && this.view.mode !== "error") seen.push("false");
+    for (const legend of this.element.querySelectorAll("[data-legend]")) {
+      const element = /** @type {HTMLElement} */ (legend);
+      element.hidden = !seen.includes(element.dataset.legend ?? "");
+    }
+  }
+}

@@ -1,0 +1,109 @@
+// Where pixels of the image are on the canvas: zoom, pan, and the panes of side by side.
+
+/** Narrower canvases show side by side as one above the other (CSS pixels). */
+const STACKED_BELOW = 620;
+
+/** The least height of a view, and the greatest as a part of the window's. */
+const LEAST_HEIGHT = 180, GREATEST_PART = 0.74;
+
+/** @typedef {{left: number, top: number, width: number, height: number}} Box */
+
+/** Geometry in CSS pixels; the image is `width` by `height` of its own. */
+class Viewport {
+  /** @param {number} width @param {number} height */
+  constructor(width, height) {
+    this.width = width;
+    this.height = height;
+    /** @type {Box[]} */
+    this.panes = [];
+    /** The zoom that fits, set by `arrange`. */
+    this.fit = 1;
+  }
+
+  /**
+   * Lay out so many panes over a canvas of a width; returns the height that they take.
+   * @param {number} count
+   * @param {number} available
+   */
+  arrange(count, available) {
+    const gap = 4;
+    const stacked = count > 1 && available < STACKED_BELOW;
+    const width = stacked ? available : (available - gap * (count - 1)) / count;
+    const natural = (width * this.height) / this.width;
+    const height = Math.round(clamp(natural, Math.min(LEAST_HEIGHT, available), GREATEST_PART * window.innerHeight));
+    this.panes = Array.from({ length: count }, (_, place) => ({
+      left: stacked ? 0 : place * (width + gap),
+      top: stacked ? place * (height + gap) : 0,
+      width,
+      height,
+    }));
+    this.fit = Math.min(width / this.width, height / this.height);
+    return stacked ? count * height + (count - 1) * gap : height;
+  }
+
+  /** @param {View} view */
+  zoom(view) {
+    return view.zoom ?? this.fit;
+  }
+
+  /** The point of the image at the centre of each pane. @param {View} view */
+  centre(view) {
+    if (view.zoom === null) return [this.width / 2, this.height / 2];
+    return [view.x ?? this.width / 2, view.y ?? this.height / 2];
+  }
+
+  /** From the image to a pane. @param {View} view @param {Box} pane @param {number} x @param {number} y */
+  toScreen(view, pane, x, y) {
+    const [cx, cy] = this.centre(view);
+    const zoom = this.zoom(view);
+    return [pane.left + pane.width / 2 + (x - cx) * zoom, pane.top + pane.height / 2 + (y - cy) * zoom];
+  }
+
+  /** From the canvas to the image. @param {View} view @param {number} left @param {number} top */
+  toImage(view, left, top) {
+    const pane = this.paneAt(left, top);
+    const [cx, cy] = this.centre(view);
+    const zoom = this.zoom(view);
+    return [cx + (left - pane.left - pane.width / 2) / zoom, cy + (top - pane.top - pane.height / 2) / zoom];
+  }
+
+  /** The pane at a place of the canvas, or the nearest before it. @param {number} left @param {number} top */
+  paneAt(left, top) {
+    const reached = this.panes.filter((pane) => pane.left <= left && pane.top <= top);
+    return reached.at(-1) ?? this.panes[0];
+  }
+
+  /** The pixel under a place of the canvas, or null. @param {View} view @param {number} left @param {number} top */
+  pixelAt(view, left, top) {
+    const [x, y] = this.toImage(view, left, top).map(Math.floor);
+    return x >= 0 && y >= 0 && x < this.width && y < this.height ? [x, y] : null;
+  }
+
+  /**
+   * Zoom by a factor, keeping the image's point under a place of the canvas where it is.
+   * @param {View} view
+   * @param {number} factor
+   * @param {number[]} place
+   */
+  zoomed(view, factor, [left, top]) {
+    const [x, y] = this.toImage(view, left, top);
+    const [cx, cy] = this.centre(view);
+    const before = this.zoom(view);
+    const zoom = clamp(before * factor, this.fit, 64);
+    if (zoom <= this.fit) return { zoom: null, x: null, y: null };
+    const kept = before / zoom;
+    return { zoom, ...this.within(x + (cx - x) * kept, y + (cy - y) * kept) };
+  }
+
+  /** Move by so many pixels of the screen. @param {View} view @param {number} right @param {number} down */
+  panned(view, right, down) {
+    const [cx, cy] = this.centre(view);
+    const zoom = this.zoom(view);
+    return view.zoom === null ? {} : this.within(cx - right / zoom, cy - down / zoom);
+  }
+
+  /** A centre that is in the image. @param {number} x @param {number} y */
+  within(x, y) {
+    return { x: clamp(x, 0, this.width), y: clamp(y, 0, this.height) };
+  }
+}

@@ -1,0 +1,211 @@
+"""A small report, and a browser that opens it from disk."""
+
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from playwright.sync_api import sync_playwright
+
+from comparisons import regions
+from comparisons.histograms import histogram
+from comparisons.metrics import METRICS, log2_luminance_ratio
+from comparisons.record import Comparison, Images
+from reports import histograms, output, vega
+from tests import records
+
+WIDTH, HEIGHT = 48, 32
+
+#: Names that the page has to bear; the address knows them by plain characters.
+NOISY, EXACT, FAILED = "noisy & <b>", "exact", "lost"
+NOISY_ID = "noisy----b-"
+
+
+@dataclass
+class Report:
+    """Where the report is, and its records and EXR channels by scene."""
+
+    url: str
+    records: dict = field(default_factory=dict)
+    channels: dict = field(default_factory=dict)
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    found = Report((folder / "index.html").as_uri())
+    views = []
+    for name, comparison in ((NOISY, noisy()), (EXACT, exact())):
+        place = output.folder_name(name, ())
+        views.append(output.write_scene(folder, place, comparison))
+        found.records[name] = comparison.data
+        with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
+            found.channels[name] = {key: c.pixels.copy() for key, c in file.channels().items()}
+    data = found.records[NOISY]
+    spec = histograms.spec(
+        "dE2000", data["histograms"]["dE2000"], data["metrics"]["dE2000"], WIDTH * HEIGHT
+    )
+    views[0]["charts"] = [vega.figure("Error against time", spec, "A chart of another kind.")]
+    output.write_page(folder, views, failures=[(FAILED, "lost.xml: there is no such file")])
+    return found
+
+
+def noisy():
+    """A bright spot against noise: HDR values over many decades, some negative."""
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    spot = 40.0 * np.exp(-((x - 30) ** 2 + (y - 12) ** 2) / 30.0)
+    reference = (0.05 + spot)[..., None] * rng.uniform(0.5, 1.5, (HEIGHT, WIDTH, 3))
+    heuristic = reference * rng.uniform(0.3, 2.0, (HEIGHT, WIDTH, 3))
+    heuristic[3, 4] = (-0.0123, 0.0, 1e-5)
+    maps = {
+        "dE2000": np.minimum(2 * spot, 90) + rng.random((HEIGHT, WIDTH)),
+        "dE_ITP": 5 * spot,
+        "dE_CAM16UCS": spot,
+    }
+    return comparison(NOISY, heuristic, reference, maps, rng.random((HEIGHT, WIDTH)) > 0.3)
+
+
+def exact():
+    """Two equal halves; nothing is significant."""
+    half = np.full((HEIGHT, WIDTH, 3), 0.25)
+    maps = dict.fromkeys(METRICS, np.zeros((HEIGHT, WIDTH)))
+    found = comparison(EXACT, half, half, maps, np.zeros((HEIGHT, WIDTH), bool))
+    for name in METRICS:
+        found.data["metrics"][name] = records.metric(0.0)
+    found.data["metrics"]["significant"]["fraction"] = 0.0
+    found.data["warnings"] = found.data["unrepresentable"] = []
+    return found
+
+
+def comparison(name, heuristic, reference, maps, significant):
+    counted = np.ones((HEIGHT, WIDTH), bool)
+    counted[0] = False
+    data = records.record() | {
+        "scene": name,
+        "resolution": [WIDTH, HEIGHT],
+        "pixels": {"counted": int(counted.sum()), "total": counted.size},
+        "regions": [region.data() for region in regions.find(maps["dE2000"], counted)],
+        "histograms": {key: histogram(maps[key][counted]).data() for key in METRICS},
+    }
+    for region in data["regions"][:1]:
+        region["effect"] = "interreflection"
+    images = Images(
+        heuristic=heuristic.astype(np.float32),
+        reference=reference.astype(np.float32),
+        reference_stderr=0.01 * np.abs(reference),
+        position=np.zeros((HEIGHT, WIDTH, 3)),
+        normal=np.zeros((HEIGHT, WIDTH, 3)),
+        maps=maps | {"log2_luminance": log2_luminance_ratio(heuristic, reference)},
+        significant=significant,
+        counted=counted,
+    )
+    return Comparison(data, images)
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        pytest.skip("there is no Chromium: apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+class Visitor:
+    """A page of the browser, and what it said and asked for meanwhile."""
+
+    def __init__(self, page, report):
+        self.page = page
+        self.report = report
+        self.complaints, self.requests = [], []
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def open(self, fragment=""):
+        """Open the report, and wait until the scene that the fragment names is drawn."""
+        if self.page.url.startswith(self.report.url):
+            self.page.evaluate("fragment => { location.hash = fragment; }", fragment)
+        else:
+            self.page.goto(self.report.url + fragment)
+        if "scene=" in fragment:
+            self.wait_for_viewer(fragment.split("scene=")[1].split("&")[0])
+        return self.page
+
+    def wait_for_viewer(self, scene=NOISY_ID):
+        self.page.wait_for_function(
+            "scene => document.querySelector('#viewer').dataset.ready === scene", arg=scene
+        )
+        self.settle()
+
+    def settle(self):
+        """Wait for two frames: drawing is asked for in one and done in the next."""
+        self.page.evaluate(
+            "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
+        )
+
+    def state(self):
+        """The fragment's parts by name."""
+        text = self.page.evaluate("location.hash.slice(1)")
+        return dict(part.split("=") for part in text.split("&") if part)
+
+    def canvas(self):
+        return self.page.locator("#viewer canvas")
+
+    def place_of(self, x, y, zoom=None, centre=(WIDTH / 2, HEIGHT / 2)):
+        """Where on the canvas the middle of a pixel is, in CSS pixels."""
+        box = self.canvas().bounding_box()
+        zoom = zoom or min(box["width"] / WIDTH, box["height"] / HEIGHT)
+        return (
+            box["width"] / 2 + (x + 0.5 - centre[0]) * zoom,
+            box["height"] / 2 + (y + 0.5 - centre[1]) * zoom,
+        )
+
+    def colour_at(self, left, top):
+        """The canvas's colour at a place in CSS pixels (the tests' screens have density 1)."""
+        return tuple(
+            self.page.evaluate(
+                """([x, y]) => {
+                  const copy = document.createElement("canvas");
+                  copy.width = copy.height = 1;
+                  const context = copy.getContext("2d", { willReadFrequently: true });
+                  context.drawImage(document.querySelector("#viewer canvas"), -x, -y);
+                  return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+                }""",
+                [int(left), int(top)],
+            )
+        )
+
+    def colour_of(self, x, y, **view):
+        self.settle()
+        return self.colour_at(*self.place_of(x, y, **view))
+
+    def inspected(self):
+        """The inspector's texts by name."""
+        cells = self.page.locator("#inspector [data-value]").all()
+        return {cell.get_attribute("data-value"): cell.text_content() for cell in cells}
+
+
+@pytest.fixture
+def visitor(chromium, report, request):
+    """A visitor on a screen of ordinary size; at the end, nothing must have gone wrong."""
+    settings = {"viewport": {"width": 1200, "height": 900}} | getattr(request, "param", {})
+    context = chromium.new_context(**settings)
+    visitor = Visitor(context.new_page(), report)
+    yield visitor
+    context.close()
+    assert visitor.complaints == []
+    folder = report.url.rsplit("/", 1)[0]
+    for url in visitor.requests:
+        assert url.startswith((folder, "data:", "about:")), url
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.browser)

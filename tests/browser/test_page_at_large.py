@@ -1,0 +1,106 @@
+"""What holds for the whole page: offline, without scripts, narrow, on paper, for everybody."""
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from tests.browser.conftest import NOISY_ID
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+VIEWS = ["", "#list=table", f"#scene={NOISY_ID}", f"#scene={NOISY_ID}&mode=side&tone=false"]
+
+
+def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
+    page = visitor.open()
+    assert page.url.startswith("file:")
+    page.get_by_role("link", name="exact").first.click()
+    visitor.wait_for_viewer("exact")
+    page.wait_for_function("() => document.querySelector('.scene.open .chart.vega-embed svg')")
+    assert [url for url in visitor.requests if not url.startswith(("data:", "about:"))] == [
+        visitor.report.url
+    ]
+
+
+def test_the_policy_stops_what_is_not_the_pages_own(visitor):
+    page = visitor.open()
+    page.evaluate("""() => {
+      const script = document.createElement("script");
+      script.textContent = "window.injected = true";
+      document.body.append(script);
+      const image = document.createElement("img");
+      image.src = "http://localhost:1/picture.png";
+      document.body.append(image);
+    }""")
+    assert page.evaluate("window.injected") is None
+    stopped = [text for text in visitor.complaints if "Content Security Policy" in text]
+    assert len(stopped) == 2
+    visitor.complaints.clear()
+    visitor.requests.remove("http://localhost:1/picture.png")
+
+
+def violations(page):
+    """What axe objects to: rules, and where."""
+    found = Axe().run(page).response["violations"]
+    return [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in found]
+
+
+@pytest.mark.parametrize(
+    "visitor", [{"color_scheme": scheme} for scheme in ("light", "dark")], indirect=True
+)
+def test_axe_finds_no_violation(visitor):
+    for fragment in VIEWS:
+        page = visitor.open(fragment)
+        if "scene=" in fragment:
+            page.wait_for_function(
+                "() => document.querySelector('.scene.open .chart.vega-embed svg')"
+            )
+        assert not violations(page), fragment
+
+
+def test_axe_finds_no_violation_in_the_help(visitor):
+    page = visitor.open(f"#scene={NOISY_ID}")
+    page.keyboard.press("?")
+    assert not violations(page)
+
+
+@pytest.mark.parametrize(
+    "visitor", [PHONE, {"viewport": {"width": 320, "height": 640}}], indirect=True
+)
+def test_a_narrow_screen_scrolls_in_one_direction_only(visitor):
+    for fragment in VIEWS:
+        page = visitor.open(fragment)
+        page.wait_for_timeout(100)
+        width = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert width <= 0, fragment
+
+
+@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
+def test_side_by_side_is_stacked_on_a_phone(visitor):
+    visitor.open(f"#scene={NOISY_ID}")
+    single = visitor.canvas().bounding_box()
+    visitor.page.get_by_role("button", name="Side by side").tap()
+    visitor.settle()
+    stacked = visitor.canvas().bounding_box()
+    assert stacked["width"] == single["width"]
+    assert stacked["height"] == pytest.approx(3 * single["height"] + 8, abs=2)
+
+
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
+def test_without_scripts_all_scenes_have_pictures_numbers_and_charts(visitor):
+    page = visitor.page
+    page.goto(visitor.report.url)
+    assert page.locator(".scene:visible").count() == 2
+    assert page.locator(".scene .pictures img:visible").count() == 14
+    assert page.locator(".scene .chart svg:visible").count() == 7
+    assert page.locator(".overview:visible").count() == 1
+    assert page.locator(".controls:visible").count() == 0
+
+
+def test_paper_gets_the_static_pictures(visitor):
+    page = visitor.open(f"#scene={NOISY_ID}")
+    page.emulate_media(media="print")
+    assert not page.locator("#viewer").is_visible()
+    assert page.locator(".scene:visible").count() == 1
+    assert page.locator(".scene .pictures img:visible").count() == 7
+    visitor.open()
+    assert page.locator(".scene:visible").count() == 2
+    assert page.locator(".overview").is_visible()

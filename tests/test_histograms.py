@@ -1,0 +1,64 @@
+"""Histograms: every pixel is counted once, and equal areas are equal shares."""
+
+import numpy as np
+import pytest
+
+from comparisons.histograms import BINS_A_DECADE, DECADES, histogram
+from reports import histograms
+from tests import records
+
+
+def test_every_value_is_counted_once_in_its_bin():
+    values = np.concatenate([10.0 ** np.random.default_rng(0).uniform(-4, 4, 5000), np.zeros(10)])
+    found = histogram(values)
+    assert found.below + found.above + sum(found.counts) == values.size
+    assert (found.below, found.above) == ((values < 0.01).sum(), (values >= 1000).sum())
+    ratio = (found.high / found.low) ** (1 / len(found.counts))
+    for place in (0, 17, 59):
+        low = found.low * ratio**place
+        assert found.counts[place] == ((values >= low) & (values < low * ratio)).sum()
+
+
+def test_an_edge_belongs_to_the_bin_above_it():
+    found = histogram([0.01, 1.0, 1000.0])
+    one = -DECADES[0] * BINS_A_DECADE
+    assert [place for place, count in enumerate(found.counts) if count] == [0, one]
+    assert (found.below, found.above) == (0, 1)
+
+
+def test_areas_under_the_chart_are_shares_of_pixels():
+    values = 10.0 ** np.random.default_rng(0).uniform(-3, 2, 3000)
+    data = histogram(values).data()
+    spec = histograms.spec("dE2000", data, records.metric(3.0), values.size)
+    rows = spec["layer"][0]["data"]["values"]
+    places = np.log10([row["value"] for row in rows])
+    area = sum(np.diff(places) * [row["density"] for row in rows[:-1]])
+    assert area == pytest.approx((values >= 0.01).mean())
+    assert rows[-1]["density"] == 0.0
+
+
+def test_mean_percentile_and_noise_floor_are_marked_where_they_are():
+    data = histogram([1.0, 2.0]).data()
+    spec = histograms.spec("dE2000", data, records.metric(3.0), 2)
+    labels = {
+        row["label"]: row["value"] for layer in spec["layer"][1:] for row in layer["data"]["values"]
+    }
+    expected = {"mean 3.00": 3.0, "95 % 6.30": 6.3, "noise floor 0.0369": 0.0369}
+    assert labels == pytest.approx(expected)
+    silent = histograms.spec("dE2000", data, records.metric(0.0), 2)
+    assert len(silent["layer"]) == 1
+
+
+def test_what_is_not_shown_is_said():
+    data = histogram([0.0, 0.0, 1.0, 2000.0]).data()
+    assert histograms.note(data, 4) == (
+        "Not shown: 50.0 % of the pixels under 0.01, 25.0 % of the pixels at least 1000."
+    )
+    assert histograms.note(histogram([1.0]).data(), 1) == ""
+
+
+def test_a_record_without_counted_pixels_has_no_chart():
+    record = records.record()
+    assert [figure.title for figure in histograms.figures(record)] == ["ΔE2000"]
+    record["pixels"]["counted"] = 0
+    assert histograms.figures(record) == []

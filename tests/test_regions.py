@@ -1,0 +1,95 @@
+"""Regions on maps whose answer is known."""
+
+import numpy as np
+import pytest
+
+from comparisons import regions
+
+ALL = np.ones((96, 96), bool)
+
+
+def blank():
+    return np.full((96, 96), 0.01)
+
+
+def test_one_box_of_error_is_found_exactly():
+    error = blank()
+    error[20:40, 50:62] = 8.0
+    (found,) = regions.find(error, ALL)
+    assert (found.x, found.y, found.width, found.height) == (50, 20, 12, 20)
+    assert found.share == pytest.approx(error[20:40, 50:62].sum() / error.sum())
+    assert found.mean_dE2000 == pytest.approx(8.0)
+
+
+def test_several_boxes_come_by_their_worth_and_do_not_overlap():
+    error = blank()
+    error[4:20, 4:20] = 3.0
+    error[60:90, 10:50] = 5.0
+    error[30:34, 80:96] = 20.0
+    found = regions.find(error, ALL)
+    corners = [(r.x, r.y, r.width, r.height) for r in found]
+    assert corners == [(10, 60, 40, 30), (80, 30, 16, 4), (4, 4, 16, 16)]
+    marked = np.zeros((96, 96), int)
+    for region in found:
+        marked[region.y : region.y + region.height, region.x : region.x + region.width] += 1
+    assert marked.max() == 1
+    assert sum(region.share for region in found) <= 1.0
+
+
+def test_boxes_in_random_maps_never_overlap_and_shares_are_what_they_hold():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        error = rng.exponential(1.0, (50, 70)) ** 3
+        counted = rng.random((50, 70)) > 0.3
+        marked = np.zeros((50, 70), int)
+        for r in regions.find(error, counted):
+            box = slice(r.y, r.y + r.height), slice(r.x, r.x + r.width)
+            marked[box] += 1
+            held = error[box][counted[box]]
+            assert r.share == pytest.approx(held.sum() / error[counted].sum())
+            assert r.mean_dE2000 == pytest.approx(held.mean())
+        assert marked.max() <= 1
+
+
+def test_the_best_box_is_the_best_of_all_boxes():
+    worth = np.random.default_rng(3).normal(size=(6, 7))
+    rows, columns, value = regions._best_box(worth)
+    sums = [
+        worth[a:b, c:d].sum()
+        for a in range(6)
+        for b in range(a + 1, 7)
+        for c in range(7)
+        for d in range(c + 1, 8)
+    ]
+    assert value == pytest.approx(max(sums))
+    assert worth[rows, columns].sum() == pytest.approx(value)
+
+
+@pytest.mark.parametrize("error", [np.zeros((96, 96)), np.ones((96, 96))], ids=["none", "even"])
+def test_error_that_stands_out_nowhere_has_no_region(error):
+    assert regions.find(error, ALL) == ()
+
+
+def test_pixels_that_do_not_count_are_not_looked_at():
+    error = blank()
+    error[10:30, 10:30] = 5.0
+    error[50:90, 50:90] = 100.0
+    counted = ALL.copy()
+    counted[48:, 48:] = False
+    (found,) = regions.find(error, counted)
+    assert (found.x, found.y) == (10, 10)
+    assert regions.find(error, np.zeros_like(counted)) == ()
+
+
+def test_a_box_is_drawn_in_to_the_counted_pixels():
+    error, counted = np.zeros((480, 480)), np.ones((480, 480), bool)
+    error[103:148, 207:251] = 5.0
+    counted[:, :207] = counted[:103] = False
+    (found,) = regions.find(error, counted)
+    assert (found.x, found.y) == (207, 103)
+
+
+def test_an_unknown_effect_is_left_out_of_the_record():
+    region = regions.Region(1, 2, 3, 4, 0.5, 6.0)
+    assert "effect" not in region.data()
+    assert regions.Region(1, 2, 3, 4, 0.5, 6.0, "occlusion").data()["effect"] == "occlusion"
