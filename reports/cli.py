@@ -10,7 +10,7 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import compare, doctor, plan, report, scenes
+from reports.commands import check, compare, doctor, plan, report, scenes
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -20,6 +20,7 @@ def cli():
 
 
 for command in (
+    check.check,
     compare.compare,
     plan.plan,
     report.report,
@@ -32,7 +33,7 @@ for command in (
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        cli(prog_name="fotismos", standalone_mode=False)
+        code = cli(prog_name="fotismos", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("fotismos: interrupted; finished scenes are kept.", err=True)
         sys.exit(130)
@@ -42,3 +43,6 @@ def main():
     except FotismosError as error:
         click.echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
+    else:
+        if code:  # what a command left with, which is None where it said nothing
+            sys.exit(code)
