@@ -1,7 +1,9 @@
 """Replacing the shapes of a scene by triangle meshes, for flat and Gouraud shading."""
 
+import shutil
+import weakref
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 import mitsuba as mi
 
@@ -10,6 +12,17 @@ from heuristic.interpolation import Interpolation
 from reference.scene import Reference, properties
 
 SHAPE = mi.ObjectType.Shape
+
+
+class _Folder:
+    """A temporary folder that goes when nothing refers to it any more.
+
+    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
+    """
+
+    def __init__(self):
+        self.name = mkdtemp(prefix="fotismos-")
+        weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
 
 
 def replace_shapes(graph, scene, resolution, interpolation):
@@ -32,7 +45,7 @@ def replace_shapes(graph, scene, resolution, interpolation):
     InputError
         Naming a shape that cannot be made into triangles.
     """
-    folder = TemporaryDirectory(prefix="fotismos-")
+    folder = _Folder()
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(SHAPE):
         given = graph.props(index)

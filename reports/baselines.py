@@ -56,8 +56,8 @@ def default_rendering():
 
 def recorded(chosen):
     """Return the options of a job as a baseline keeps them: plain, without those at rest."""
-    kept = {key: value for key, value in chosen.items() if value not in (None, False)}
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in kept.items()}
+    plain = {k: list(v) if isinstance(v, tuple) else v for k, v in chosen.items()}
+    return {k: v for k, v in plain.items() if v is not None and v is not False}
 
 
 def find(path):
