@@ -52,35 +52,36 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     ::
 
         t = (x₂ − x₁) / √(e₁² + e₂²)
-        ν = (e₁² + e₂²)² / (e₁⁴ / (n₁ − 1) + e₂⁴ / (n₂ − 1))
+        ν = (n − 1) (e₁² + e₂²)² / (e₁⁴ + e₂⁴)
 
-    with standard errors e over n passes (Welch 1947; Satterthwaite 1946). A difference within
-    rounding has p = 1; a larger one where neither side has any spread, p = 0. Šidák's correction
-    takes the quantities as independent: they are not quite, which makes alarms rarer.
+    with standard errors e over n passes on either side (Welch 1947; Satterthwaite 1946). A
+    difference within rounding has p = 1; a larger one where neither side has any spread, p = 0.
+    Šidák's correction takes the quantities as independent: they are not quite, which makes alarms
+    rarer.
 
     Raises
     ------
     ValueError
-        For measurements of other quantities.
+        For measurements of other quantities, or of more passes on one side: Welch's test is then
+        not right in the far tails, which a correction for many tests needs.
     """
     from scipy.special import stdtr
 
     pairs = list(zip(before.quantities(), after.quantities(), strict=True))
-    if any(old.name != new.name for old, new in pairs):
-        raise ValueError("the measurements hold other quantities, and cannot be compared")
+    if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
+        raise ValueError("measurements of other passes or quantities cannot be compared")
     x = np.array([[old.value, new.value] for old, new in pairs])
     variance = np.array([[old.error**2, new.error**2] for old, new in pairs])
-    freedom = np.array([before.passes - 1, after.passes - 1])
     difference, total = x[:, 1] - x[:, 0], variance.sum(axis=1)
-    spread = total > 0.0
+    rounding = np.array([old.rounding for old, _ in pairs])
+    rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
+    spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
     safe = np.where(spread, total, 1.0)
     t = difference / np.sqrt(safe)
     # With shares of the total, because fourth powers of small errors would underflow.
     shares = np.where(spread[:, None], variance / safe[:, None], 0.5)
-    nu = 1.0 / (shares**2 / freedom).sum(axis=1)
+    nu = (before.passes - 1) / (shares**2).sum(axis=1)
     p = np.where(spread, 2.0 * stdtr(nu, -np.abs(t)), 0.0)
-    rounding = np.array([old.rounding for old, _ in pairs])
-    rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
     p = np.where(np.abs(difference) <= rounding, 1.0, p)
     corrected = sidak(p, len(pairs))
     return tuple(
