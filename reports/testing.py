@@ -101,8 +101,9 @@ class Fotismos:
         Parameters
         ----------
         scene
-            A built-in name, the path of a Mitsuba file, a dictionary as ``mitsuba.load_dict`` takes
-            it, or a function that returns one.
+            A built-in name, the path of a Mitsuba file, from the test's own folder or else from the
+            current one, a dictionary as ``mitsuba.load_dict`` takes it, or a function that returns
+            one.
         metric
             ``dE2000``, ``dE_ITP``, ``dE_CAM16UCS``, ``rmse`` or ``log2_luminance``.
         options
@@ -113,7 +114,7 @@ class Fotismos:
         -------
         Departure
         """
-        source, chosen = self._job(scene, options, "scene")
+        source, chosen = self._job(self._found(scene), options, "scene")
         set_variant(chosen["variant"])
         if chosen["resolution"] is None:
             chosen |= {"resolution": checking.small_resolution(source)}
@@ -150,6 +151,7 @@ class Fotismos:
         AssertionError
             With the table of what moved, or for a baseline that is missing.
         """
+        scene = self._found(scene)
         given = options | ({"variant": self.variant} if self.variant else {})
         path = self._path(scene, name)
         if not path.exists():
@@ -174,6 +176,13 @@ class Fotismos:
         else:
             _require_passed(checks.examine(file, job, significance, self.pictures() / path.stem))
         return True
+
+    def _found(self, scene):
+        """Return a scene; a path from the test's own folder, where there is such a file."""
+        if _in_python(scene):
+            return scene
+        place = self.folder.parent / scene
+        return place if place.is_file() else scene
 
     def _path(self, scene, name):
         if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
