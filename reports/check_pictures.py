@@ -17,6 +17,9 @@ LONGEST = 640
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
 
+NAMES = tuple(half + kind for half in HALVES for kind in ("", "-change", "-p", "-error"))
+"""Names of all pictures that a failure can have."""
+
 LEAST_P = 1e-6
 """The p-value at which the map's colours end."""
 

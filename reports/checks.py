@@ -1,7 +1,6 @@
 """Checking scenes against baselines, and writing baselines and the pictures of what failed."""
 
 import json
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -94,7 +93,7 @@ def examine(file, job, level=LEVEL, folder=None, progress=None):
         versions=check_record.other_versions(file.baseline),
     )
     if folder is not None:
-        shutil.rmtree(folder, ignore_errors=True)
+        _clear(folder)
     result = replace(result, seconds=perf_counter() - begin)
     if result.folder is not None:
         _write_failure(file, result)
@@ -166,10 +165,18 @@ def _small(pictures):
     return check_pictures.reduced(pictures)
 
 
+def _clear(folder):
+    """Delete the files of an earlier failure, and the folder unless it holds others."""
+    for name in ("check.json", *(f"{name}.png" for name in check_pictures.NAMES)):
+        (folder / name).unlink(missing_ok=True)
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
 def _write_failure(file, result):
-    """Write pictures, the record, and the baseline as it would be."""
+    """Write pictures and the record."""
     folder = result.folder
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     for name, png in check_pictures.pictures(result.check, file.pictures()).items():
         (folder / f"{name}.png").write_bytes(png)
     data = json.dumps(check_record.data(result), indent=2, ensure_ascii=False, allow_nan=False)

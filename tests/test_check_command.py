@@ -121,6 +121,7 @@ def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):  # no
         (("nix.json", "--update"), "--scene"),
         (("nix.json", "--update", "--scene", "fig-0"), "'fig-0' is neither"),
         (("nix.json", "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b"), "one --scene"),
+        (("new", "--update", "--scene", "a/x.xml", "--scene", "b/x.xml"), "one name"),
         (("nix.json", "--spp", "4"), "--spp.*--update"),
         (("nix.json", "--scene", "fig-8-6b"), "--scene.*--update"),
         (("nix.json", "--significance", "0"), "range"),
@@ -133,6 +134,18 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):  # 
     assert code == 2
     assert re.search(expected, messages)
     assert "Traceback" not in messages
+
+
+def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):  # noqa: F811
+    own = tmp_path / "out/fig-8-6b/mine.txt"
+    own.parent.mkdir(parents=True)
+    own.write_text("mine")
+    change(folder / "fig-8-6b.json")
+    assert run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out")[0] == 1
+    assert (own.parent / "check.json").is_file()
+    change(folder / "fig-8-6b.json", factor=1 / 1.5)
+    assert run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out")[0] == 0
+    assert [path.name for path in own.parent.iterdir()] == ["mine.txt"]
 
 
 # --- Updating --------------------------------------------------------------------------------
@@ -170,6 +183,16 @@ def test_other_options_write_a_baseline_anew(run, folder):  # noqa: F811
     assert code == 0
     assert (options["pairing"], options["seed"]) == ("literal", 4)
     assert (options["spp"], options["resolution"]) == (32, [16, 12])
+
+
+def test_a_broken_baseline_is_written_anew_once_its_scene_is_named(run, folder):  # noqa: F811
+    path = folder / "fig-8-6a.json"
+    path.write_text("{", encoding="utf-8")
+    code, _, messages = run("check", path, "--update")
+    assert code == 2
+    assert "--update --scene" in messages
+    assert run("check", path, "--update", "--scene", "fig-8-6a", *FAST)[0] == 0
+    assert run("check", path, "-o", folder / "out")[0] == 0
 
 
 def test_a_baseline_follows_its_schema(folder):

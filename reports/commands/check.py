@@ -135,22 +135,35 @@ def _update_one(path, scene, images, significance, given, bar):
     from reports import baselines, checks
 
     def run():
-        options, named = dict(given), scene
-        if path.exists():
-            file = baselines.read(path)
-            same = named is None or baselines.scene_for(named, path) == file.baseline.scene
-            if same:
+        file, options, named, pictures = _readable(path, scene), dict(given), scene, images
+        if file is not None:
+            pictures = images or bool(file.baseline.images)
+            if scene is None or baselines.scene_for(scene, path) == file.baseline.scene:
                 named = baselines.scene_from(file.baseline.scene, path)
                 options = dict(file.baseline.options) | options
-            if same and baselines.recorded(options) == file.baseline.options:
-                return checks.update(file, file.job(), significance, images, bar.of(path.stem))
+                if baselines.recorded(options) == file.baseline.options:
+                    return checks.update(file, file.job(), significance, images, bar.of(path.stem))
         if options.get("resolution") is not None:
             options["resolution"] = tuple(options["resolution"])
         job = jobs.job(named, baselines.default_rendering() | options)
         scene_name = baselines.scene_for(named, path)
-        return checks.create(path, scene_name, job, images, bar.of(path.stem))
+        return checks.create(path, scene_name, job, pictures, bar.of(path.stem))
 
     return checks.guarded(path, run)
+
+
+def _readable(path, scene):
+    """Read a baseline; one that is missing, or broken where its scene is given, is none."""
+    from reports import baselines
+
+    if not path.exists():
+        return None
+    try:
+        return baselines.read(path)
+    except InputError:
+        if scene is None:
+            raise
+        return None
 
 
 def _targets(path, scenes):
@@ -167,9 +180,15 @@ def _targets(path, scenes):
             scenes = (path.stem,)
         return [(path, scenes[0] if scenes else None)]
     if scenes:
-        return [(path / f"{Path(scene).stem if scene.endswith('.xml') else scene}.json", scene)
-                for scene in scenes]  # fmt: skip
+        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
+        if len(named) < len(scenes):
+            raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
+        return list(named.items())
     return [(one, None) for one in baselines.find(path)]
+
+
+def _stem(scene):
+    return Path(scene).stem if Path(scene).suffix == ".xml" else scene
 
 
 def _folder(path):
