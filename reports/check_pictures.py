@@ -20,6 +20,9 @@ LONGEST_KEPT = 128
 NAMES = tuple(half + kind for half in HALVES for kind in ("", "-change", "-p", "-error"))
 """Names of all pictures that a failure can have."""
 
+LARGEST_ERROR = 2.0
+"""ΔE2000 at which the error maps' colours end: what moved is often hardly noticeable."""
+
 LEAST_P = 1e-6
 """The p-value at which the map's colours end."""
 
@@ -40,9 +43,7 @@ def pictures(check, before=None):
         if before is not None:
             size = before[half].shape[:2]
             distance = METRICS["dE2000"](_reduced_to(now, size), before[half])
-            made[f"{half}-error"] = _enlarged(
-                images.error_map(distance, METRICS["dE2000"].map_range[1])
-            )
+            made[f"{half}-error"] = _enlarged(images.error_map(distance, LARGEST_ERROR))
     return {name: images.png(picture) for name, picture in made.items()}
 
 
