@@ -118,7 +118,7 @@ def check_alarms(make, resolution, count, levels):
 
 
 def test_an_unchanged_scene_alarms_no_more_than_stated(rgb):
-    check_alarms(SCENES["plastic-spheres"].make, (16, 16), 15, (0.05,))
+    check_alarms(SCENES["plastic-spheres"].make, (16, 16), 10, (0.05,))
 
 
 @pytest.mark.slow

@@ -120,8 +120,8 @@ def standard_deviations(before, after):
     "broken", [one_sided, normal_not_t, uncorrected, standard_deviations], ids=lambda f: f.__name__
 )
 def test_a_broken_statistic_leaves_the_bounds(broken):
-    least, most = bounds(1000, 0.2 * 102 / 107)
-    assert not least <= alarms(normal, 1000, 0.2, broken) <= most
+    least, most = bounds(400, 0.2 * 102 / 107)
+    assert not least <= alarms(normal, 400, 0.2, broken) <= most
 
 
 def test_shared_significance_is_that_of_all_checks():
