@@ -14,6 +14,17 @@ from reference.scene import Reference, properties
 SHAPE = mi.ObjectType.Shape
 
 
+class _Folder:
+    """A temporary folder that goes when nothing refers to it any more.
+
+    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
+    """
+
+    def __init__(self):
+        self.name = mkdtemp(prefix="fotismos-")
+        weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
+
+
 def replace_shapes(graph, scene, resolution, interpolation):
     """Replace every shape of a graph by a mesh of the same place, name, material and light.
 

@@ -10,7 +10,7 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import compare, cost, doctor, fit, plan, report, scenes
+from reports.commands import check, compare, cost, doctor, fit, plan, report, scenes
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -24,6 +24,7 @@ for command in (
     plan.plan,
     cost.cost,
     fit.fit,
+    check.check,
     report.report,
     scenes.scenes,
     doctor.doctor,
@@ -34,7 +35,7 @@ for command in (
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        cli(prog_name="fotismos", standalone_mode=False)
+        code = cli(prog_name="fotismos", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("fotismos: interrupted; finished scenes are kept.", err=True)
         sys.exit(130)
@@ -44,3 +45,6 @@ def main():
     except FotismosError as error:
         click.echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
+    else:
+        if code:  # what a command left with, which is None where it said nothing
+            sys.exit(code)

@@ -1,6 +1,7 @@
 """What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
 
 import gc
+from importlib.metadata import entry_points
 
 import heuristic  # noqa: F401  isort: skip
 
@@ -10,6 +11,10 @@ import pytest
 
 from heuristic import plugins
 from reference import direct
+
+# An installed fotismos brings its pytest plugin along; from a checkout it is named here.
+if "fotismos" not in entry_points(group="pytest11").names:
+    pytest_plugins = ["reports.pytest_plugin"]
 
 
 @pytest.fixture

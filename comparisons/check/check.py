@@ -1,0 +1,147 @@
+"""Checking one scene against its baseline."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mitsuba as mi
+import numpy as np
+
+from comparisons import record
+from comparisons.check.baseline import Baseline
+from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
+from comparisons.check.moved import LEVEL, Move, differences, moved
+from comparisons.compare import prepare
+from heuristic.errors import InputError
+from reference.scene import properties
+
+LONGEST = 64
+"""Pixels of the longer side that a scene is measured at, where nothing else is asked for."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A scene held against its baseline.
+
+    Attributes
+    ----------
+    before, after
+        What was measured then, and now with the same options.
+    moves
+        Every quantity tested.
+    moved
+        Those that moved by more than chance and rounding allow.
+    level
+        Chance of an alarm though nothing changed.
+    pictures
+        Both halves as they are now.
+    """
+
+    before: Measurement
+    after: Measurement
+    moves: tuple[Move, ...]
+    moved: tuple[Move, ...]
+    level: float
+    pictures: Pictures
+
+    @property
+    def passed(self):
+        """Whether nothing moved."""
+        return not self.moved
+
+    def change(self, half):
+        """Return the change of a half's blocks, (rows, columns, 3) linear RGB."""
+        return self.after.colours[half].blocks - self.before.colours[half].blocks
+
+    def p_values(self, half):
+        """Return the least p-value of each block of a half, corrected for all that was tested."""
+        values = np.ones(self.after.colours[half].blocks.shape[:2])
+        for move in self.moves:
+            if move.before.half == half and move.before.block:
+                block = move.before.block
+                values[block] = min(values[block], move.corrected)
+        return values
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A scene as it was just measured: with the samples taken, and the pictures."""
+
+    measurement: Measurement
+    pictures: Pictures
+    spp: int
+
+
+def measure_scene(source, options, passes=PASSES, progress: Callable | None = None):
+    """Measure a scene in the current variant.
+
+    Parameters
+    ----------
+    source : reference.scene.Source
+        The scene.
+    options : comparisons.options.Options
+        What is rendered; ``spp`` is over all passes, and the plan's where it is not given.
+    passes
+        Independent passes.
+    progress
+        As of :func:`comparisons.compare.compare`.
+
+    Returns
+    -------
+    Measured
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    ready = prepare(source, options)
+    spp = options.spp or ready.reference.spp * ready.passes
+    for half in (ready.heuristic, ready.reference):
+        half.spp = max(1, spp // passes)
+    found, pictures = measure(ready, options.seed, passes, options.viewing, progress)
+    return Measured(found, pictures, spp)
+
+
+def check(source, options, before, level=LEVEL, progress=None):
+    """Measure a scene as it was measured before, and say what moved.
+
+    Parameters
+    ----------
+    source, options, progress
+        As of :func:`measure_scene`; ``options`` are those of the baseline. With its seed, what did
+        not change gives the same images on the same machine; with another one the test holds, too.
+    before : Measurement
+        The baseline's.
+    level
+        Chance of an alarm though nothing changed, over all quantities of this scene.
+
+    Returns
+    -------
+    Check
+    """
+    now = measure_scene(source, options, before.passes, progress)
+    shapes = [m.colours["reference"].blocks.shape for m in (before, now.measurement)]
+    if shapes[0] != shapes[1]:
+        raise InputError(
+            f"{source.name}: the baseline has {shapes[0][0]} by {shapes[0][1]} blocks, and the"
+            f" scene {shapes[1][0]} by {shapes[1][1]}. Write it anew with --update."
+        )
+    moves = differences(before, now.measurement)
+    return Check(before, now.measurement, moves, tuple(moved(moves, level)), level, now.pictures)
+
+
+def new_baseline(scene, options, measured, images=None):
+    """Return the baseline of a scene just measured, with the versions of this moment."""
+    return Baseline(scene, options, record.versions(), measured, images)
+
+
+def small_resolution(source):
+    """Return the film's ``(width, height)`` reduced to `LONGEST`, its proportions kept."""
+    graph = source.parse()
+    films = graph.nodes(mi.ObjectType.Film)
+    props = graph.props(films[0]) if films else properties("hdrfilm")
+    sides = [int(props.get(key, default)) for key, default in (("width", 768), ("height", 576))]
+    scale = min(1.0, LONGEST / max(sides))
+    return tuple(max(1, round(side * scale)) for side in sides)

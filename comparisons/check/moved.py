@@ -1,0 +1,122 @@
+"""Which measured numbers moved by more than both sides' doubt: Welch's t-test, many at a time.
+
+Before and after are independent measurements, or share random numbers where they have one seed;
+the second only makes the difference of unchanged things smaller than the test allows for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons.check.measurement import Measurement, Quantity
+
+LEVEL = 0.01
+"""Chance of an alarm though nothing changed, over all that one check tests."""
+
+RELATIVE_ROUNDING = 1e-5
+"""Share of a value that rounding can change: other machines order float32 sums otherwise."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """One quantity, before and after.
+
+    Attributes
+    ----------
+    before, after
+        What was measured then and now.
+    error
+        Standard error of the difference, of both sides.
+    standard_errors
+        The difference over that error, signed; None where neither side has any spread.
+    p
+        Chance of a difference as large as this one, or larger, though nothing changed.
+    corrected
+        Chance of one such among all quantities tested (Šidák).
+    """
+
+    before: Quantity
+    after: Quantity
+    error: float
+    standard_errors: float | None
+    p: float
+    corrected: float
+
+
+def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
+    """Compare all quantities of two measurements of the same kind.
+
+    ::
+
+        t = (x₂ − x₁) / √(e₁² + e₂²)
+        ν = (n − 1) (e₁² + e₂²)² / (e₁⁴ + e₂⁴)
+
+    with standard errors e over n passes on either side (Welch 1947; Satterthwaite 1946). A
+    difference within rounding has p = 1; a larger one where neither side has any spread, p = 0.
+    Šidák's correction takes the quantities as independent: they are not quite, which makes alarms
+    rarer.
+
+    Raises
+    ------
+    ValueError
+        For measurements of other quantities, or of more passes on one side: Welch's test is then
+        not right in the far tails, which a correction for many tests needs.
+    """
+    from scipy.special import stdtr
+
+    pairs = list(zip(before.quantities(), after.quantities(), strict=True))
+    if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
+        raise ValueError("measurements of other passes or quantities cannot be compared")
+    x = np.array([[old.value, new.value] for old, new in pairs])
+    variance = np.array([[old.error**2, new.error**2] for old, new in pairs])
+    difference, total = x[:, 1] - x[:, 0], variance.sum(axis=1)
+    rounding = np.array([old.rounding for old, _ in pairs])
+    rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
+    spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
+    safe = np.where(spread, total, 1.0)
+    t = difference / np.sqrt(safe)
+    # With shares of the total, because fourth powers of small errors would underflow.
+    shares = np.where(spread[:, None], variance / safe[:, None], 0.5)
+    nu = (before.passes - 1) / (shares**2).sum(axis=1)
+    p = np.where(spread, 2.0 * stdtr(nu, -np.abs(t)), 0.0)
+    p = np.where(np.abs(difference) <= rounding, 1.0, p)
+    corrected = sidak(p, len(pairs))
+    return tuple(
+        Move(
+            old,
+            new,
+            float(np.sqrt(total[i])),
+            float(t[i]) if spread[i] else None,
+            float(p[i]),
+            float(corrected[i]),
+        )
+        for i, (old, new) in enumerate(pairs)
+    )
+
+
+def sidak(p, tests):
+    """Return the chance of a p-value as small as `p` among so many independent tests."""
+    with np.errstate(divide="ignore"):  # p = 1
+        return -np.expm1(tests * np.log1p(-np.asarray(p, float)))
+
+
+def level_of_each(level: float, checks: int) -> float:
+    """The significance of each of several checks that gives all of them together `level`."""
+    return float(-np.expm1(np.log1p(-level) / checks))
+
+
+def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
+    """Return those that moved: metrics first, then whole images, then blocks, surest first.
+
+    Where neither side has any spread, the largest difference comes first.
+    """
+    found = [move for move in moves if move.corrected < level]
+    return sorted(found, key=_order)
+
+
+def _order(move):
+    part = (move.before.half is not None) + (move.before.block is not None)
+    return part, move.p, -abs(move.after.value - move.before.value)

@@ -1,0 +1,104 @@
+"""The results of checks as lines for a terminal."""
+
+from rich.console import Console
+from rich.table import Table
+
+SHOWN = 12
+"""Quantities of a scene that are listed; all are in the record."""
+
+
+def lines(results, level):
+    """Yield what people read: what moved in each scene, then a table of all."""
+    for result in results:
+        yield from _details(result)
+    if len(results) > 1:
+        yield from _printed(_summary(results))
+        yield ""
+    yield verdict(results, level)
+
+
+def verdict(results, level):
+    """Return the line that says how it went."""
+    count = len(results)
+    updates = [r for r in results if r.status in ("created", "updated", "unchanged")]
+    failed = sum(result.status == "failed" for result in results)
+    errors = sum(result.status == "error" for result in results)
+    if updates:
+        written = sum(result.status in ("created", "updated") for result in updates)
+        text = f"{written} of {count} baselines written"
+    else:
+        text = f"{failed} of {count} moved" if failed else f"{count - errors} of {count} unmoved"
+        text += f" (significance {level:g} over all that was tested)"
+    return text + (f"; {errors} could not be checked" if errors else "")
+
+
+def moved_lines(check):
+    """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
+    table = _table("what moved", "baseline", "now", "change", "standard errors", "p")
+    for move in check.moved[:SHOWN]:
+        old, new = move.before.value, move.after.value
+        errors = move.standard_errors
+        table.add_row(
+            move.before.name,
+            f"{old:.6g}",
+            f"{new:.6g}",
+            f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}",
+            "no noise" if errors is None else f"{errors:+.1f}",
+            f"{move.corrected:.1g}" if move.corrected else "0",
+        )
+    yield from _printed(table)
+    more = len(check.moved) - SHOWN
+    if more > 0:
+        yield f"and {more} more; {len(check.moves)} quantities were tested"
+
+
+def versions_line(result):
+    """Return what else changed since the baseline, or nothing."""
+    changes = ", ".join(f"{name} {a} -> {b}" for name, (a, b) in (result.versions or {}).items())
+    return f"versions since the baseline: {changes}" if changes else ""
+
+
+def _details(result):
+    if result.check is None or not result.check.moved:
+        if result.message:
+            yield f"{result.name}: {result.message}"
+        return
+    yield f"{result.name}: {result.status}"
+    yield from ("  " + line for line in moved_lines(result.check))
+    if versions_line(result):
+        yield "  " + versions_line(result)
+    if result.folder is not None:
+        yield f"  pictures: {result.folder}"
+    if result.status == "failed":
+        yield f"  if this is meant: fotismos check {result.path} --update"
+    yield ""
+
+
+def _summary(results):
+    table = _table("baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time")
+    for result in results:
+        row = [result.name, result.status]
+        if result.check is not None:
+            check = result.check
+            old, new = (m.metrics["dE2000"].value for m in (check.before, check.after))
+            least = min(move.corrected for move in check.moves)
+            row += [str(len(check.moved)), str(len(check.moves)), f"{old:.3f}", f"{new:.3f}"]
+            row += [f"{least:.2g}"]
+        else:
+            row += [""] * 5
+        table.add_row(*row, f"{result.seconds:.1f} s")
+    return table
+
+
+def _table(*headings):
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for number, heading in enumerate(headings):
+        table.add_column(heading, overflow="fold", justify="right" if number > 1 else "left")
+    return table
+
+
+def _printed(table):
+    console = Console(width=120)
+    with console.capture() as capture:
+        console.print(table)
+    return [line.rstrip() for line in capture.get().splitlines()]

@@ -1,0 +1,211 @@
+"""``fotismos check``: whether a change moved anything that was measured before."""
+
+import json
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from heuristic.errors import InputError
+from reports import jobs
+
+
+@click.command()
+@click.argument("baseline", type=click.Path(path_type=Path), metavar="BASELINE")
+@click.option("--update", is_flag=True, help="Write what moved to BASELINE, and print it.")
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    metavar="SCENE",
+    help="With --update: the scene that BASELINE is to be of. In a folder a baseline is"
+    " named after its scene, and there may be several.",
+)
+@click.option(
+    "--images",
+    is_flag=True,
+    help="With --update: keep small pictures beside BASELINE, for people to compare.",
+)
+@click.option(
+    "--significance",
+    default=0.01,
+    show_default=True,
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    help="Chance of an alarm though nothing changed, over all that is tested.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option(
+    "--junit",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write a JUnit XML file.",
+)
+@jobs.output_option("out/check")
+@jobs.rendering_options
+@click.pass_context
+def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
+          **rendering):  # fmt: skip
+    """Say whether anything that was measured before moved by more than noise.
+
+    BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
+    again with the options in its baseline, the seed included; --seed takes another. If something
+    moved, the exit code is 1, and OUTPUT holds pictures of where.
+
+    \b
+    Examples:
+      fotismos check baselines --update --scene cornell-box --scene my_scene.xml
+      fotismos check baselines
+      fotismos check baselines/cornell-box.json --update
+    """  # noqa: D301 click reads the \b as: keep these lines
+    given = {
+        name: value
+        for name, value in rendering.items()
+        if context.get_parameter_source(name) is not ParameterSource.DEFAULT
+    }
+    _require_consistent(update, scenes, images, given)
+    jobs.check_installation()
+    from reports import annotations, check_record, checking
+    from reports import junit as junit_xml
+
+    if update:
+        results = _update(baseline, scenes, images, significance, given)
+    else:
+        results = _examine(baseline, significance, given.get("seed"), output)
+    _report_errors(results)
+    notes = annotations.annotate(results, output, significance)
+    if junit is not None:
+        _write(junit, junit_xml.document(results))
+    if as_json:
+        data = check_record.summary(results, significance)
+        lines = [json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)]
+    else:
+        lines = checking.lines(results, significance)
+    for line in lines:
+        click.echo(line)
+    for line in notes:
+        click.echo(line, err=as_json)
+    context.exit(max(result.exit_code for result in results))
+
+
+def _require_consistent(update, scenes, images, given):
+    """Refuse what belongs to --update alone: a check renders what the baseline says."""
+    wanting = [f"--{name.replace('_', '-')}" for name in given if name != "seed"]
+    wanting += ["--scene"] * bool(scenes) + ["--images"] * images
+    if wanting and not update:
+        raise InputError(
+            f"{', '.join(wanting)}: a check renders its baseline's own scene and options. Add"
+            " --update to write another baseline."
+        )
+
+
+def _examine(path, significance, seed, output):
+    """Check one baseline or a folder of them; the significance is shared."""
+    from comparisons.check.moved import level_of_each
+    from reports import baselines, checks, progress
+
+    paths = baselines.find(path)
+    level = level_of_each(significance, len(paths))
+    output = _folder(output)
+    results = []
+    with progress.shown() as bar:
+        for one in paths:
+
+            def run(path=one):
+                file = baselines.read(path)
+                return checks.examine(
+                    file, file.job(seed), level, output / path.stem, bar.of(path.stem)
+                )
+
+            results.append(checks.guarded(one, run))
+    return results
+
+
+def _update(path, scenes, images, significance, given):
+    from reports import progress
+
+    with progress.shown() as bar:
+        results = []
+        for one, scene in _targets(path, scenes):
+            results.append(_update_one(one, scene, images, significance, given, bar))
+    return results
+
+
+def _update_one(path, scene, images, significance, given, bar):
+    """Write one baseline, unless it is there with the same options and nothing moved."""
+    from reports import baselines, checks
+
+    def run():
+        file, options, named, pictures = _readable(path, scene), dict(given), scene, images
+        if file is not None:
+            pictures = images or bool(file.baseline.images)
+            if scene is None or baselines.scene_for(scene, path) == file.baseline.scene:
+                named = baselines.scene_from(file.baseline.scene, path)
+                options = dict(file.baseline.options) | options
+                if baselines.recorded(options) == file.baseline.options:
+                    return checks.update(file, file.job(), significance, images, bar.of(path.stem))
+        if options.get("resolution") is not None:
+            options["resolution"] = tuple(options["resolution"])
+        job = jobs.job(named, baselines.default_rendering() | options)
+        scene_name = baselines.scene_for(named, path)
+        return checks.create(path, scene_name, job, pictures, bar.of(path.stem))
+
+    return checks.guarded(path, run)
+
+
+def _readable(path, scene):
+    """Read a baseline; one that is missing, or broken where its scene is given, is none."""
+    from reports import baselines
+
+    if not path.exists():
+        return None
+    try:
+        return baselines.read(path)
+    except InputError:
+        if scene is None:
+            raise
+        return None
+
+
+def _targets(path, scenes):
+    """Return ``(file, scene)`` of the baselines to write; without a scene, the file knows it."""
+    from comparisons.scenes import SCENES
+    from reports import baselines
+
+    if path.suffix == ".json":
+        if len(scenes) > 1:
+            raise InputError(f"{path}: one baseline is of one --scene; name a folder for several.")
+        if not scenes and not path.exists():
+            if path.stem not in SCENES:
+                raise InputError(f"{path}: there is no such baseline. Name its --scene.")
+            scenes = (path.stem,)
+        return [(path, scenes[0] if scenes else None)]
+    if scenes:
+        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
+        if len(named) < len(scenes):
+            raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
+        return list(named.items())
+    return [(one, None) for one in baselines.find(path)]
+
+
+def _stem(scene):
+    return Path(scene).stem if Path(scene).suffix == ".xml" else scene
+
+
+def _folder(path):
+    from reports import output
+
+    return output.prepare(path)
+
+
+def _report_errors(results):
+    for result in results:
+        if result.status == "error":
+            click.echo(f"fotismos: error: {result.message}", err=True)
+
+
+def _write(path, content):
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise InputError(f"--junit {path}: {error.strerror or error}.") from error

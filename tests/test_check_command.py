@@ -1,0 +1,315 @@
+"""`fotismos check`: files, messages, exit codes, JUnit and what CI services read."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import jsonschema
+import numpy as np
+import pytest
+from PIL import Image
+
+from reports import annotations, cli, junit
+from tests.test_cli import ROOT, run, scene_file  # noqa: F401 fixtures
+
+SCHEMA = json.loads((ROOT / "reports/baseline.schema.json").read_text(encoding="utf-8"))
+FAST = ("--spp", 32, "--resolution", "16x12")
+SERVICES = ("GITHUB_ACTIONS", "GITLAB_CI", "TF_BUILD", "TEAMCITY_VERSION")
+
+
+@pytest.fixture(autouse=True)
+def no_service(monkeypatch):
+    """These tests may themselves run in a CI service."""
+    for name in SERVICES:
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Two baselines, made by the command."""
+    folder = tmp_path_factory.mktemp("made") / "baselines"
+    words = ["check", folder, "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b", "--images"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["fotismos", *map(str, words), *map(str, FAST)])
+        cli.main()
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path):
+    """A copy of the two."""
+    return Path(shutil.copytree(made, tmp_path / "baselines"))
+
+
+def change(path, half="reference", factor=1.5):
+    """Change a baseline so that its scene seems to have moved in one block."""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data[half]["blocks"][1][2]["mean"][0] *= factor
+    path.write_text(json.dumps(data), encoding="utf-8")
+
+
+# --- Checking --------------------------------------------------------------------------------
+
+
+def test_what_did_not_move_passes(run, folder, tmp_path):  # noqa: F811
+    out = tmp_path / "out"
+    for words in ((), ("--seed", 7)):
+        code, printed, messages = run("check", folder, "-o", out, *words)
+        assert (code, messages) == (0, "")
+        assert "2 of 2 unmoved" in printed
+    assert list(out.iterdir()) == []
+
+
+def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):  # noqa: F811
+    change(folder / "fig-8-6b.json")
+    out = tmp_path / "out"
+    code, printed, messages = run("check", folder, "-o", out)
+    assert (code, messages) == (1, "")
+    assert "1 of 2 moved" in printed
+    assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", printed)
+    assert f"fotismos check {folder / 'fig-8-6b.json'} --update" in printed
+    names = {path.name for path in (out / "fig-8-6b").iterdir()}
+    kinds = ("", "-change", "-p", "-error")
+    pictures = {f"{half}{kind}.png" for half in ("heuristic", "reference") for kind in kinds}
+    assert names == {"check.json", *pictures}
+    assert [path.name for path in out.iterdir()] == ["fig-8-6b"]
+    # The block that moved is the one that stands out of its map.
+    shown = np.asarray(Image.open(out / "fig-8-6b/reference-p.png").convert("RGB"), float)
+    height, width = shown.shape[:2]
+    blocks = shown.reshape(4, height // 4, 4, width // 4, 3).mean(axis=(1, 3, 4))
+    assert np.unravel_index(blocks.argmax(), blocks.shape) == (1, 2)
+    # Once it passes again, nothing speaks of the failure.
+    change(folder / "fig-8-6b.json", factor=1 / 1.5)
+    assert run("check", folder, "-o", out)[0] == 0
+    assert list(out.iterdir()) == []
+
+
+def test_json_says_what_moved(run, folder, tmp_path):  # noqa: F811
+    change(folder / "fig-8-6b.json")
+    code, printed, _ = run("check", folder, "--json", "-o", tmp_path / "out")
+    data = json.loads(printed)
+    assert code == 1
+    assert not data["passed"]
+    passed, failed = data["checks"]
+    assert (passed["status"], passed["moved"]) == ("passed", [])
+    (move,) = failed["moved"]
+    assert (move["half"], move["block"]) == ("reference", [2, 3])
+    assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
+    assert move["p_corrected"] < failed["significance"] < 0.01
+    assert failed["tested"] == 5 + 2 * 3 * (1 + 4 * 4)  # metrics; halves, channels, blocks
+
+
+def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):  # noqa: F811
+    (folder / "broken.json").write_text("{", encoding="utf-8")
+    code, printed, messages = run("check", folder, "-o", tmp_path / "out")
+    assert code == 2
+    assert re.search(r"broken +error", printed)
+    assert "2 of 3 unmoved" in printed
+    assert "1 could not be checked" in printed
+    assert re.search(r"error: .*broken\.json: this is no JSON", messages)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nix.json",), "no such baseline"),
+        (("empty",), "no baseline"),
+        (("nix.json", "--update"), "--scene"),
+        (("nix.json", "--update", "--scene", "fig-0"), "'fig-0' is neither"),
+        (("nix.json", "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b"), "one --scene"),
+        (("new", "--update", "--scene", "a/x.xml", "--scene", "b/x.xml"), "one name"),
+        (("nix.json", "--spp", "4"), "--spp.*--update"),
+        (("nix.json", "--scene", "fig-8-6b"), "--scene.*--update"),
+        (("nix.json", "--significance", "0"), "range"),
+    ],
+)
+def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):  # noqa: F811
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    code, _, messages = run("check", *words)
+    assert code == 2
+    assert re.search(expected, messages)
+    assert "Traceback" not in messages
+
+
+def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):  # noqa: F811
+    own = tmp_path / "out/fig-8-6b/mine.txt"
+    own.parent.mkdir(parents=True)
+    own.write_text("mine")
+    change(folder / "fig-8-6b.json")
+    assert run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out")[0] == 1
+    assert (own.parent / "check.json").is_file()
+    change(folder / "fig-8-6b.json", factor=1 / 1.5)
+    assert run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out")[0] == 0
+    assert [path.name for path in own.parent.iterdir()] == ["mine.txt"]
+
+
+# --- Updating --------------------------------------------------------------------------------
+
+
+def test_a_baseline_is_made_by_its_name_alone(run, tmp_path):  # noqa: F811
+    code, printed, messages = run("check", tmp_path / "new/fig-8-5a.json", "--update", *FAST)
+    assert (code, messages) == (0, "")
+    assert "1 of 1 baselines written" in printed
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["fig-8-5a.json"]
+
+
+def test_an_update_rewrites_what_moved_and_nothing_else(run, folder):  # noqa: F811
+    whole = {path.name: path.read_bytes() for path in folder.iterdir()}
+    change(folder / "fig-8-6b.json")
+    code, printed, _ = run("check", folder, "--update", "--json")
+    assert code == 0
+    statuses = [check["status"] for check in json.loads(printed)["checks"]]
+    assert statuses == ["unchanged", "updated"]
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == whole
+
+
+def test_an_update_prints_what_changed(run, folder):  # noqa: F811
+    change(folder / "fig-8-6b.json")
+    _, printed, _ = run("check", folder / "fig-8-6b.json", "--update")
+    assert "fig-8-6b: updated" in printed
+    assert "reference R, block 2,3" in printed
+    assert "1 of 1 baselines written" in printed
+
+
+def test_other_options_write_a_baseline_anew(run, folder):  # noqa: F811
+    path = folder / "fig-8-6b.json"
+    code, _, _ = run("check", path, "--update", "--pairing", "literal", "--seed", 4)
+    options = json.loads(path.read_text(encoding="utf-8"))["options"]
+    assert code == 0
+    assert (options["pairing"], options["seed"]) == ("literal", 4)
+    assert (options["spp"], options["resolution"]) == (32, [16, 12])
+
+
+def test_a_broken_baseline_is_written_anew_once_its_scene_is_named(run, folder):  # noqa: F811
+    path = folder / "fig-8-6a.json"
+    path.write_text("{", encoding="utf-8")
+    code, _, messages = run("check", path, "--update")
+    assert code == 2
+    assert "--update --scene" in messages
+    assert run("check", path, "--update", "--scene", "fig-8-6a", *FAST)[0] == 0
+    assert run("check", path, "-o", folder / "out")[0] == 0
+
+
+def test_a_baseline_follows_its_schema(folder):
+    for path in folder.glob("*.json"):
+        jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), SCHEMA)
+
+
+def test_a_scene_in_a_file_is_found_from_anywhere(run, scene_file, tmp_path, monkeypatch):  # noqa: F811
+    path = tmp_path / "some/where/baseline.json"
+    code, _, messages = run("check", path, "--update", "--scene", scene_file, "--spp", 32)
+    assert (code, messages) == (0, "")
+    scene = json.loads(path.read_text(encoding="utf-8"))["scene"]
+    assert scene == "../../my scene.xml"
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert run("check", "../some/where")[0] == 0
+
+
+# --- CI services -----------------------------------------------------------------------------
+
+
+def quantity(name, value):
+    return SimpleNamespace(name=name, value=value, half=None, block=None)
+
+
+def failure(name="a%b,c:d", message=""):
+    """A result that failed, or an error with a message, without any rendering."""
+    moved = SimpleNamespace(
+        before=quantity("dE2000", 2.0), after=quantity("dE2000", 3.0), standard_errors=9.0, p=1e-9,
+        corrected=1e-7,
+    )  # fmt: skip
+    check = None if message else SimpleNamespace(moved=(moved,), moves=(moved,))
+    return SimpleNamespace(
+        name=name, path=Path(f"{name}.json"), scene="s", check=check, message=message, exit_code=1,
+        status="error" if message else "failed", seconds=1.5,
+    )  # fmt: skip
+
+
+def test_junit_holds_failures_and_errors(run, folder, tmp_path):  # noqa: F811
+    change(folder / "fig-8-6b.json")
+    (folder / "broken.json").write_text("{", encoding="utf-8")
+    file = tmp_path / "new/junit.xml"
+    run("check", folder, "-o", tmp_path / "out", "--junit", file)
+    suite = ElementTree.parse(file).getroot().find("testsuite")
+    assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
+        "tests": "3",
+        "failures": "1",
+        "errors": "1",
+    }
+    cases = {case.get("name"): case for case in suite}
+    assert "reference R, block 2,3" in cases["fig-8-6b"].find("failure").text
+    assert "no JSON" in cases["broken"].find("error").get("message")
+    assert len(cases["fig-8-6a"]) == 0
+
+
+def test_junit_survives_names_that_xml_cannot_hold():
+    document = junit.document([failure(name="a\x00<b>&\x1b", message="no\x08\ufffe")])
+    case = ElementTree.fromstring(document).find("testsuite/testcase")
+    assert case.get("name") == "a�<b>&�"
+
+
+def test_github_gets_errors_and_a_summary(tmp_path):
+    summary = tmp_path / "summary.md"
+    summary.write_text("before\n", encoding="utf-8")
+    environment = {
+        "GITHUB_ACTIONS": "true",
+        "GITHUB_STEP_SUMMARY": str(summary),
+        "GITHUB_WORKSPACE": str(Path.cwd().parent),
+    }
+    results = [failure(), failure("second", "line 1\nline | 2 <b>")]
+    first, second = annotations.annotate(results, tmp_path, 0.01, environment)
+    place = f"{Path.cwd().name}/a%25b%2Cc%3Ad.json"
+    assert first.startswith(f"::error file={place},title=fotismos check%3A a%25b%2Cc%3Ad::dE2000")
+    assert second.endswith("::line 1%0Aline | 2 <b>")
+    text = summary.read_text(encoding="utf-8")
+    assert text.startswith("before\n### fotismos check\n")
+    assert "| a%b,c:d | failed | dE2000 (1 in all) | 2 | 3 | +9.0 | 1e-07 |" in text
+    assert r"| second | error | line 1 line \| 2 &lt;b> |" in text
+
+
+def test_gitlab_gets_a_code_quality_report(tmp_path):
+    assert annotations.annotate([failure()], tmp_path, 0.01, {"GITLAB_CI": "true"}) == []
+    (found,) = json.loads((tmp_path / "gl-code-quality-report.json").read_text(encoding="utf-8"))
+    assert found["location"] == {"path": "a%b,c:d.json", "lines": {"begin": 1}}
+    assert found["severity"] == "major"
+    assert "dE2000 moved from 2 to 3" in found["description"]
+    assert re.fullmatch("[0-9a-f]{64}", found["fingerprint"])
+    annotations.annotate([], tmp_path, 0.01, {"GITLAB_CI": "true"})
+    assert (tmp_path / "gl-code-quality-report.json").read_text(encoding="utf-8") == "[]"
+
+
+def test_azure_gets_issues_and_a_summary(tmp_path):
+    issue, summary = annotations.annotate([failure("a;b]")], tmp_path, 0.01, {"TF_BUILD": "True"})
+    assert issue.startswith("##vso[task.logissue type=error;sourcepath=a%3Bb%5D.json]a;b]: dE2000")
+    assert summary == f"##vso[task.uploadsummary]{tmp_path / 'summary.md'}"
+    assert "fotismos check" in (tmp_path / "summary.md").read_text(encoding="utf-8")
+
+
+def test_teamcity_gets_problems(tmp_path):
+    result = failure("it's [Δ]", "one\ntwo")
+    (line,) = annotations.annotate([result], tmp_path, 0.01, {"TEAMCITY_VERSION": "2024.1"})
+    assert line == (
+        "##teamcity[buildProblem description='fotismos check: it|'s |[|0x0394|]: one|ntwo']"
+    )
+
+
+def test_without_a_service_nothing_is_written(tmp_path):
+    assert annotations.annotate([failure()], tmp_path, 0.01, {"CI": "true"}) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_detected_service_is_told(run, folder, tmp_path, monkeypatch):  # noqa: F811
+    change(folder / "fig-8-6b.json")
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
+    _, printed, _ = run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out")
+    assert re.search("^::error file=.*fig-8-6b.json,title=", printed, re.MULTILINE)
+    _, printed, messages = run("check", folder / "fig-8-6b.json", "-o", tmp_path / "out", "--json")
+    json.loads(printed)
+    assert messages.startswith("::error ")

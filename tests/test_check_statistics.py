@@ -1,0 +1,237 @@
+"""What a check calls moved: false alarms at the stated rate, power, and statistics gone wrong.
+
+Passes are drawn here, by NumPy, so that thousands of checks take a second. Alarms are counted
+against bounds that a right statistic leaves once in a thousand runs; broken ones must leave them.
+"""
+
+import numpy as np
+import pytest
+from scipy import special, stats
+
+from comparisons.check import measurement as measuring
+from comparisons.check import moved as moving
+from comparisons.check.measurement import Colours, Measurement, Metric, measurement
+from comparisons.spaces import DEFAULT_VIEWING
+
+PASSES = 16
+
+
+def measured(passes):
+    """A measurement of drawn passes (n, 102), as if they were colours; metrics are 0."""
+    mean, error = passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
+    halves = [
+        Colours(m[:3], e[:3], m[3:].reshape(4, 4, 3), e[3:].reshape(4, 4, 3))
+        for m, e in zip(mean.reshape(2, 51), error.reshape(2, 51), strict=True)
+    ]
+    metrics = {name: Metric(0.0, 0.0, 0.0) for name in measuring.ROUNDING}
+    return Measurement(len(passes), metrics, dict(zip(measuring.HALVES, halves, strict=True)))
+
+
+def normal(rng):
+    return 1 + 0.01 * rng.normal(size=(PASSES, 102))
+
+
+def fireflies(rng):
+    """One sample in fifty is a hundred times as bright as the others."""
+    return 1 + 0.01 * rng.normal(size=(PASSES, 102)) + (rng.random((PASSES, 102)) < 0.02)
+
+
+def skewed(rng):
+    return rng.lognormal(sigma=1.0, size=(PASSES, 102))
+
+
+def alarms(draw, checks, level, differences=moving.differences):
+    """Count the checks that alarm though both sides are drawn alike."""
+    rng = np.random.default_rng(11)
+    return sum(
+        bool(moving.moved(differences(*(measured(draw(rng)) for _ in range(2))), level))
+        for _ in range(checks)
+    )
+
+
+def bounds(checks, level):
+    return stats.binom.interval(0.999, checks, level)
+
+
+# --- False alarms ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("level", [0.01, 0.2])
+def test_normal_noise_alarms_at_the_stated_rate(level):
+    least, most = bounds(1000, level * 102 / 107)
+    assert least <= alarms(normal, 1000, level) <= most
+
+
+@pytest.mark.parametrize("draw", [fireflies, skewed])
+def test_noise_of_heavy_tails_alarms_no_more_than_stated(draw):
+    assert alarms(draw, 500, 0.05) <= bounds(500, 0.05)[1]
+
+
+def test_a_change_of_noise_alone_alarms_no_more_than_stated():
+    """A sampler that is twice as noisy, or half, is no change of what is measured."""
+    rng = np.random.default_rng(12)
+    noisier = [
+        bool(moving.moved(moving.differences(measured(normal(rng)), measured(2 * normal(rng) - 1))))
+        for _ in range(1000)
+    ]
+    assert sum(noisier) <= bounds(1000, 0.01)[1]
+
+
+def one_sided(before, after):
+    """The baseline's own doubt forgotten."""
+    exact = Measurement(before.passes, before.metrics, {
+        half: Colours(c.whole, 0 * c.whole_error, c.blocks, 0 * c.blocks_error)
+        for half, c in before.colours.items()
+    })  # fmt: skip
+    return moving.differences(exact, after)
+
+
+def normal_not_t(before, after):
+    """The normal distribution in place of Student's."""
+    moves = moving.differences(before, after)
+    return [
+        moving.Move(m.before, m.after, m.error, m.standard_errors, p, moving.sidak(p, len(moves)))
+        for m in moves
+        for p in [2 * special.ndtr(-abs(m.standard_errors or 0.0))]
+    ]
+
+
+def uncorrected(before, after):
+    """Each of all the tests at the level of the whole."""
+    return [
+        moving.Move(m.before, m.after, m.error, m.standard_errors, m.p, m.p)
+        for m in moving.differences(before, after)
+    ]
+
+
+def standard_deviations(before, after):
+    """The spread of passes taken for the error of their mean: nothing is ever seen."""
+    wide = [
+        Measurement(side.passes, side.metrics, {
+            half: Colours(c.whole, 4 * c.whole_error, c.blocks, 4 * c.blocks_error)
+            for half, c in side.colours.items()
+        })
+        for side in (before, after)
+    ]  # fmt: skip
+    return moving.differences(*wide)
+
+
+@pytest.mark.parametrize(
+    "broken", [one_sided, normal_not_t, uncorrected, standard_deviations], ids=lambda f: f.__name__
+)
+def test_a_broken_statistic_leaves_the_bounds(broken):
+    least, most = bounds(400, 0.2 * 102 / 107)
+    assert not least <= alarms(normal, 400, 0.2, broken) <= most
+
+
+def test_shared_significance_is_that_of_all_checks():
+    level = moving.level_of_each(0.01, 27)
+    assert 1 - (1 - level) ** 27 == pytest.approx(0.01)
+
+
+# --- Values ----------------------------------------------------------------------------------
+
+
+def test_the_p_value_is_scipys_of_welchs_test():
+    rng = np.random.default_rng(3)
+    sides = normal(rng), 1.002 + 0.03 * rng.normal(size=(PASSES, 102))
+    moves = moving.differences(*map(measured, sides))[5:]
+    expected = stats.ttest_ind(sides[1], sides[0], equal_var=False)
+    names = [move.before.name for move in moves]
+    assert names[:4] == ["heuristic R", "heuristic G", "heuristic B", "reference R"]
+    order = np.r_[0:3, 51:54, 3:51, 54:102]
+    np.testing.assert_allclose([m.p for m in moves], expected.pvalue[order], rtol=1e-9)
+    t = [m.standard_errors for m in moves]
+    np.testing.assert_allclose(t, expected.statistic[order], rtol=1e-9)
+    corrected = [m.corrected for m in moves]
+    np.testing.assert_allclose(corrected, 1 - (1 - expected.pvalue[order]) ** 107, rtol=1e-6)
+
+
+def exact(value):
+    return measured(np.full((PASSES, 102), value))
+
+
+@pytest.mark.parametrize(("after", "moves"), [(1.0, 0), (1 + 9e-6, 0), (1 + 2e-5, 102)])
+def test_without_noise_what_exceeds_rounding_moved(after, moves):
+    found = moving.moved(moving.differences(exact(1.0), exact(after)))
+    assert len(found) == moves
+    assert all(move.p == 0 and move.standard_errors is None for move in found)
+
+
+def test_noise_below_rounding_is_no_reason_to_alarm():
+    rng = np.random.default_rng(4)
+    sides = [measured(value + 1e-9 * rng.normal(size=(16, 102))) for value in (1.0, 1.0 + 1e-6)]
+    assert not moving.moved(moving.differences(*sides))
+
+
+def test_noise_on_one_side_alone_is_that_sides_test():
+    rng = np.random.default_rng(5)
+    passes = normal(rng)
+    moves = moving.differences(exact(1.0), measured(passes))
+    expected = stats.ttest_1samp(passes, 1.0).pvalue
+    np.testing.assert_allclose([m.p for m in moves[5:8]], expected[:3], rtol=1e-9)
+
+
+def test_the_surest_of_the_widest_comes_first():
+    before, after = exact(1.0), exact(1.0)
+    after.colours["reference"].blocks[1, 2, 0] = 1.5
+    after.colours["reference"].whole[1] = 1.1
+    after.metrics["rmse"] = Metric(0.1, 0.0, 0.0)
+    names = [move.before.name for move in moving.moved(moving.differences(before, after))]
+    assert names == ["rmse", "reference G", "reference R, block 2,3"]
+
+
+# --- Measurement -----------------------------------------------------------------------------
+
+
+def test_jackknife_errors_are_those_of_metrics_drawn_again():
+    """The spread of a metric over independent measurements is the error that each reports."""
+    rng = np.random.default_rng(6)
+    truth = rng.uniform(0.2, 0.6, (2, 16, 16, 3))
+    counted = np.ones((16, 16), bool)
+    drawn = [
+        measurement(
+            truth + 0.05 * rng.normal(size=(PASSES, *truth.shape)), counted, DEFAULT_VIEWING
+        )
+        for _ in range(30)
+    ]
+    for name in measuring.ROUNDING:
+        values = [one.metrics[name].value for one in drawn]
+        errors = [one.metrics[name].error for one in drawn]
+        # 30 draws know their own spread to 13 %.
+        assert np.std(values, ddof=1) == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.4)
+
+
+def test_metrics_are_those_of_the_mean_image_over_counted_pixels():
+    rng = np.random.default_rng(7)
+    images = rng.uniform(0.1, 0.9, (4, 2, 10, 12, 3))
+    counted = rng.random((10, 12)) < 0.5
+    found = measurement(images, counted, DEFAULT_VIEWING)
+    test, reference = images.mean(axis=0)[:, counted]
+    assert found.metrics["rmse"].value == pytest.approx(np.sqrt(np.mean((test - reference) ** 2)))
+    left_out = [
+        np.sqrt(np.mean(np.subtract(*np.delete(images, i, 0).mean(axis=0)[:, counted]) ** 2))
+        for i in range(4)
+    ]
+    error = np.sqrt(3 / 4 * np.sum((left_out - np.mean(left_out)) ** 2))
+    assert found.metrics["rmse"].error == pytest.approx(error)
+
+
+def test_without_counted_pixels_metrics_are_0():
+    found = measurement(np.ones((3, 2, 5, 5, 3)), np.zeros((5, 5), bool), DEFAULT_VIEWING)
+    assert all(metric.value == metric.error == 0 for metric in found.metrics.values())
+
+
+@pytest.mark.parametrize(("height", "width"), [(64, 64), (7, 10), (2, 3)])
+def test_blocks_tile_the_image(height, width):
+    rng = np.random.default_rng(8)
+    image = rng.random((height, width, 3))
+    blocks = measuring.block_means(image)
+    rows, columns = min(4, height), min(4, width)
+    assert blocks.shape == (rows, columns, 3)
+    for row, column in np.ndindex(rows, columns):
+        part = image[
+            row * height // rows : (row + 1) * height // rows,
+            column * width // columns : (column + 1) * width // columns,
+        ]
+        np.testing.assert_allclose(blocks[row, column], part.mean(axis=(0, 1)))

@@ -1,0 +1,149 @@
+"""The pytest plugin, in the suite of someone else: passing, failing, updating, skipping."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.test_cli import ROOT
+
+SCENE = """<scene version="3.0.0">
+  <sensor type="perspective">
+    <film type="hdrfilm">
+      <integer name="width" value="16"/><integer name="height" value="12"/>
+    </film>
+  </sensor>
+  <shape type="sphere">
+    <point name="center" x="0" y="0" z="4"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.2, 0.3, 0.5"/></bsdf>
+  </shape>
+  <emitter type="point">
+    <point name="position" x="3" y="2" z="-3"/><float name="intensity" value="90"/>
+  </emitter>
+  <shape type="rectangle">
+    <transform name="to_world">
+      <scale value="9"/><rotate y="1" angle="180"/><translate z="6"/>
+    </transform>
+  </shape>
+</scene>
+"""
+
+SUITE = """
+import pytest
+
+SMALL = {"resolution": (16, 12), "spp": 32}
+
+def plain():
+    return {
+        "type": "scene",
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 16, "height": 12}},
+        "lamp": {"type": "point", "position": (0, 0, -3), "intensity": 9.0},
+        "ball": {"type": "sphere", "center": (0, 0, 4), "bsdf": {"type": "diffuse"}},
+    }
+
+def test_a_close_scene(fotismos):
+    departure = fotismos.departure("lambert-sphere", **SMALL)
+    assert departure <= 0.1
+    assert not departure > 0.1
+    assert 0 <= float(departure) < 0.1
+
+def test_a_far_scene(fotismos):
+    assert fotismos.departure("scenes/scene.xml", spp=32) <= 0.5
+
+def test_another_metric(fotismos):
+    assert fotismos.departure(plain, metric="rmse") <= 1e-3
+
+def test_unchanged(fotismos):
+    assert fotismos.unchanged("scenes/scene.xml", spp=32)
+
+def test_unchanged_in_python(fotismos):
+    fotismos.unchanged(plain, spp=32)
+
+def test_unchanged_dictionary(fotismos):
+    fotismos.unchanged(plain(), name="named", spp=32)
+
+@pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_mono")
+def test_variants(fotismos):
+    import mitsuba as mi
+    assert mi.variant() == fotismos.variant
+    fotismos.unchanged("fig-8-6a", **SMALL)
+"""
+
+
+@pytest.fixture
+def suite(tmp_path):
+    """A folder with a suite; returns a function that runs it, with arguments and variables."""
+    (tmp_path / "tests/scenes").mkdir(parents=True)
+    (tmp_path / "tests/test_mine.py").write_text(SUITE, encoding="utf-8")
+    (tmp_path / "tests/scenes/scene.xml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n", encoding="utf-8")
+
+    def run(*arguments, **variables):
+        words = [sys.executable, "-m", "pytest", "-p", "reports.pytest_plugin", "-W", "error"]
+        # Without the colours and services of the run that this is part of.
+        environment = {
+            k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "GITHUB"))
+        }
+        environment |= {"PYTHONPATH": str(ROOT), "COLUMNS": "120"} | variables
+        done = subprocess.run(
+            [*words, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    return run
+
+
+def test_a_suite_fails_updates_and_passes(suite, tmp_path):
+    code, printed = suite("-rf")
+    assert code == 1
+    assert "6 failed, 2 passed" in printed
+    for words in (
+        "assert dE2000 ",
+        "<= 0.5",
+        "scene: mean dE2000 ",
+        "95 % interval: ",
+        "noise alone: ",
+        "scene.json: there is no such baseline. `pytest --fotismos-update` writes it.",
+    ):
+        assert words in printed
+
+    code, printed = suite("--fotismos-update", "-k", "unchanged or variants")
+    assert (code, "5 passed" in printed) == (0, True), printed
+    baselines = tmp_path / "tests/baselines"
+    names = ["fig-8-6a-llvm_ad_mono", "fig-8-6a-llvm_ad_rgb", "named", "plain", "scene"]
+    assert sorted(path.stem for path in baselines.iterdir()) == names
+
+    path = baselines / "plain.json"
+    text = path.read_text(encoding="utf-8").replace('"mean": [0.', '"mean": [1.', 1)
+    path.write_text(text, encoding="utf-8")
+    (tmp_path / "tests/scenes/scene.xml").write_text(
+        SCENE.replace('value="0.2, 0.3, 0.5"', 'value="0.3, 0.3, 0.5"'), encoding="utf-8"
+    )
+    code, printed = suite("-k", "unchanged or variants")
+    assert "2 failed, 3 passed" in printed
+    for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "pictures: "):
+        assert words in printed
+
+
+def test_without_llvm_tests_are_skipped_with_the_reason(suite):
+    code, printed = suite("-rs", DRJIT_LIBLLVM_PATH="/nowhere/libLLVM.so")
+    assert code == 0
+    assert "8 skipped" in printed
+    assert "fotismos cannot render here. There is no LLVM" in printed
+
+
+def test_the_plugin_imports_nothing_heavy():
+    code = (
+        "import reports.pytest_plugin, sys; print({'mitsuba', 'drjit', 'numpy'} & {*sys.modules})"
+    )
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_the_package_brings_the_plugin():
+    import tomllib
+
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert data["project"]["entry-points"]["pytest11"] == {"fotismos": "reports.pytest_plugin"}
