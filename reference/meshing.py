@@ -14,17 +14,6 @@ from reference.scene import Reference, properties
 SHAPE = mi.ObjectType.Shape
 
 
-class _Folder:
-    """A temporary folder that goes when nothing refers to it any more.
-
-    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
-    """
-
-    def __init__(self):
-        self.name = mkdtemp(prefix="fotismos-")
-        weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
-
-
 def replace_shapes(graph, scene, resolution, interpolation):
     """Replace every shape of a graph by a mesh of the same place, name, material and light.
 
@@ -67,7 +56,10 @@ def replace_shapes(graph, scene, resolution, interpolation):
 
 
 class _Folder:
-    """A temporary folder that goes away with the last graph that names it, without a warning."""
+    """A temporary folder that goes away with the last graph that names it.
+
+    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
+    """
 
     def __init__(self):
         self.path = Path(mkdtemp(prefix="fotismos-"))
