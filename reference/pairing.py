@@ -31,10 +31,11 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 from math import exp, log, sqrt
 
 import numpy as np
-from scipy.optimize import minimize_scalar, root_scalar
+from scipy.optimize import root_scalar
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.terms import normalisation
@@ -194,14 +195,23 @@ def _nearest_ior(plastic, wanted, highest):
         diffuse = np.minimum(wanted.diffuse, reached.diffuse)
         return np.sum((diffuse - wanted.diffuse) ** 2 + (reached.specular - wanted.specular) ** 2)
 
-    return exp(
-        minimize_scalar(
-            distance,
-            bounds=(log(SMALLEST_IOR), log(highest)),
-            method="bounded",
-            options={"xatol": 1e-3},
-        ).x
-    )
+    # Where it is least is where it is level, values a step to either side being equal: the least
+    # value itself is too flat for single precision to tell its place.
+    step = 1.02
+
+    @cache
+    def slope(log_log_ior):
+        return distance(exp(log_log_ior) * step) - distance(exp(log_log_ior) / step)
+
+    smallest, high = log(log(SMALLEST_IOR) * step), log(log(highest) / step)
+    if slope(high) <= 0:
+        return exp(exp(high))
+    low = max(high - 1, smallest)
+    while slope(low) >= 0:
+        if low == smallest:
+            return exp(exp(low))
+        low, high = max(low - 1, smallest), low
+    return exp(exp(root_scalar(slope, bracket=(low, high), xtol=1e-4).root))
 
 
 def _misses(wanted, reached):
