@@ -1,0 +1,139 @@
+"""Spreading a study over processes with Dask: a cluster that runs already, or one made for it.
+
+Rows come back to the process that asked for them, which keeps them; workers share no files. Dask
+gives the points of a lost worker to another. A scheduler that is lost ends the run, and the next
+run goes on where it ended.
+"""
+
+import os
+from contextlib import contextmanager
+from itertools import islice
+from threading import Lock
+
+from comparisons.study import point
+from heuristic.errors import InstallationError
+
+EXTRA = "cluster"
+ALLOWED_FAILURES = 30
+"""Workers that may die with a point before the point itself is blamed, in a cluster of ours."""
+
+AHEAD = 4
+"""Blocks in hand for each worker: enough to keep it busy, few enough to lose little."""
+
+_one_at_a_time = Lock()
+
+
+def rows(block, threads):
+    """Do one block in a worker; one at a time in a process, since Mitsuba uses its threads."""
+    import drjit as dr
+
+    with _one_at_a_time:
+        if threads and dr.thread_count() != threads:
+            dr.set_thread_count(threads)
+        return point.rows(block)
+
+
+@contextmanager
+def local(workers):
+    """Make a Dask cluster of separate processes on this machine, which share its cores.
+
+    Gives what :func:`comparisons.study.run.run` takes as ``spread``.
+
+    Raises
+    ------
+    InstallationError
+        When the extra is not installed.
+    """
+    distributed = _distributed()
+    import dask
+
+    threads = max(1, (os.cpu_count() or 1) // workers)
+    settings = {
+        "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
+        "distributed.admin.log-format": "%(message)s",
+        "logging": {"distributed": "error"},
+    }
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield lambda blocks: spread(client, blocks, threads)
+
+
+@contextmanager
+def connected(address, timeout=20):
+    """Use the Dask cluster whose scheduler is at an address, such as ``tcp://host:8786``.
+
+    Raises
+    ------
+    InstallationError
+        When the extra is not installed, or the scheduler does not answer.
+    """
+    distributed = _distributed()
+    try:
+        client = distributed.Client(address, timeout=timeout)
+    except (OSError, ValueError) as error:
+        raise InstallationError(
+            f"no Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`, and"
+            " workers with `dask worker ADDRESS --nthreads 1`, in an environment that has fotismos."
+        ) from error
+    with client:
+        yield lambda blocks: spread(client, blocks, None)
+
+
+def spread(client, blocks, threads):
+    """Do blocks on a cluster; yields ``(block, rows)`` as they are finished.
+
+    Raises
+    ------
+    InstallationError
+        When the scheduler is lost.
+    """
+    from distributed import as_completed
+
+    waiting = iter(blocks)
+    hands = {}
+
+    def submit(count):
+        some = list(islice(waiting, count))
+        futures = [client.submit(rows, block, threads, key=block.key) for block in some]
+        hands.update({future.key: block for future, block in zip(futures, some, strict=True)})
+        return futures
+
+    workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    queue = as_completed(submit(AHEAD * workers))
+    for future in queue:
+        block = hands.pop(future.key)
+        yield block, _result(future, block)
+        queue.update(submit(1))
+
+
+def _result(future, block):
+    """Return the rows of a finished block, or rows that say why it did not finish."""
+    if future.status in ("cancelled", "lost"):
+        raise InstallationError(
+            "the Dask scheduler is gone. All finished points are kept; run the same command again,"
+            " and it goes on from there."
+        )
+    try:
+        return future.result()
+    # A worker that died too often with it, or one that cannot import fotismos: the study goes on.
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+    return [
+        {"part": block.part.name, "point": block.first + number, **values, "error": reason}
+        for number, values in enumerate(block.points)
+    ]
+
+
+def _distributed():
+    try:
+        import distributed
+    except ImportError as error:
+        raise InstallationError(
+            f"a cluster needs Dask, which is not installed. Do: pip install 'fotismos[{EXTRA}]'"
+        ) from error
+    return distributed
