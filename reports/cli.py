@@ -10,7 +10,7 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import compare, doctor, plan, report, scenes
+from reports.commands import compare, doctor, plan, report, scenes, study
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -23,6 +23,7 @@ for command in (
     compare.compare,
     plan.plan,
     report.report,
+    study.study,
     scenes.scenes,
     doctor.doctor,
 ):

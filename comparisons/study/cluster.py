@@ -5,13 +5,13 @@ gives the points of a lost worker to another. A scheduler that is lost ends the 
 run goes on where it ended.
 """
 
-import os
 from contextlib import contextmanager
 from itertools import islice
 from threading import Lock
 
 from comparisons.study import point
-from heuristic.errors import InstallationError
+from comparisons.study.processes import cores
+from heuristic.errors import InstallationError, LostProcessError
 
 EXTRA = "cluster"
 ALLOWED_FAILURES = 30
@@ -47,7 +47,7 @@ def local(workers):
     distributed = _distributed()
     import dask
 
-    threads = max(1, (os.cpu_count() or 1) // workers)
+    threads = max(1, cores() // workers)
     settings = {
         "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
         "distributed.admin.log-format": "%(message)s",
@@ -89,7 +89,7 @@ def spread(client, blocks, threads):
 
     Raises
     ------
-    InstallationError
+    LostProcessError
         When the scheduler is lost.
     """
     from distributed import as_completed
@@ -114,7 +114,7 @@ def spread(client, blocks, threads):
 def _result(future, block):
     """Return the rows of a finished block, or rows that say why it did not finish."""
     if future.status in ("cancelled", "lost"):
-        raise InstallationError(
+        raise LostProcessError(
             "the Dask scheduler is gone. All finished points are kept; run the same command again,"
             " and it goes on from there."
         )

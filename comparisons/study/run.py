@@ -9,7 +9,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from comparisons.study import dataset, point
+from comparisons.study import dataset, point, processes
 from comparisons.study.point import Block
 
 
@@ -23,13 +23,7 @@ class Outcome:
     failed: int
 
 
-def one_process(blocks):
-    """Do the blocks one after another here; yields ``(block, rows)``."""
-    for block in blocks:
-        yield block, point.rows(block)
-
-
-def run(study, folder, spread=one_process, progress=None):
+def run(study, folder, spread=None, progress=None):
     """Do the points of a study that are not done yet, and put all together.
 
     Points that failed in an earlier run are done again.
@@ -40,9 +34,10 @@ def run(study, folder, spread=one_process, progress=None):
         The study.
     folder
         Where finished blocks are kept, in ``points/``.
-    spread : callable
-        Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order:
-        :func:`one_process`, or a cluster's (:mod:`comparisons.study.cluster`).
+    spread : callable, optional
+        Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
+        (:mod:`comparisons.study.processes`, :mod:`comparisons.study.cluster`). All are done in this
+        process where it is not given.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
 
@@ -67,7 +62,7 @@ def run(study, folder, spread=one_process, progress=None):
     at_hand = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
     report("points", done, total)
-    for block, rows in spread(left):
+    for block, rows in (spread or processes.over(1))(left):
         _write(kept / f"{block.key}.json", rows)
         found[block.key] = rows
         done += len(rows)
