@@ -11,7 +11,7 @@ A figure is a table of the study's TOML file::
     y = "alpha"                    # maps
     values = ["dE2000"]            # one column for a map, one or more for lines
     series = "alpha"               # lines: one for each value of this parameter
-    where = { int_ior = 1.5 }
+    where = { int_ior = [1.5, 2] } # the points that are shown
     rule = 1.0                     # lines: a horizontal line
     log = ["x", "y"]               # lines: logarithmic axes
 
@@ -34,10 +34,12 @@ SYMBOLS = {
     "dE2000_shape": "ΔE2000 after the best exposure",
     "dE_ITP": "ΔE ITP",
     "int_ior": "index of refraction",
+    "k_d": "k_d",
+    "k_s": "k_s",
     "log2_luminance": "luminance ratio",
 }
-WORDS = ("#fde725", "#35b779", "#443983", "#21918c")
-"""Colours for words, of different lightness; the first letter stands in each cell besides."""
+WORDS = ("#fde725", "#90d743", "#35b779", "#9fb8e8")
+"""Colours for words, light enough for the letter of the word that stands in each cell besides."""
 
 CONFIG = {
     "font": "sans-serif",
@@ -144,10 +146,7 @@ def _map(figure, table, part, data):
     layer = [{"mark": mark, "encoding": {"color": colour}}]
     if is_word and part.design == "grid":
         text = {"field": "letter", "type": "nominal"}
-        # Black or white, whichever is farther from the cell's own lightness.
-        ink = {"condition": {"test": f"datum.value === '{words[-1]}' && {len(words)} > 2",
-                             "value": "white"}, "value": "black"}  # fmt: skip
-        layer.append({"mark": {"type": "text"}, "encoding": {"text": text, "color": ink}})
+        layer.append({"mark": {"type": "text"}, "encoding": {"text": text}})
     return {
         "data": {"values": cells},
         "width": 420,
@@ -171,8 +170,7 @@ def _lines(figure, table, part, data):
     encoding = {"x": _field("x", table, x), "y": y_axis}
     for axis in ("x", "y"):
         encoding[axis]["scale"] = {"type": "log"} if axis in logarithmic else {"zero": axis == "y"}
-    if "x" not in logarithmic:
-        encoding["x"]["scale"]["nice"] = False
+    encoding["x"]["scale"]["nice"] = False
     if series:
         encoding["color"] = {
             "field": "y",

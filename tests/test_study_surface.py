@@ -53,9 +53,13 @@ def phong_albedo(k_d, k_s, n, degrees):
     a = np.deg2rad(degrees)
     cosine = np.sin(a) * np.sin(theta) * np.cos(phi) + np.cos(a) * np.cos(theta)
     radiance = k_d * np.cos(a) + k_s * np.maximum(cosine, 0) ** n
-    return 2 * np.sum(radiance * np.cos(theta) * np.sin(theta)) * (np.pi / 1800) * (
-        np.pi / 900
-    ) / (np.pi * np.cos(a))
+    return (
+        2
+        * np.sum(radiance * np.cos(theta) * np.sin(theta))
+        * (np.pi / 1800)
+        * (np.pi / 900)
+        / (np.pi * np.cos(a))
+    )
 
 
 @pytest.mark.parametrize("n", [1, 9, 100])

@@ -20,6 +20,9 @@ ALLOWED_FAILURES = 30
 AHEAD = 4
 """Blocks in hand for each worker: enough to keep it busy, few enough to lose little."""
 
+TIMEOUT = 20
+"""Seconds in which a scheduler must answer."""
+
 _one_at_a_time = Lock()
 
 
@@ -64,7 +67,7 @@ def local(workers):
 
 
 @contextmanager
-def connected(address, timeout=20):
+def connected(address):
     """Use the Dask cluster whose scheduler is at an address, such as ``tcp://host:8786``.
 
     Raises
@@ -74,7 +77,7 @@ def connected(address, timeout=20):
     """
     distributed = _distributed()
     try:
-        client = distributed.Client(address, timeout=timeout)
+        client = distributed.Client(address, timeout=TIMEOUT)
     except (OSError, ValueError) as error:
         raise InstallationError(
             f"no Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`, and"

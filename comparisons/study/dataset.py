@@ -67,4 +67,6 @@ def read(path):
     try:
         return pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
-        raise InputError(f"{path} cannot be read as a dataset: {error}. Run the study again.") from error
+        raise InputError(
+            f"{path} cannot be read as a dataset: {error}. Run the study again."
+        ) from error

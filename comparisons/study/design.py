@@ -154,7 +154,9 @@ def _part(table, folder):
     design = _choice(table, "design", DESIGNS, where)
     given = table.get("parameters", {})
     if not isinstance(given, dict) or not given:
-        raise InputError(f"{where}: there is nothing to vary. Name parameters in [part.parameters].")
+        raise InputError(
+            f"{where}: there is nothing to vary. Name parameters in [part.parameters]."
+        )
     known = _parameters(scene, given, where)
     spans = {}
     for key, parameter in known.items():
@@ -193,7 +195,9 @@ def _parameters(scene, given, where):
 def _known(table, names, where):
     for key in table:
         if key not in names:
-            raise InputError(f"{where}: {key!r} is not known. Known are {', '.join(sorted(names))}.")
+            raise InputError(
+                f"{where}: {key!r} is not known. Known are {', '.join(sorted(names))}."
+            )
 
 
 def _choice(table, key, choices, where):

@@ -202,5 +202,3 @@ def _set(graph, path, value):
 
 def _is_number(value):
     return isinstance(value, (Real, *COLOURS)) and not isinstance(value, bool)
-
-

@@ -165,8 +165,9 @@ def _lobe(part, point):
         result[f"albedo_{name}"] = surface.albedo(hemisphere, angle)
         result[f"specular_albedo_{name}"] = surface.albedo(specular, angle)
         result[f"specular_{name}"] = float(mirrored[0])
-        if in_plane.any():
-            result[f"peak_{name}"] = float(np.argmax(in_plane) * PEAK_STEP)
+        highest = in_plane > in_plane.max() * (1 - 1e-6)
+        if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
+            result[f"peak_{name}"] = float(np.argmax(in_plane)) * PEAK_STEP
     counted = np.ones(images[0].shape[:2], bool)
     return result | measure(*images, counted)
 

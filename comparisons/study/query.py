@@ -11,7 +11,7 @@ from heuristic.errors import InputError
 def rows(table, part, where=None):
     """Return the rows of a part that have a result, as dictionaries.
 
-    ``where`` maps columns to values; numbers match to six digits.
+    ``where`` maps columns to a value or a list of values; numbers match to six digits.
 
     Raises
     ------
@@ -28,8 +28,7 @@ def rows(table, part, where=None):
     found = [
         row
         for row in chosen.to_pylist()
-        if row["error"] is None
-        and all(_matches(row[name], value) for name, value in where.items())
+        if row["error"] is None and all(_matches(row[name], value) for name, value in where.items())
     ]
     if not found:
         raise InputError(f"no point of part {part!r} has {where or 'a result'}.")
@@ -52,7 +51,7 @@ def require(table, column):
 
 def unit(table, column):
     """Return the unit of a column, as its metadata has it."""
-    return (table.schema.field(column).metadata or {}).get(b"unit", b"").decode()
+    return table.schema.field(column).metadata[b"unit"].decode()
 
 
 class Facts:
@@ -103,6 +102,8 @@ class Facts:
 
 
 def _matches(found, wanted):
+    if isinstance(wanted, list):
+        return any(_matches(found, value) for value in wanted)
     if isinstance(found, float):
         return isclose(found, wanted, rel_tol=1e-6, abs_tol=1e-9)
     return found == wanted

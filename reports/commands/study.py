@@ -10,17 +10,36 @@ from reports import jobs
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
-@click.option("-o", "--output", type=click.Path(path_type=Path),
-              help="Folder for the results. [default: out/<name of the file>]")
-@click.option("--processes", type=click.IntRange(min=1), metavar="N",
-              help="Processes on this machine. [default: one a core]")
-@click.option("--workers", type=click.IntRange(min=1), metavar="N",
-              help="Start a Dask cluster of N worker processes on this machine.")
-@click.option("--scheduler", metavar="ADDRESS",
-              help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.")
-@click.option("--findings", type=click.Path(path_type=Path), metavar="PAGE.md",
-              help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
-              " dataset beside FILE.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder for the results. [default: out/<name of the file>]",
+)
+@click.option(
+    "--processes",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine. [default: one a core]",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Start a Dask cluster of N worker processes on this machine.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.",
+)
+@click.option(
+    "--findings",
+    type=click.Path(path_type=Path),
+    metavar="PAGE.md",
+    help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
+    " dataset beside FILE.",
+)
 def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
