@@ -38,7 +38,7 @@ SYMBOLS = {
     "k_s": "k_s",
     "log2_luminance": "luminance ratio",
 }
-WORDS = ("#fde725", "#90d743", "#35b779", "#9fb8e8")
+WORDS = ("#fde725", "#5ec962", "#5aa0c8", "#c9b6e4")
 """Colours for words, light enough for the letter of the word that stands in each cell besides."""
 
 CONFIG = {
@@ -132,6 +132,9 @@ def _map(figure, table, part, data):
     else:
         cells = [{"x": row[x], "y": row[y], "value": row[column]} for row in data]
         x_axis, y_axis = (_field(axis, table, name) for axis, name in (("x", x), ("y", y)))
+        for axis, name in ((x_axis, x), (y_axis, y)):
+            if getattr(part.spans[name], "logarithmic", False):
+                axis["scale"] = {"type": "log", "nice": False}
         mark = {"type": "circle", "size": 60, "opacity": 1}
     colour = {"field": "value", "title": _label(column).split(" ")}
     if is_word:

@@ -23,7 +23,7 @@ class Page:
 
 
 def page(study, file, findings):
-    """Check the figures of a study, and find the template of its findings where they are asked for.
+    """Check a study's figures, and find the template of its findings if they are asked for.
 
     Raises
     ------
@@ -78,8 +78,8 @@ def findings(study, table, page):
     """Return the page of findings.
 
     The template asks the dataset through the functions of :class:`comparisons.study.query.Facts`,
-    so that no number is written by hand. ``figure(name)`` is the number of a figure, ``picture(name,
-    text)`` the picture itself.
+    so that no number is written by hand. ``figure(name)`` is the number of a figure, and
+    ``picture(name, text)`` the picture itself.
     """
     names = [figure["name"] for figure in study.figures]
     folder = page.file.stem
@@ -105,14 +105,14 @@ def findings(study, table, page):
 def summary(study, outcome):
     """Yield a line for each part: points, failures, and the range of the departure."""
     width = max(4, *(len(part.name) for part in study.parts))
-    yield f"{'part':<{width}}  {'points':>6}  {'failed':>6}  {'mean ΔE2000: least':>18}  median  most"
+    yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
     rows = outcome.table.to_pylist()
     for part in study.parts:
         own = [row for row in rows if row["part"] == part.name]
         good = sorted(row["dE2000"] for row in own if row["error"] is None)
         line = f"{part.name:<{width}}  {len(own):>6}  {len(own) - len(good):>6}"
         if good:
-            line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>.2f}"
+            line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
         yield line
     if outcome.at_hand:
         yield f"{outcome.at_hand} points were at hand from an earlier run."

@@ -161,7 +161,7 @@ def test_the_dataset_says_units_meanings_and_where_it_comes_from(rgb, tmp_path):
     assert "mitsuba" in json.loads(table.schema.metadata[b"versions"])
     assert not list(tmp_path.glob("*.partial"))
     (tmp_path / "bad.parquet").write_text("nothing")
-    with pytest.raises(InputError, match="bad.parquet"):
+    with pytest.raises(InputError, match=r"bad\.parquet"):
         dataset.read(tmp_path / "bad.parquet")
 
 

@@ -1,7 +1,7 @@
 """Surfaces evaluated without an image, against formulas that share nothing with kernel or Mitsuba.
 
-The facts that a study must reproduce: Fresnel's rise towards grazing, which Phong's model lacks; the
-off-specular peak; more light reflected than received for a large k_s.
+The facts that a study must reproduce: Fresnel's rise towards grazing, which Phong's model lacks;
+the off-specular peak; more light reflected than received for a large k_s.
 """
 
 import numpy as np

@@ -5,6 +5,7 @@ gives the points of a lost worker to another. A scheduler that is lost ends the 
 run goes on where it ended.
 """
 
+import logging
 from contextlib import contextmanager
 from itertools import islice
 from threading import Lock
@@ -51,15 +52,14 @@ def local(workers):
     import dask
 
     threads = max(1, cores() // workers)
-    settings = {
-        "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
-        "distributed.admin.log-format": "%(message)s",
-        "logging": {"distributed": "error"},
-    }
     with (
-        dask.config.set(settings),
+        _quiet(),
+        dask.config.set({"distributed.scheduler.allowed-failures": ALLOWED_FAILURES}),
         distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -83,7 +83,7 @@ def connected(address):
             f"no Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`, and"
             " workers with `dask worker ADDRESS --nthreads 1`, in an environment that has fotismos."
         ) from error
-    with client:
+    with _quiet(), client:
         yield lambda blocks: spread(client, blocks, None)
 
 
@@ -130,6 +130,18 @@ def _result(future, block):
         {"part": block.part.name, "point": block.first + number, **values, "error": reason}
         for number, values in enumerate(block.points)
     ]
+
+
+@contextmanager
+def _quiet():
+    """Keep Dask's own words on lost workers and schedulers from the user's terminal."""
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def _distributed():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def row(part, point):
     images, noise = _render(renderers, part.seed)
     counted = gbuffer(physical, *part.resolution).hit
     result = measure(images[0], images[-1], counted, noise)
-    result |= _steps(dict(zip(plans, zip(images, images[1:], strict=False), strict=True)), counted)
+    result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
     misses = [abs(miss.reached / miss.wanted - 1) for miss in pair.misses if miss.wanted]
     result["miss"] = max(misses, default=0.0)
     return result | (_derived(pair) if part.scene in SCENES else {})

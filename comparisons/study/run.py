@@ -72,7 +72,7 @@ def run(study, folder, spread=None, progress=None):
 
 
 def _named(block: Block, rows):
-    """Give rows the part and numbers of this block; it may stand elsewhere than when it was done."""
+    """Give rows the part and numbers of this block; it may have stood elsewhere before."""
     return [
         row | {"part": block.part.name, "point": block.first + number}
         for number, row in enumerate(rows)

@@ -88,7 +88,7 @@ def direction(theta, phi):
 
 
 def heuristic_radiance(phong, light, view):
-    """Return the :class:`Radiance` that the kernel gives, for directions (3, N) of light and viewer.
+    """Return the :class:`Radiance` of the kernel, for directions (3, N) of light and viewer.
 
     All numbers are opaque, so that one kernel serves all materials and directions.
     """

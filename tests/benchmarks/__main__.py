@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights, stability, terms
+from tests.benchmarks import kernel, lights, stability, study, terms
 
 BENCHMARKS = {
     "kernel": kernel.run,
     "lights": lights.run,
     "stability": stability.run,
+    "study": study.run,
     "terms": terms.run,
 }
 
