@@ -23,7 +23,7 @@ class Page:
 
 
 def page(study, file, findings):
-    """Check a study's figures, and find the template of its findings if they are asked for.
+    """Check a study's figures, and find the template of its findings if it is asked for.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def page(study, file, findings):
 
 
 def write(study, outcome, folder, page=None):
-    """Write dataset and figures, and the page of findings if there is one; yields lines to print."""
+    """Write dataset, figures, and the page of findings if there is one; yields lines to print."""
     place = folder / f"{study.name}.parquet"
     dataset.write(place, outcome.table)
     figures = folder / "figures"

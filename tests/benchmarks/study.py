@@ -16,7 +16,7 @@ from comparisons.study import cluster, design, point, processes  # isort: skip  
 
 import drjit as dr
 
-POINTS = 160
+POINTS = 96
 WORKERS = (1, 2, 4)
 STUDY = """
 [[part]]
