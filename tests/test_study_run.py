@@ -1,6 +1,7 @@
 """Running a study: kernels shared, work kept, processes killed, failures told."""
 
 import json
+import multiprocessing
 import os
 import signal
 
@@ -9,9 +10,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.study import cluster, dataset, design, editing, point, rendered, run
+from comparisons.study import cluster, dataset, design, editing, point, processes, rendered, run
 from comparisons.study.scenes import SCENES, bsdf
-from heuristic.errors import InputError
+from heuristic.errors import InputError, LostProcessError
 from reference import halves
 from reference.scene import Source
 
@@ -116,6 +117,41 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, mon
     assert run.run(wanted, tmp_path / "cut").done == 0
 
 
+def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
+    text = study("light_angle = [0, 30]", "lobe", "").text
+    twice = text + text.replace("scene", "name = 'again'\nscene")
+    given = []
+
+    def noted(left):
+        for block in left:
+            given.append(block)
+            yield block, point.rows(block)
+
+    table = run.run(design.parse(twice), tmp_path, noted).table
+    assert len(given) == 2
+    assert table["part"].to_pylist() == ["lobe", "lobe", "again", "again"]
+    assert table["dE2000"].to_pylist()[:2] == table["dE2000"].to_pylist()[2:]
+
+
+def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(processes, "WORTH_A_PROCESS", 1)
+    wanted = study("alpha = [0.1, 0.2, 0.3]\nlight_angle = {from=0, to=85, steps=18}", "lobe", "")
+    alone = run.run(wanted, tmp_path / "a")
+
+    def killing(given):
+        for number, done in enumerate(processes.over(2)(given)):
+            yield done
+            if number == 2:
+                os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
+
+    with pytest.raises(LostProcessError, match="run the same command again"):
+        run.run(wanted, tmp_path / "b", killing)
+    outcome = run.run(wanted, tmp_path / "b")
+    assert outcome.at_hand >= 3
+    assert outcome.done < 54
+    assert outcome.table.equals(alone.table)
+
+
 def test_other_values_and_options_are_other_points(tmp_path):
     keys = [
         blocks(study("alpha = 0.1", "sphere", more))[0].key
@@ -197,7 +233,7 @@ MANY = "alpha = 0.3\nlight_size = 2\nlight_angle = {from = 0, to = 90, steps = %
 
 
 def pids(client):
-    return list(client.run(os.getpid).values())
+    return list(client.run(os.getpid, on_error="ignore").values())
 
 
 @pytest.mark.parametrize(
@@ -213,8 +249,7 @@ def test_killed_workers_change_nothing(count, workers, rgb, tmp_path):
             from distributed import get_client
 
             client, rng = get_client(), np.random.default_rng(0)
-            victims = pids(client)
-            doomed = max(1, round(0.3 * len(victims)))
+            doomed = max(1, round(0.3 * workers))
             at = set(rng.choice(range(2, count - 2), max(1, count // 40), replace=False).tolist())
             for number, done in enumerate(spread(given)):
                 yield done

@@ -38,6 +38,11 @@ def measure(heuristic, reference, counted, noise=None):
     }
 
 
+def largest_miss(misses):
+    """Return the largest relative miss of a pairing, 0 where nothing is missed."""
+    return max((abs(miss.reached / miss.wanted - 1) for miss in misses if miss.wanted), default=0.0)
+
+
 def measure_each(heuristic, reference):
     """Return the columns of single values (N,) of grey, one array each.
 

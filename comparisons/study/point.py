@@ -10,7 +10,7 @@ import numpy as np
 
 from comparisons.study import rendered, surface
 from comparisons.study.design import Part
-from comparisons.study.measure import measure, measure_each
+from comparisons.study.measure import largest_miss, measure, measure_each
 from comparisons.study.scenes import SCENES
 from heuristic import __version__, plugins
 from heuristic.errors import FotismosError, InputError
@@ -173,5 +173,4 @@ def _lobe(part, point):
 
 
 def _shared(material):
-    misses = [abs(miss.reached / miss.wanted - 1) for miss in material.misses if miss.wanted]
-    return material.values() | {"miss": max(misses, default=0.0)}
+    return material.values() | {"miss": largest_miss(material.misses)}

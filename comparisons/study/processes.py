@@ -6,6 +6,7 @@ several processes keep all of them busy.
 
 import multiprocessing
 import os
+import signal
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 
@@ -60,4 +61,6 @@ def over(count):
 def _begin(threads):
     import drjit as dr
 
+    # Ctrl-C is for the process that asked; it ends these.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     dr.set_thread_count(threads)

@@ -9,7 +9,7 @@ import numpy as np
 
 from comparisons.scenes import builtin
 from comparisons.study.editing import EditedSource, Kept
-from comparisons.study.measure import measure
+from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
 from reference import halves
@@ -64,8 +64,7 @@ def row(part, point):
     counted = gbuffer(physical, *part.resolution).hit
     result = measure(images[0], images[-1], counted, noise)
     result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
-    misses = [abs(miss.reached / miss.wanted - 1) for miss in pair.misses if miss.wanted]
-    result["miss"] = max(misses, default=0.0)
+    result["miss"] = largest_miss(pair.misses)
     return result | (_derived(pair) if part.scene in SCENES else {})
 
 

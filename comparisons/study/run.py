@@ -57,7 +57,8 @@ def run(study, folder, spread=None, progress=None):
     blocks = [block for part in study.parts for block in point.blocks(part)]
     found = {block.key: _read(kept / f"{block.key}.json") for block in blocks}
     found = {key: rows for key, rows in found.items() if rows and not _failed(rows)}
-    left = [block for block in blocks if block.key not in found]
+    # Parts may share points; these are done once.
+    left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
     at_hand = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
