@@ -119,7 +119,7 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, mon
 
 def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
     text = study("light_angle = [0, 30]", "lobe", "").text
-    twice = text + text.replace("scene", "name = 'again'\nscene")
+    twice = f"{text}\n" + text.replace("scene", "name = 'again'\nscene")
     given = []
 
     def noted(left):
