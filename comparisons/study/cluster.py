@@ -7,7 +7,7 @@ run goes on where it ended.
 
 import logging
 from contextlib import contextmanager
-from itertools import islice
+from itertools import count, islice
 from threading import Lock
 
 from comparisons.study import point
@@ -96,36 +96,40 @@ def spread(client, blocks, threads):
         When the scheduler is lost.
     """
     from distributed import as_completed
+    from distributed.client import FutureCancelledError
 
-    waiting = iter(blocks)
-    hands = {}
+    waiting, hands, tries = iter(blocks), {}, count()
 
-    def submit(count):
-        some = list(islice(waiting, count))
-        futures = [client.submit(rows, block, threads, key=block.key) for block in some]
-        hands.update({future.key: block for future, block in zip(futures, some, strict=True)})
+    def submit(some):
+        futures = []
+        for block in some:
+            future = client.submit(rows, block, threads, key=f"{block.key}-{next(tries)}")
+            hands[future.key] = block
+            futures.append(future)
         return futures
 
     workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-    queue = as_completed(submit(AHEAD * workers))
+    queue = as_completed(submit(islice(waiting, AHEAD * workers)))
     for future in queue:
         block = hands.pop(future.key)
-        yield block, _result(future, block)
-        queue.update(submit(1))
+        try:
+            result = future.result()
+        except FutureCancelledError as error:
+            if client.status != "running":
+                raise LostProcessError(
+                    "the Dask scheduler is gone. All finished points are kept; run the same command"
+                    " again, and it goes on from there."
+                ) from error
+            queue.update(submit([block]))  # its rows were lost with the worker that held them
+            continue
+        # A worker that died too often with it, or one that cannot import fotismos.
+        except Exception as error:
+            result = _failed(block, f"{type(error).__name__}: {error}")
+        yield block, result
+        queue.update(submit(islice(waiting, 1)))
 
 
-def _result(future, block):
-    """Return the rows of a finished block, or rows that say why it did not finish."""
-    if future.status in ("cancelled", "lost"):
-        raise LostProcessError(
-            "the Dask scheduler is gone. All finished points are kept; run the same command again,"
-            " and it goes on from there."
-        )
-    try:
-        return future.result()
-    # A worker that died too often with it, or one that cannot import fotismos: the study goes on.
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
+def _failed(block, reason):
     return [
         {"part": block.part.name, "point": block.first + number, **values, "error": reason}
         for number, values in enumerate(block.points)
