@@ -5,7 +5,8 @@
     FotismosError
     ├── InputError         a scene, value or option that cannot be used     exit code 2
     ├── InstallationError  something that must be on the machine is not     exit code 2
-    └── NonFiniteError     a NaN or an infinity in an image                 exit code 1
+    ├── NonFiniteError     a NaN or an infinity in an image                 exit code 1
+    └── LostProcessError   a process that work was given to is gone         exit code 1
 
 A message names the value, what is allowed and what to do next. The command line prints it without
 a traceback and leaves with the class's `exit_code`.
@@ -32,5 +33,11 @@ class InstallationError(FotismosError):
 
 class NonFiniteError(FotismosError):
     """A NaN or an infinity in an image; the message says in which, and where."""
+
+    exit_code = 1
+
+
+class LostProcessError(FotismosError):
+    """A process, or a scheduler, that work was given to is gone; what it finished is kept."""
 
     exit_code = 1

@@ -10,7 +10,7 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import check, compare, cost, doctor, fit, plan, report, scenes
+from reports.commands import check, compare, cost, doctor, fit, plan, report, scenes, study
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -26,6 +26,7 @@ for command in (
     fit.fit,
     check.check,
     report.report,
+    study.study,
     scenes.scenes,
     doctor.doctor,
 ):

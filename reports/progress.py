@@ -23,14 +23,14 @@ class Bar:
 
 
 @contextmanager
-def shown():
+def shown(unit="passes"):
     """Show progress on standard error while the block runs, if that is a terminal."""
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("passes"),
+        TextColumn(unit),
         TimeRemainingColumn(),
     )
     with Progress(

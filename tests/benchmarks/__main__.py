@@ -7,13 +7,14 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights, scaling, stability, terms
+from tests.benchmarks import kernel, lights, scaling, stability, study, terms
 
 BENCHMARKS = {
     "kernel": kernel.run,
     "lights": lights.run,
     "scaling": scaling.run,
     "stability": stability.run,
+    "study": study.run,
     "terms": terms.run,
 }
 

@@ -1,0 +1,61 @@
+"""The columns of a study's dataset: unit and meaning of each."""
+
+from dataclasses import dataclass
+
+from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its unit, ``1`` for pure numbers, its meaning, and its Python type."""
+
+    unit: str
+    meaning: str
+    kind: type = float
+
+
+LUMINANCE = "display-linear, 1 for a white diffuse surface that faces the light"
+IDENTITY = {
+    "part": Column("", "part of the study", str),
+    "point": Column("", "number of the point in its part", int),
+}
+PARAMETERS = {
+    name: Column(parameter.unit, parameter.meaning)
+    for scene in SCENES.values()
+    for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
+}
+RESULTS = {
+    "heuristic": Column("1", f"mean of the heuristic image, {LUMINANCE}"),
+    "reference": Column("1", f"mean of the reference, {LUMINANCE}"),
+    "dE2000": Column("1", "CIE DE2000, mean"),
+    "dE2000_p95": Column("1", "CIE DE2000, 95th percentile"),
+    "dE2000_noise": Column("1", "CIE DE2000 that the noise of the comparison alone would give"),
+    "dE2000_shape": Column("1", "CIE DE2000, mean, after the best exposure"),
+    "exposure": Column("1", "factor on the heuristic image that makes CIE DE2000 smallest"),
+    "dE_ITP": Column("1", "ΔE ITP (ITU-R BT.2124) at 203 cd/m² for white, mean"),
+    "dE_CAM16UCS": Column("1", "distance in CAM16-UCS, mean"),
+    "rmse": Column("1", "root mean square difference, display-linear"),
+    "log2_luminance": Column("stops", "mean ratio of luminances, heuristic to reference"),
+    "form": Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
+    "occlusion": Column("1", "RMS change by shadows"),
+    "interreflection": Column("1", "RMS change by light reflected more than once"),
+    "dominant": Column("", "the largest of form, occlusion and interreflection", str),
+    "specular_heuristic": Column(
+        "1", "the heuristic's specular part (scene lobe: in the mirror direction)"
+    ),
+    "specular_reference": Column(
+        "1", "the reference's specular part (scene lobe: in the mirror direction)"
+    ),
+    "albedo_heuristic": Column("1", "share of the light that the heuristic reflects"),
+    "albedo_reference": Column("1", "share of the light that the reference reflects"),
+    "specular_albedo_heuristic": Column("1", "share that the heuristic's specular part reflects"),
+    "specular_albedo_reference": Column("1", "share that the reference's specular part reflects"),
+    "peak_heuristic": Column(
+        "deg", "view angle at which the heuristic's specular part peaks, in the plane of incidence"
+    ),
+    "peak_reference": Column(
+        "deg", "view angle at which the reference's specular part peaks, in the plane of incidence"
+    ),
+    "miss": Column("1", "largest relative miss of the pairing, 0 where it is met"),
+    "error": Column("", "why there is no result; empty where there is one", str),
+}

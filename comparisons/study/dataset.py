@@ -1,0 +1,72 @@
+"""Rows as one Parquet file, with units, meanings and provenance in its schema."""
+
+import json
+import os
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from comparisons.record import versions
+from comparisons.study.columns import IDENTITY, PARAMETERS, RESULTS, Column
+from heuristic.errors import InputError
+
+TYPES = {str: pa.string(), int: pa.int64(), float: pa.float64()}
+
+
+def table(study, rows):
+    """Return the rows of a study as a ``pyarrow.Table``.
+
+    Each field's metadata has ``unit`` and ``description``; the schema's has ``title``, ``study``
+    (the TOML text) and ``versions`` (JSON). Columns that no row has are left out; of the others,
+    what a row does not have is null. No time or place is noted, so that equal studies are equal.
+    """
+    present = {name for row in rows for name, value in row.items() if value is not None}
+    present |= {"part", "point", "error"}
+    paths = sorted(present - {*IDENTITY, *PARAMETERS, *RESULTS})
+    own = {path: Column("", "parameter of the scene, by its path") for path in paths}
+    columns = IDENTITY | PARAMETERS | own | RESULTS
+    columns = {name: column for name, column in columns.items() if name in present}
+    schema = pa.schema(
+        [
+            pa.field(
+                name,
+                TYPES[column.kind],
+                metadata={"unit": column.unit, "description": column.meaning},
+            )
+            for name, column in columns.items()
+        ],
+        metadata={
+            "title": study.title,
+            "study": study.text,
+            "versions": json.dumps(versions(), ensure_ascii=False),
+        },
+    )
+    return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in rows], schema)
+
+
+def write(path, data):
+    """Write a table to a Parquet file, which appears whole or not at all."""
+    path = Path(path)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        pq.write_table(data, partial, compression="zstd")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read(path):
+    """Read a dataset.
+
+    Raises
+    ------
+    InputError
+        When it is missing, or no Parquet file.
+    """
+    try:
+        return pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise InputError(
+            f"{path} cannot be read as a dataset: {error}. Run the study again."
+        ) from error

@@ -1,0 +1,254 @@
+"""The design of a study, as a TOML file states it: which points, of which scenes.
+
+::
+
+    title = "Roughness and incidence"
+
+    [[part]]
+    name = "lobe"
+    scene = "lobe"                 # a study scene, a built-in scene, or a Mitsuba file
+    design = "grid"                # or "random", or "sobol", with points = 256
+    pairing = "matched"            # or "literal"
+
+    [part.parameters]
+    alpha = { from = 0.05, to = 0.8, steps = 16, scale = "log" }
+    light_angle = [0, 30, 60]
+    int_ior = 1.5
+
+What is not named has its default. A part of a scene that is rendered may set ``resolution`` and
+``spp`` too. Figures (``[[figure]]``) are read by :mod:`reports.study_charts`.
+"""
+
+import tomllib
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED
+from comparisons.study.values import Fixed, Span, values
+from heuristic.errors import InputError
+from reference.pairing import Convention
+
+DESIGNS = ("grid", "random", "sobol")
+LARGEST = 1_000_000
+KEYS = {"name", "scene", "design", "points", "pairing", "resolution", "spp", "seed", "parameters"}
+
+
+@dataclass(frozen=True)
+class Part:
+    """One design over one scene.
+
+    Attributes
+    ----------
+    name
+        In the dataset's column ``part``.
+    scene
+        Name in :data:`comparisons.study.scenes.SCENES`, of a built-in scene, or path of a file.
+    design
+        ``grid``: all combinations; ``random``: independent and uniform (in the logarithm where the
+        scale is); ``sobol``: the scrambled Sobol sequence, a power of 2 of points.
+    spans
+        What each parameter runs over, by name, slowest first in a grid.
+    count
+        Number of points of a random or Sobol design.
+    seed
+        Of the design and of the renderings.
+    resolution, spp
+        Of rendered scenes; ``spp`` is over all passes.
+    """
+
+    name: str
+    scene: str
+    spans: dict
+    design: str = "grid"
+    count: int = 0
+    convention: Convention = Convention.MATCHED
+    seed: int = 0
+    resolution: tuple[int, int] = (64, 64)
+    spp: int = 64
+
+    def points(self):
+        """Return the points in order, each a dictionary from parameter to value."""
+        names = list(self.spans)
+        if self.design == "grid":
+            table = product(*(span.values() for span in self.spans.values()))
+        else:
+            unit = _unit_points(self.design, len(names), self.count, self.seed)
+            table = zip(
+                *(span.at(u) for span, u in zip(self.spans.values(), unit.T, strict=True)),
+                strict=True,
+            )
+        return [dict(zip(names, map(float, row), strict=True)) for row in table]
+
+    @property
+    def varying(self):
+        """The parameters that take more than one value."""
+        return tuple(name for name, span in self.spans.items() if not isinstance(span, Fixed))
+
+
+@dataclass(frozen=True)
+class Study:
+    """A whole study: its title, its parts, its figures as written, and the file's text."""
+
+    name: str
+    title: str
+    parts: tuple[Part, ...]
+    text: str
+    figures: tuple[dict, ...] = field(default=())
+
+
+def read(path):
+    """Read a study from a TOML file.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, it is no TOML, or something in it is not allowed: naming it,
+        what is allowed, and what to do.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: {reason}. Give the TOML file of a study.") from error
+    try:
+        return parse(text, path.stem, path.parent)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def parse(text, name="study", folder=Path()):
+    """Make a study out of the text of a TOML file; scene files are sought in ``folder``.
+
+    Raises
+    ------
+    InputError
+        As :func:`read`.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"this is no TOML: {error}.") from error
+    _known(table, {"title", "part", "figure"}, "the study")
+    parts = table.get("part")
+    if not isinstance(parts, list) or not parts:
+        raise InputError("there is nothing to do: give one table [[part]] or more.")
+    parts = tuple(_part(part, folder) for part in parts)
+    names = [part.name for part in parts]
+    if len(set(names)) < len(names):
+        raise InputError(f"parts are called {', '.join(names)}: give each a name of its own.")
+    return Study(name, table.get("title", name), parts, text, tuple(table.get("figure", ())))
+
+
+def _part(table, folder):
+    scene = table.get("scene")
+    if not isinstance(scene, str):
+        raise InputError(f"a part has no scene. Study scenes are {', '.join(SCENES)}.")
+    name = table.get("name", scene)
+    where = f"part {name!r}"
+    _known(table, KEYS, where)
+    design = _choice(table, "design", DESIGNS, where)
+    given = table.get("parameters", {})
+    if not isinstance(given, dict) or not given:
+        raise InputError(
+            f"{where}: there is nothing to vary. Name parameters in [part.parameters]."
+        )
+    known = _parameters(scene, given, where)
+    spans = {}
+    for key, parameter in known.items():
+        raw = given.get(key, parameter.default)
+        spans[key] = values(raw, parameter, design == "grid", f"{where}: {key}")
+    part = Part(
+        name=name,
+        scene=str(folder / scene) if scene.endswith(".xml") else scene,
+        spans=spans,
+        design=design,
+        count=_whole(table, "points", 0, where),
+        convention=Convention(_choice(table, "pairing", ("matched", "literal"), where)),
+        seed=_whole(table, "seed", 0, where),
+        resolution=_resolution(table, where),
+        spp=_whole(table, "spp", 64, where, least=4),
+    )
+    _check_size(part, where)
+    return part
+
+
+def _parameters(scene, given, where):
+    """Return the parameters of a part's scene, those that change its structure most first."""
+    if scene not in SCENES:
+        return dict.fromkeys(given, UNLIMITED)
+    phong, plastic = (set(given) & set(material) for material in (PHONG, ROUGHPLASTIC))
+    if phong and plastic:
+        raise InputError(
+            f"{where}: {', '.join(sorted(phong | plastic))} are parameters of both materials. Give"
+            " those of one; pairing derives the other."
+        )
+    known = (PHONG if phong else ROUGHPLASTIC) | SCENES[scene].parameters
+    _known(given, {*PHONG, *ROUGHPLASTIC, *SCENES[scene].parameters}, where)
+    return known
+
+
+def _known(table, names, where):
+    for key in table:
+        if key not in names:
+            raise InputError(
+                f"{where}: {key!r} is not known. Known are {', '.join(sorted(names))}."
+            )
+
+
+def _choice(table, key, choices, where):
+    chosen = table.get(key, choices[0])
+    if chosen not in choices:
+        raise InputError(f"{where}: {key} = {chosen!r}: choose one of {', '.join(choices)}.")
+    return chosen
+
+
+def _whole(table, key, default, where, least=0):
+    value = table.get(key, default)
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise InputError(f"{where}: {key} = {value!r}: give an integer of {least} or more.")
+    return value
+
+
+def _resolution(table, where):
+    value = table.get("resolution", [64, 64])
+    fits = isinstance(value, list) and len(value) == 2
+    if not fits or not all(isinstance(side, int) and 1 <= side <= 4096 for side in value):
+        raise InputError(
+            f"{where}: resolution = {value!r}: give [width, height], from 1 to 4096 each."
+        )
+    return tuple(value)
+
+
+def _check_size(part, where):
+    """Refuse a design without points, with too many, or of a size that has no Sobol sequence."""
+    if part.design == "grid":
+        size = int(np.prod([len(span.values()) for span in part.spans.values()], dtype=float))
+    else:
+        size = part.count
+    if not 1 <= size <= LARGEST:
+        raise InputError(
+            f"{where}: the design {part.design!r} has {size} points: from 1 to {LARGEST} are"
+            " possible. Random and Sobol designs take their number from `points`."
+        )
+    if part.design == "sobol" and size & (size - 1):
+        lower = 1 << (size.bit_length() - 1)
+        raise InputError(
+            f"{where}: points = {size}: a Sobol design has a power of 2, such as {lower} or"
+            f" {2 * lower}."
+        )
+    if part.design != "grid" and not any(isinstance(span, Span) for span in part.spans.values()):
+        raise InputError(f"{where}: no parameter has a range to draw from.")
+
+
+def _unit_points(design, dimensions, count, seed):
+    """Return points of the unit cube, (count, dimensions)."""
+    if design == "sobol":
+        return qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
+            count.bit_length() - 1
+        )
+    return np.random.default_rng(seed).random((count, dimensions))

@@ -1,0 +1,176 @@
+"""One block of points to rows: a pure function, the same in any process."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from itertools import groupby
+from json import dumps
+from pathlib import Path
+
+import numpy as np
+
+from comparisons.study import rendered, surface
+from comparisons.study.design import Part
+from comparisons.study.measure import largest_miss, measure, measure_each
+from comparisons.study.scenes import SCENES
+from heuristic import __version__, plugins
+from heuristic.errors import FotismosError, InputError
+from reference import direct
+from reference.scene import set_variant
+
+VARIANT = "llvm_ad_rgb"
+PEAK_STEP = 0.05
+"""Degrees between the directions among which a lobe's peak is sought."""
+
+LARGEST_BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class Block:
+    """Points of one part that are evaluated together: ``first`` is the number of the first."""
+
+    part: Part
+    first: int
+    points: tuple[dict, ...]
+
+    @property
+    def key(self):
+        """A name made out of all that the rows depend on, so that equal blocks are done once."""
+        part = self.part
+        content = {
+            "version": __version__,
+            "scene": part.scene,
+            "pairing": part.convention.value,
+            "seed": part.seed,
+            "resolution": part.resolution,
+            "spp": part.spp,
+            "points": self.points,
+        }
+        if part.scene.endswith(".xml") and Path(part.scene).is_file():
+            content["file"] = sha256(Path(part.scene).read_bytes()).hexdigest()
+        return sha256(dumps(content).encode()).hexdigest()[:32]
+
+
+def blocks(part):
+    """Return the blocks of a part: single points, or those that differ in directions alone."""
+    scene = SCENES.get(part.scene)
+    together = scene.together if scene else ()
+
+    def alike(numbered):
+        number, point = numbered
+        if not together:
+            return number
+        return [value for name, value in point.items() if name not in together]
+
+    found, first = [], 0
+    for _, group in groupby(enumerate(part.points()), alike):
+        points = [point for _, point in group]
+        for begin in range(0, len(points), LARGEST_BLOCK):
+            some = tuple(points[begin : begin + LARGEST_BLOCK])
+            found.append(Block(part, first, some))
+            first += len(some)
+    return found
+
+
+def check(part):
+    """See that a part's scene is there, and that paths into it lead to numbers.
+
+    Raises
+    ------
+    InputError
+        Naming what is not there.
+    """
+    if part.scene not in SCENES:
+        _prepare()
+        try:
+            rendered.source(part, next(iter(part.points()))).parse()
+        except InputError as error:
+            raise InputError(f"part {part.name!r}: {error}") from error
+
+
+def rows(block):
+    """Evaluate a block; return one row a point, as dictionaries.
+
+    A point that fails has its parameters and, in the column ``error``, what went wrong.
+    """
+    _prepare()
+    part = block.part
+    try:
+        results = _results(part, block.points)
+        error = None
+    # Whatever went wrong with one point must not end a study of thousands.
+    except Exception as failure:
+        kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
+        results, error = [{} for _ in block.points], f"{kind}{failure}"
+    return [
+        {"part": part.name, "point": block.first + number, **point, **result, "error": error}
+        for number, (point, result) in enumerate(zip(block.points, results, strict=True))
+    ]
+
+
+def _prepare():
+    set_variant(VARIANT)
+    plugins.register()
+    direct.register()
+
+
+def _results(part, points):
+    if part.scene == "patch":
+        return _patch(part, points)
+    if part.scene == "lobe":
+        return [_lobe(part, point) for point in points]
+    return [rendered.row(part, point) for point in points]
+
+
+def _patch(part, points):
+    """Return what is seen of a surface of one material from one direction each."""
+    material = surface.material(points[0], part.convention)
+    angles = {
+        name: np.array([point[name] for point in points])
+        for name in ("light_angle", "view_angle", "azimuth")
+    }
+    light = surface.direction(angles["light_angle"], 180.0)
+    view = surface.direction(angles["view_angle"], angles["azimuth"])
+    heuristic = surface.heuristic_radiance(material.phong, light, view)
+    reference = surface.reference_radiance(material.plastic, light, view)
+    columns = measure_each(heuristic.total, reference.total)
+    columns["specular_heuristic"] = heuristic.specular
+    columns["specular_reference"] = reference.specular
+    columns = {name: np.broadcast_to(values, len(points)) for name, values in columns.items()}
+    return [
+        {name: float(values[number]) for name, values in columns.items()} | _shared(material)
+        for number in range(len(points))
+    ]
+
+
+def _lobe(part, point):
+    """Return the departure over all views, the albedos, and where the specular part peaks.
+
+    Statistics are over views of equal projected solid angle: each sees as much of the surface.
+    """
+    material, angle = surface.material(point, part.convention), point["light_angle"]
+    plane = surface.direction(np.arange(0, 90, PEAK_STEP), 0.0)
+    mirror = surface.direction(angle, 0.0)
+    parts = (surface.views(), surface.hemisphere().view, plane, mirror)
+    view = np.concatenate(parts, axis=1)
+    light = np.broadcast_to(surface.direction(angle, 180.0), view.shape)
+    splits = np.cumsum([part.shape[1] for part in parts])[:-1]
+    result, images = _shared(material), []
+    for name, radiance in (
+        ("heuristic", surface.heuristic_radiance(material.phong, light, view)),
+        ("reference", surface.reference_radiance(material.plastic, light, view)),
+    ):
+        seen, hemisphere, _, _ = np.split(radiance.total, splits)
+        _, specular, in_plane, mirrored = np.split(radiance.specular, splits)
+        images.append(np.repeat(seen[None, :, None], 3, axis=2))
+        result[f"albedo_{name}"] = surface.albedo(hemisphere, angle)
+        result[f"specular_albedo_{name}"] = surface.albedo(specular, angle)
+        result[f"specular_{name}"] = float(mirrored[0])
+        highest = in_plane > in_plane.max() * (1 - 1e-6)
+        if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
+            result[f"peak_{name}"] = float(np.argmax(in_plane)) * PEAK_STEP
+    counted = np.ones(images[0].shape[:2], bool)
+    return result | measure(*images, counted)
+
+
+def _shared(material):
+    return material.values() | {"miss": largest_miss(material.misses)}

@@ -1,0 +1,109 @@
+"""Asking a dataset: rows of a part at given parameters, and single values of them."""
+
+from math import isclose
+
+import numpy as np
+import pyarrow as pa
+
+from heuristic.errors import InputError
+
+
+def rows(table, part, where=None):
+    """Return the rows of a part that have a result, as dictionaries.
+
+    ``where`` maps columns to a value or a list of values; numbers match to six digits.
+
+    Raises
+    ------
+    InputError
+        When there is no such part or column, or nothing matches: naming what there is.
+    """
+    where = where or {}
+    parts = sorted(set(table["part"].to_pylist()))
+    if part not in parts:
+        raise InputError(f"there is no part {part!r}. There are {', '.join(parts)}.")
+    for name in where:
+        require(table, name)
+    chosen = table.filter(pa.array([value == part for value in table["part"].to_pylist()]))
+    found = [
+        row
+        for row in chosen.to_pylist()
+        if row["error"] is None and all(_matches(row[name], value) for name, value in where.items())
+    ]
+    if not found:
+        raise InputError(f"no point of part {part!r} has {where or 'a result'}.")
+    return found
+
+
+def require(table, column):
+    """See that there is a column.
+
+    Raises
+    ------
+    InputError
+        Listing the columns, when there is not.
+    """
+    if column not in table.column_names:
+        raise InputError(
+            f"there is no column {column!r}. There are {', '.join(table.column_names)}."
+        )
+
+
+def unit(table, column):
+    """Return the unit of a column, as its metadata has it."""
+    return table.schema.field(column).metadata[b"unit"].decode()
+
+
+class Facts:
+    """Single values of a dataset, for a page of findings."""
+
+    def __init__(self, table):
+        self._table = table
+
+    def value(self, part, column, **where):
+        """Return a column's value at one point, or its mean over the points that match."""
+        return float(np.mean(self._values(part, column, where)))
+
+    def largest(self, part, column, **where):
+        """Return the largest value of a column."""
+        return float(max(self._values(part, column, where)))
+
+    def smallest(self, part, column, **where):
+        """Return the smallest value of a column."""
+        return float(min(self._values(part, column, where)))
+
+    def quantile(self, part, column, q, **where):
+        """Return a quantile of a column."""
+        return float(np.quantile(self._values(part, column, where), q))
+
+    def share_below(self, part, column, limit, **where):
+        """Return the share of points whose value is below a limit."""
+        return float(np.mean(np.array(self._values(part, column, where)) < limit))
+
+    def share_of(self, part, column, name, **where):
+        """Return the share of points whose value is a word."""
+        return float(np.mean([value == name for value in self._values(part, column, where)]))
+
+    def at_largest(self, part, column, parameter, **where):
+        """Return a parameter's value where a column is largest."""
+        return max(rows(self._table, part, where), key=lambda row: row[column])[parameter]
+
+    def at_smallest(self, part, column, parameter, **where):
+        """Return a parameter's value where a column is smallest."""
+        return min(rows(self._table, part, where), key=lambda row: row[column])[parameter]
+
+    def count(self, part):
+        """Return the number of points of a part that have a result."""
+        return len(rows(self._table, part))
+
+    def _values(self, part, column, where):
+        require(self._table, column)
+        return [row[column] for row in rows(self._table, part, where) if row[column] is not None]
+
+
+def _matches(found, wanted):
+    if isinstance(wanted, list):
+        return any(_matches(found, value) for value in wanted)
+    if isinstance(found, float):
+        return isclose(found, wanted, rel_tol=1e-6, abs_tol=1e-9)
+    return found == wanted

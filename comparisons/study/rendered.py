@@ -1,0 +1,129 @@
+"""A point that is rendered: both halves with the same camera rays, and the steps between them."""
+
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from comparisons.scenes import builtin
+from comparisons.study.editing import EditedSource, Kept
+from comparisons.study.measure import largest_miss, measure
+from comparisons.study.scenes import SCENES, bsdf
+from heuristic.errors import InputError
+from reference import halves
+from reference.gbuffer import gbuffer
+from reference.plan import plan, sampler
+from reference.rendering import Accumulator, Renderer, physical_integrator
+from reference.scene import Source
+
+PASSES = 4
+"""Few passes of many samples: small images cost a launch each, and the samples of one pass are
+stratified. Four are enough to see what noise is left."""
+
+STEPS = ("form", "occlusion", "interreflection")
+"""What lies between the halves, in the order in which it is added to the heuristic image: the form
+of BSDFs and lights, shadows, and light reflected more than once."""
+
+
+def row(part, point):
+    """Render a point and return its columns.
+
+    ``form``, ``occlusion`` and ``interreflection`` are the root mean square changes of the image as
+    each of :data:`STEPS` is simulated too; ``dominant`` names the largest.
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    pair = halves.pair(source(part, point), part.convention, part.resolution)
+    kept = _kept(part.scene)
+    physical = kept[1].scene(halves.with_sampler(pair.physical, sampler()))
+    chosen = plan(pair, physical)
+    heuristic = kept[0].scene(halves.with_sampler(pair.heuristic, chosen.sampler))
+    spp = part.spp // PASSES
+    direct = replace(
+        chosen, integrator="direct_all", max_depth=2, shadows=False, tabulate_environment=False
+    )
+    plans = {"form": direct}
+    if chosen.shadows:
+        plans["occlusion"] = replace(direct, shadows=True)
+    if chosen.max_depth != 2:
+        plans["interreflection"] = chosen
+    else:
+        plans[list(plans)[-1]] = chosen
+    renderers = [Renderer(heuristic, None, spp, "heuristic image")]
+    for stage in plans.values():
+        integrator = physical_integrator(stage, physical, pair.hide_emitters)
+        renderers.append(Renderer(physical, integrator, spp, "reference image"))
+    images, noise = _render(renderers, part.seed)
+    counted = gbuffer(physical, *part.resolution).hit
+    result = measure(images[0], images[-1], counted, noise)
+    result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
+    result["miss"] = largest_miss(pair.misses)
+    return result | (_derived(pair) if part.scene in SCENES else {})
+
+
+def source(part, point):
+    """Return the scene of a point, for :func:`reference.pair`.
+
+    Raises
+    ------
+    InputError
+        When a part's scene is neither a study scene nor a file nor built in, or not in RGB.
+    """
+    if part.scene in SCENES:
+        return Source(part.scene, lambda: SCENES[part.scene].make(point, bsdf(point)))
+    if part.scene.endswith(".xml"):
+        return EditedSource(Source(Path(part.scene).stem, part.scene), point)
+    scene = builtin(part.scene)
+    if scene.variant != "llvm_ad_rgb":
+        raise InputError(f"{part.scene} needs {scene.variant}: studies are in RGB so far.")
+    return EditedSource(scene.source(), point)
+
+
+@lru_cache(maxsize=4)
+def _kept(scene):
+    """Return the scenes at hand of both halves, for all points of a scene in this process."""
+    return Kept(), Kept()
+
+
+def _render(renderers, seed):
+    """Render all in turn; return their mean images, and the noise of first less last."""
+    sums = [Accumulator() for _ in renderers]
+    difference = Accumulator()
+    for number in range(PASSES):
+        passes = [renderer.render(seed + number) for renderer in renderers]
+        for total, image in zip(sums, passes, strict=True):
+            total.add(image)
+        difference.add(passes[0] - passes[-1])
+    return [total.estimate().mean for total in sums], difference.estimate().noise
+
+
+def _steps(stages, counted):
+    """Return the root mean square change of each step, and the name of the largest."""
+    sizes = dict.fromkeys(STEPS, 0.0)
+    for name, (before, after) in stages.items():
+        change = (after - before).mean(axis=2)[counted]
+        sizes[name] = float(np.sqrt(np.mean(change**2))) if change.size else 0.0
+    return sizes | {"dominant": max(sizes, key=sizes.get)}
+
+
+def _derived(pair):
+    """Return the parameters of the material that pairing derived, by their names in a study."""
+    for record in pair.bsdfs:
+        given = record.parameters
+        if (record.given, record.derived) == ("roughplastic", "phong"):
+            return {"n": given["n"], "k_d": given["k_d"][0], "k_s": given["k_s"][0]}
+        if (record.given, record.derived) == ("phong", "roughplastic"):
+            reflectance = given["diffuse_reflectance"][0]
+            return {
+                "alpha": given["alpha"],
+                "int_ior": given["int_ior"],
+                "reflectance": reflectance,
+            }
+    return {}

@@ -1,0 +1,164 @@
+"""What a study can vary: parametrised scenes of the project's own, and their parameters.
+
+Two need no image. A flat surface under parallel light is one radiance in each direction, and the
+kernel and Mitsuba's BSDF give it at once (:mod:`comparisons.study.surface`). The others are
+rendered. All materials are grey. Lights give the irradiance ``pi`` where the surface (the centre of
+the sphere) faces them, so that a white diffuse surface has the value 1 there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, inf, radians, sin, tan
+
+import mitsuba as mi
+
+CAMERA_DISTANCE, LIGHT_DISTANCE = 8.0, 10.0
+"""Of the scene ``sphere``, in radii: the lamp, however large, is behind the camera."""
+
+ROOM, CEILING = 4.0, 3.9
+"""Of the scene ``enclosure``, in radii: half the room's side, and the lamp's height."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: its unit, allowed range (``low`` and ``high`` included), and meaning."""
+
+    unit: str
+    low: float
+    high: float
+    default: float
+    meaning: str
+
+
+ROUGHPLASTIC = {
+    "alpha": Parameter("1", 0.02, 1, 0.3, "roughness of roughplastic: root mean square slope"),
+    "int_ior": Parameter("1", 1.05, 4, 1.5, "index of refraction of roughplastic"),
+    "reflectance": Parameter("1", 0, 1, 0.5, "diffuse reflectance of roughplastic"),
+}
+PHONG = {
+    "n": Parameter("1", 0, 1e4, 9, "Phong's exponent"),
+    "k_d": Parameter("1", 0, 1, 0.5, "diffuse coefficient of Phong's model"),
+    "k_s": Parameter("1", 0, 1e4, 0.5, "specular coefficient of Phong's model"),
+}
+LIGHT_ANGLE = Parameter("deg", 0, 89, 45, "angle between the light and the normal")
+VIEW_ANGLE = Parameter("deg", 0, 89, 45, "angle between the viewer and the normal")
+AZIMUTH = Parameter("deg", 0, 180, 0, "azimuth of the viewer; 0 is the side of the mirror image")
+PHASE_ANGLE = Parameter("deg", 0, 90, 45, "angle between the light and the viewer at the centre")
+LIGHT_SIZE = Parameter("deg", 0.1, 120, 2, "angular diameter of the lamp, from the centre")
+WALL_ALBEDO = Parameter("1", 0, 0.95, 0.5, "reflectance of the walls")
+
+
+@dataclass(frozen=True)
+class StudyScene:
+    """A parametrised scene.
+
+    Attributes
+    ----------
+    title
+        A sentence on what is compared.
+    parameters
+        Its own parameters by name; each scene has those of one of the two materials besides.
+    make
+        Makes the dictionary for ``mitsuba.load_dict`` out of a point and a BSDF; None for scenes
+        that are evaluated without an image.
+    together
+        Parameters that vary within one block of points, because they are evaluated at once.
+    """
+
+    title: str
+    parameters: dict[str, Parameter]
+    make: Callable[[dict, dict], dict] | None = None
+    together: tuple[str, ...] = ()
+
+
+def bsdf(point):
+    """Return the dictionary of the material that a point gives, ``roughplastic`` or ``phong``."""
+    if "n" in point:
+        return {"type": "phong", "k_d": point["k_d"], "k_s": point["k_s"], "n": point["n"]}
+    return {
+        "type": "roughplastic",
+        "alpha": point["alpha"],
+        "int_ior": point["int_ior"],
+        "ext_ior": 1.0,
+        "diffuse_reflectance": point["reflectance"],
+    }
+
+
+def _sphere(point, material):
+    angle = radians(point["light_angle"])
+    place = (LIGHT_DISTANCE * sin(angle), 0.0, LIGHT_DISTANCE * cos(angle))
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "hide_emitters": True},
+        "sensor": _camera((0, 0, CAMERA_DISTANCE), (0, 0, 0), (0, 1, 0), 16.0),
+        "sphere": {"type": "sphere", "bsdf": material},
+        "lamp": _lamp(place, LIGHT_DISTANCE, point["light_size"]),
+    }
+
+
+def _enclosure(point, material):
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "hide_emitters": True},
+        "sensor": _camera((0, -3.8, 0.5), (0, 0, -0.4), (0, 0, 1), 60.0),
+        "sphere": {"type": "sphere", "bsdf": material},
+        "walls": {
+            "type": "cube",
+            "flip_normals": True,
+            "to_world": mi.ScalarTransform4f().scale(ROOM),
+            "bsdf": {"type": "diffuse", "reflectance": point["wall_albedo"]},
+        },
+        "lamp": _lamp((0.0, 0.0, CEILING), CEILING, point["light_size"]),
+    }
+
+
+def _lamp(place, distance, size):
+    """A disk that faces the origin: seen under an angle, it gives the irradiance ``pi`` there.
+
+    A disk of radiance ``L`` and half angle ``a`` gives ``E = pi L sin^2(a)`` on its axis.
+    """
+    half = radians(size) / 2
+    # Any vector will do that is not parallel to the axis; lamps are in the plane y = 0.
+    to_world = mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 1, 0))
+    return {
+        "type": "disk",
+        "to_world": to_world.scale(distance * tan(half)),
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {"type": "area", "radiance": 1 / sin(half) ** 2},
+    }
+
+
+def _camera(place, target, up, field_of_view):
+    return {
+        "type": "perspective",
+        "fov": field_of_view,
+        "to_world": mi.ScalarTransform4f().look_at(place, target, up),
+        "film": {"type": "hdrfilm", "rfilter": {"type": "box"}},
+    }
+
+
+SCENES = {
+    "patch": StudyScene(
+        "a flat surface under parallel light, from one direction",
+        {"light_angle": LIGHT_ANGLE, "view_angle": VIEW_ANGLE, "azimuth": AZIMUTH},
+        together=("light_angle", "view_angle", "azimuth"),
+    ),
+    "lobe": StudyScene(
+        "a flat surface under parallel light, from all directions",
+        {"light_angle": LIGHT_ANGLE},
+    ),
+    "sphere": StudyScene(
+        "a sphere under a round lamp far away",
+        {"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE},
+        _sphere,
+    ),
+    "enclosure": StudyScene(
+        "a sphere in a closed room of diffuse walls, under a round lamp at the ceiling",
+        {"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO},
+        _enclosure,
+    ),
+}
+"""The scenes by name. Any other scene can be studied through paths to its parameters."""
+
+UNLIMITED = Parameter("", -inf, inf, 0, "a parameter of the scene, by its path")
+"""What is known of a parameter of a user's own scene."""

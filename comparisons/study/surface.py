@@ -1,0 +1,188 @@
+"""A flat surface under parallel light, evaluated without an image: kernel against Mitsuba's BSDF.
+
+The light has the heuristic intensity 1, so the irradiance ``pi`` on a surface that faces it. The
+surface lies in the plane z = 0, the light in the plane y = 0 on the side of negative x, so that its
+mirror image is at the azimuth 0. Directions point away from the surface.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+import heuristic
+from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from heuristic.numerics import is_moderate
+from reference import pairing
+from reference.albedo import RoughPlastic
+from reference.pairing import Convention, Miss, Phong
+
+HEIGHTS, AZIMUTHS = 240, 120
+"""Directions of the quadrature over the hemisphere, half of it for symmetry."""
+
+VIEW_HEIGHTS, VIEW_AZIMUTHS = 96, 64
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material in both models, with what the pairing misses."""
+
+    phong: Phong
+    plastic: RoughPlastic
+    misses: tuple[Miss, ...]
+
+    def values(self):
+        """Return the values of all parameters of both models, by their names in a study."""
+        return {
+            "alpha": self.plastic.alpha,
+            "int_ior": self.plastic.int_ior,
+            "reflectance": self.plastic.diffuse_reflectance[0],
+            "n": self.phong.n,
+            "k_d": self.phong.k_d[0],
+            "k_s": self.phong.k_s[0],
+        }
+
+
+@dataclass(frozen=True)
+class Radiance:
+    """What is seen of the surface, (N,) each: the sum of diffuse and specular part, and the latter.
+
+    Display-linear: a white diffuse surface that faces the light has the value 1.
+    """
+
+    total: np.ndarray
+    specular: np.ndarray
+
+
+def material(point, convention):
+    """Return the :class:`Material` of a point, which has the parameters of one of the models."""
+    if "n" in point:
+        grey = [(point[name],) * 3 for name in ("k_d", "k_s")]
+        return _of_phong(Phong(*grey, point["n"]), convention)
+    grey = (point["reflectance"],) * 3
+    return _of_plastic(RoughPlastic(grey, point["alpha"], point["int_ior"]), convention)
+
+
+@lru_cache(maxsize=256)
+def _of_phong(phong: Phong, convention: Convention):
+    if not any(phong.k_s):
+        # Pairing makes it a plain diffuse surface, which a roughplastic is not.
+        return Material(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
+    plastic, misses = pairing.to_roughplastic(phong, convention)
+    return Material(phong, plastic, tuple(misses))
+
+
+@lru_cache(maxsize=256)
+def _of_plastic(plastic: RoughPlastic, convention: Convention):
+    phong, misses = pairing.to_phong(plastic, convention)
+    return Material(phong, plastic, tuple(misses))
+
+
+def direction(theta, phi):
+    """Return unit vectors (3, N) from polar angles and azimuths in degrees."""
+    angles = np.broadcast_arrays(np.atleast_1d(theta), phi)
+    theta, phi = map(np.deg2rad, angles)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
+def heuristic_radiance(phong, light, view):
+    """Return the :class:`Radiance` of the kernel, for directions (3, N) of light and viewer.
+
+    All numbers are opaque, so that one kernel serves all materials and directions.
+    """
+    number = dr.leaf_t(mi.Float)
+    k_d, k_s, n = (dr.opaque(number, v) for v in (phong.k_d[0], phong.k_s[0], phong.n))
+    count = light.shape[1]
+    sun = heuristic.DirectionalLight(-mi.Vector3f(light), dr.opaque(number, 1.0))
+    parts = [
+        heuristic.shade(
+            dr.zeros(mi.Point3f, count),
+            mi.Normal3f(0, 0, 1),
+            mi.Vector3f(view),
+            heuristic.Material(
+                k_d=coefficients[0], k_s=coefficients[1], n=n, n_is_moderate=is_moderate(phong.n)
+            ),
+            [sun],
+        )
+        for coefficients in ((k_d, k_s), (0, k_s))
+    ]
+    return Radiance(*(np.array(part, float) for part in parts))
+
+
+def reference_radiance(plastic, light, view):
+    """Return the :class:`Radiance` of Mitsuba's BSDF, for directions (3, N) of light and viewer."""
+    bsdf = _bsdf(plastic)
+    si = dr.zeros(mi.SurfaceInteraction3f, light.shape[1])
+    si.wi = mi.Vector3f(view)
+    context = mi.BSDFContext()
+    total = bsdf.eval(context, si, mi.Vector3f(light))
+    context.type_mask = +mi.BSDFFlags.DiffuseReflection
+    diffuse = bsdf.eval(context, si, mi.Vector3f(light))
+    dr.eval(total, diffuse)
+    total, diffuse = (
+        IRRADIANCE_PER_INTENSITY * np.atleast_2d(np.array(value, float))[0]
+        for value in (total, diffuse)
+    )
+    return Radiance(total, total - diffuse)
+
+
+@lru_cache(maxsize=8)
+def _bsdf(plastic: RoughPlastic):
+    if plastic.int_ior == plastic.ext_ior:
+        return mi.load_dict({"type": "diffuse", "reflectance": plastic.diffuse_reflectance[0]})
+    return mi.load_dict(
+        {
+            "type": "roughplastic",
+            "alpha": plastic.alpha,
+            "int_ior": plastic.int_ior,
+            "ext_ior": plastic.ext_ior,
+            "diffuse_reflectance": plastic.diffuse_reflectance[0],
+            "specular_reflectance": plastic.specular_reflectance[0],
+        }
+    )
+
+
+@dataclass(frozen=True)
+class Hemisphere:
+    """Directions of the viewer over half the hemisphere, with weights for means and albedos.
+
+    ``weight`` is in proportion to the projected solid angle, and adds up to 1.
+    """
+
+    view: np.ndarray
+    weight: np.ndarray
+
+
+@lru_cache(maxsize=1)
+def hemisphere():
+    """Return the :class:`Hemisphere` by Gauss-Legendre nodes in polar angle and in azimuth."""
+    x, w = np.polynomial.legendre.leggauss(HEIGHTS)
+    theta, w = (x + 1) * 45, w / 2
+    y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
+    phi, v = (y + 1) * 90, v / 2
+    theta, phi = np.meshgrid(theta, phi)
+    weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
+    return Hemisphere(direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum())
+
+
+@lru_cache(maxsize=1)
+def views():
+    """Return directions of the viewer, (3, N), each for the same projected solid angle.
+
+    Over half the hemisphere: the centres of cells of equal steps in ``sin^2(theta)`` and azimuth.
+    """
+    height = (np.arange(VIEW_HEIGHTS) + 0.5) / VIEW_HEIGHTS
+    azimuth = (np.arange(VIEW_AZIMUTHS) + 0.5) * 180 / VIEW_AZIMUTHS
+    theta, phi = np.meshgrid(np.rad2deg(np.arcsin(np.sqrt(height))), azimuth)
+    return direction(theta.ravel(), phi.ravel())
+
+
+def albedo(radiance, light_angle):
+    """Return the share of the light that leaves the surface, from radiances over the hemisphere.
+
+    ``pi mean(L) / (pi cos(theta))``, the mean over projected solid angle: exitance over
+    irradiance.
+    """
+    return float(hemisphere().weight @ radiance / np.cos(np.deg2rad(light_angle)))

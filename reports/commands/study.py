@@ -1,0 +1,77 @@
+"""``fotismos study``: how the departure behaves over a space of scenes."""
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import click
+
+from reports import jobs
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder for the results. [default: out/<name of the file>]",
+)
+@click.option(
+    "--processes",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine. [default: one a core]",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Start a Dask cluster of N worker processes on this machine.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.",
+)
+@click.option(
+    "--findings",
+    type=click.Path(path_type=Path),
+    metavar="PAGE.md",
+    help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
+    " dataset beside FILE.",
+)
+def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
+    """Compare over a grid or a random design of scenes: one dataset, and maps.
+
+    FILE.toml says which parameters of which scenes vary. Writes OUTPUT/<name>.parquet and
+    OUTPUT/figures/*.svg. Points that are finished are kept: a study that ends early goes on where
+    it ended when the same command is given again.
+
+    \b
+    Examples:
+      fotismos study studies/phong-roughplastic.toml
+      fotismos study my_study.toml --workers 4
+      fotismos study my_study.toml --scheduler tcp://head:8786 -o results
+    """  # noqa: D301 click reads the \b as: keep these lines
+    given = [name for name in (processes, workers, scheduler) if name is not None]
+    if len(given) > 1:
+        raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
+    jobs.check_installation()
+    from comparisons.study import cluster, design, run
+    from comparisons.study import processes as pool
+    from reports import output as files
+    from reports import progress, studying
+
+    wanted = design.read(file)
+    page = studying.page(wanted, file, findings)
+    folder = files.prepare(output or Path("out", wanted.name))
+    if scheduler:
+        spreading = cluster.connected(scheduler)
+    elif workers:
+        spreading = cluster.local(workers)
+    else:
+        spreading = nullcontext(pool.over(processes or pool.cores()))
+    with spreading as spread, progress.shown("points") as bar:
+        outcome = run.run(wanted, folder, spread, bar.of(wanted.name))
+    for line in studying.write(wanted, outcome, folder, page):
+        click.echo(line)
