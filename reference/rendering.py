@@ -18,6 +18,7 @@ import numpy as np
 from heuristic.errors import NonFiniteError
 from reference import direct
 from reference.environment import AlbedoTable
+from reference.preparation import PATHS
 
 
 @dataclass(frozen=True)
@@ -166,9 +167,9 @@ def variant(name):
 def physical_integrator(plan, scene, hide_emitters):
     """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
-    if plan.integrator == "path":
-        description = {"type": "path", "hide_emitters": hide_emitters, "max_depth": plan.max_depth}
-        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
+    if plan.integrator in PATHS:
+        description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+        return mi.load_dict(description | {"max_depth": plan.max_depth, "rr_depth": plan.rr_depth})
     integrator = mi.load_dict(
         {
             "type": plan.integrator,

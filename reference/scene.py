@@ -12,7 +12,7 @@ from pathlib import Path
 import mitsuba as mi
 
 from heuristic.errors import InputError
-from heuristic.plugins import lights
+from heuristic.plugins import lights, mapped
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -21,7 +21,10 @@ KINDS_OF_OWN_PLUGINS = {
     "phong": mi.ObjectType.BSDF,
     "heuristic": mi.ObjectType.Integrator,
     "heuristic_glow": mi.ObjectType.Emitter,
-} | dict.fromkeys(lights.KINDS, mi.ObjectType.Emitter)
+    "heuristic_tilt": mi.ObjectType.Texture,
+}
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(lights.KINDS, mi.ObjectType.Emitter)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
@@ -104,15 +107,17 @@ class Graph:
         self.config = config
         self.state = state
         self.folders = []  # temporary ones with files that nodes refer to
+        self.kinds = {}  # of plugins written in Python
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
+        copy.kinds = self.kinds
         return copy
 
-    def instantiate(self):
-        """Make the Mitsuba scene, without merging shapes.
+    def instantiate(self, index=0):
+        """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
 
         Raises
         ------
@@ -120,6 +125,8 @@ class Graph:
             With Mitsuba's own message when a plugin refuses its parameters.
         """
         state = Parser.ParserState(self.state)
+        if index:
+            state.nodes[0] = Parser.SceneNode(state.nodes[index])
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
@@ -137,9 +144,20 @@ class Graph:
     def kind(self, index):
         """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
         kind = self.state.nodes[index].type
-        if kind == mi.ObjectType.Unknown:
-            return KINDS_OF_OWN_PLUGINS.get(self.plugin(index), kind)
-        return kind
+        if kind != mi.ObjectType.Unknown:
+            return kind
+        plugin = self.plugin(index)
+        if plugin not in self.kinds:
+            self.kinds[plugin] = KINDS_OF_OWN_PLUGINS.get(plugin) or self._kind_of_object(index)
+        return self.kinds[plugin]
+
+    def _kind_of_object(self, index):
+        """Return the kind of a user's own plugin: that of the object that it makes."""
+        made = self.instantiate(index)
+        for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
+            if isinstance(made, getattr(mi, kind)):
+                return getattr(mi.ObjectType, kind)
+        return mi.ObjectType.Unknown
 
     def plugin(self, index):
         """Return the name of a node's plugin."""
