@@ -160,7 +160,7 @@ def _set_integrator(graph, ambient, settings, interpolation, prune):
         prune=prune,
     )
     if ambient is not None:
-        props["ambient"] = ambient
+        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from reference.nearest.probe import WAVELENGTHS, as_value
+from reference.nearest.probe import WAVELENGTHS, as_value, opaque_wavelengths
 
 SAMPLES = 65_536
 LATTICE = (1, 19_463)
@@ -123,9 +123,10 @@ def _wavelengths():
 
 def _at(it, wavelengths):
     if wavelengths is not None:
-        it.wavelengths = mi.Spectrum(*map(float, wavelengths))
+        it.wavelengths = opaque_wavelengths(wavelengths)
     return it
 
 
 def _channel_means(spectrum):
-    return np.array([np.mean(np.array(channel, float)) for channel in spectrum])
+    """Return the mean of each channel; sky models dip a little below 0, which no light can."""
+    return np.array([max(np.mean(np.array(channel, float)), 0.0) for channel in spectrum])

@@ -145,10 +145,10 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
 
 def _stock(pair):
     """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media."""
-    if not pair.media:
-        return "path"
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator
+    if not pair.media:
+        return "path"
     graph = pair.physical
     extinctions = (
         graph.props(index).get(key, 0.0)

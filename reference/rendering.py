@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import NonFiniteError
+from heuristic.errors import InputError, NonFiniteError
 from reference import direct
 from reference.environment import AlbedoTable
 from reference.preparation import PATHS
@@ -120,20 +120,27 @@ class Renderer:
 
         Raises
         ------
+        InputError
+            With Mitsuba's own reason when it cannot render the scene.
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
         """
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
-            image = mi.render(
-                self.scene,
-                integrator=self.integrator,
-                spp=self.spp,
-                seed=dr.opaque(mi.UInt32, seed),
-            )
-            dr.eval(image)
-            dr.sync_thread()
+            try:
+                image = mi.render(
+                    self.scene,
+                    integrator=self.integrator,
+                    spp=self.spp,
+                    seed=dr.opaque(mi.UInt32, seed),
+                )
+                dr.eval(image)
+                dr.sync_thread()
+            except RuntimeError as error:
+                raise InputError(
+                    f"{self.label}: Mitsuba cannot render it: {_reason(error)}"
+                ) from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
@@ -181,6 +188,13 @@ def physical_integrator(plan, scene, hide_emitters):
     if plan.tabulate_environment:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
+
+
+def _reason(error):
+    """Return the message of the error that began a chain of them."""
+    while (cause := error.__cause__ or error.__context__) is not None:
+        error = cause
+    return str(error).strip()
 
 
 def _require_finite(image, label, seed):

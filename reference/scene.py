@@ -5,6 +5,7 @@ dictionary, and knows the file and line of each node, which is what error messag
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -93,7 +94,10 @@ class Source:
             raise InputError(
                 f"{self.name}: this is no scene. Its outermost element must be a scene."
             )
-        return Graph(self.name, config, state)
+        graph = Graph(self.name, config, state)
+        if not isinstance(content, Mapping):
+            graph.folder = path.resolve().parent
+        return graph
 
 
 class Graph:
@@ -108,12 +112,14 @@ class Graph:
         self.state = state
         self.folders = []  # temporary ones with files that nodes refer to
         self.kinds = {}  # of plugins written in Python
+        self.folder = None  # where relative names of files begin
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
         copy.kinds = self.kinds
+        copy.folder = self.folder
         return copy
 
     def instantiate(self, index=0):
@@ -132,7 +138,8 @@ class Graph:
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
         try:
-            made = Parser.instantiate(self.config, state)
+            with _files_from(self.folder):
+                made = Parser.instantiate(self.config, state)
         except RuntimeError as error:
             raise InputError(f"{self.name}: {_message(error)}") from error
         return made[0] if isinstance(made, list) else made
@@ -224,6 +231,22 @@ class Graph:
                 if isinstance(value, Reference):
                     queue.append(value.index())
         return sorted(seen)
+
+
+@contextmanager
+def _files_from(folder):
+    """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
+    if folder is None:
+        yield
+        return
+    before = mi.file_resolver()
+    widened = mi.FileResolver(before)
+    widened.prepend(str(folder))
+    mi.set_file_resolver(widened)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
 
 
 def _message(error):

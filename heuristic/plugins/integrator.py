@@ -132,8 +132,8 @@ def _through_layers(integrator, scene, ray, active):
     layer = mi.UInt32(0)
     while active & (layer < LAYERS):
         seen, hit, si = integrator.layer(scene, ray, active)
-        colour += throughput * seen
-        throughput *= SceneMaterials(scene).transmittance(si, hit)
+        colour += throughput * mi.Spectrum(seen)
+        throughput *= mi.Spectrum(SceneMaterials(scene).transmittance(si, hit))
         hit_any |= hit
         ray = si.spawn_ray(ray.d)
         active = hit & (dr.max(throughput) > 0)

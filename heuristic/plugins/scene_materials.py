@@ -121,7 +121,7 @@ def _bsdfs(scene):
     class Below(mi.TraversalCallback):
         """Collects the outermost BSDFs below an object."""
 
-        def put(self, name, value, flags):
+        def put(self, name, value, *details):
             if isinstance(value, mi.BSDF):
                 found.setdefault(value)
             elif isinstance(value, mi.Object):

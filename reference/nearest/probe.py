@@ -93,8 +93,15 @@ def interaction(size, wavelengths=None):
     si.uv = mi.Point2f(points[3], points[4])
     si.wi = mi.Vector3f(0, 0, 1)
     if wavelengths is not None:
-        si.wavelengths = mi.Spectrum(*map(float, wavelengths))
+        si.wavelengths = opaque_wavelengths(wavelengths)
     return si, points[:3]
+
+
+def opaque_wavelengths(wavelengths):
+    """Return four wavelengths as one spectrum that compiles the same kernel for all."""
+    found = mi.Spectrum(*map(float, wavelengths))
+    dr.make_opaque(found)
+    return found
 
 
 def _at(bsdf, wavelengths):
