@@ -59,7 +59,8 @@ def _serialized():
 
 
 def _ellipsoids(path):
-    names = "x y z nx ny nz scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split()
+    names = [*"xyz", "nx", "ny", "nz", *(f"scale_{i}" for i in range(3))]
+    names += [f"rot_{i}" for i in range(4)]
     rows = np.zeros((2, len(names)), "<f4")
     rows[:, 0], rows[:, 6:9], rows[:, 9] = (-0.5, 0.5), -1.5, 1
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]

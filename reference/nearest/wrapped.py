@@ -71,23 +71,24 @@ def blend(context, index):
 
 
 def normal_map(context, index):
-    """``normalmap``: the nested material, with the mapped normal."""
-    ((_, child),) = context.graph.children(index, BSDF)
-    return _tilted(context, child, normals=context.graph.props(index)["normalmap"])
+    """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
+    return _tilted(context, index, normals=context.graph.props(index)["normalmap"])
 
 
 def bump_map(context, index):
-    """``bumpmap``: the nested material, with the normal of the displaced surface."""
-    graph = context.graph
-    ((_, child),) = graph.children(index, BSDF)
-    ((key, _),) = graph.children(index, TEXTURE)
+    """``bumpmap``: the nested material, with the displaced surface's normal (as there)."""
+    ((key, _),) = context.graph.children(index, TEXTURE)
     scale = float(context.value(index, "scale", 1.0))
-    return _tilted(context, child, heights=graph.props(index)[key], scale=scale)
+    return _tilted(context, index, heights=context.graph.props(index)[key], scale=scale)
 
 
-def _tilted(context, child, **values):
+def _tilted(context, index, **values):
+    ((_, child),) = context.graph.children(index, BSDF)
     inner = context.nearest(child)
     lost = inner.lost
+    if context.value(index, "use_shadowing_function", True):
+        lost += (("shadows that mapped bumps cast on each other", "none"),)
+    values["flip"] = context.value(index, "flip_invalid_normals", True)
     if inner.tilt is not None:
         lost += (("nested normal maps", "the outer one alone"),)
     tilt = operations.node(context.graph, "heuristic_tilt", **values)
