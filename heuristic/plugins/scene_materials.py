@@ -20,16 +20,14 @@ class SceneMaterials:
 
     def __init__(self, scene, prune=True):
         self.prune = prune
-        numbers = {}
-        places = {}
-        for bsdf in _bsdfs(scene):
+        self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
+        for bsdf in self.bsdfs:
             if not hasattr(bsdf, "material"):
                 raise InputError(
                     f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is no phong. The integrator heuristic"
                     " renders the heuristic half of a pair, which reference.pair makes."
                 )
-            places[_registry_index(bsdf)] = numbers.setdefault(bsdf, len(numbers))
-        self.bsdfs = list(numbers)
+        places = {_registry_index(bsdf): number for number, bsdf in enumerate(self.bsdfs)}
         self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
 
     def at(self, si, active):
@@ -38,6 +36,8 @@ class SceneMaterials:
         There is one pair for each form of the lobe that the scene has, since the form decides on
         the kernel's code; the mask tells where it holds.
         """
+        if not self.bsdfs:
+            return []  # a scene without shapes
         if len(self.bsdfs) == 1:
             return [(self.bsdfs[0].material(si, active, self.prune), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))

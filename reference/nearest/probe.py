@@ -5,14 +5,15 @@ At normal incidence, by a rank-1 lattice of samples that also covers the texture
 * albedos of what is reflected and of what passes through, as ``sample`` weighs it (light as
   particles, so that a refraction's change of solid angle does not count);
 * the diffuse part ``k_d = pi f``, with the BRDF ``f`` 60 degrees off the normal, beside the lobe;
-* the lobe's width from the second moment of what is left, over half vectors: for Beckmann's lobe
-  the mean of ``tan^2`` is ``alpha^2``.
+* the lobe's width from the median slope of what is left, over half vectors: for Beckmann's lobe
+  ``tan^2`` is distributed exponentially, with the median ``alpha^2 ln 2``. A mean would rest on the
+  tail, which is where the diffuse part is not quite even.
 
 Textures are averaged.
 """
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sin
+from math import cos, log, pi, radians, sin
 
 import drjit as dr
 import mitsuba as mi
@@ -136,7 +137,7 @@ def _means(value):
 
 
 def _width(bs, weight, up, diffuse):
-    """Return the root mean square slope of the half vectors of what is not diffuse."""
+    """Return the root mean square slope of the lobe beside the diffuse part, by its median."""
     weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
     cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
     density = np.array(bs.pdf, float)
@@ -144,6 +145,8 @@ def _width(bs, weight, up, diffuse):
     # Of each sample's weight, f cos / pdf, the diffuse part is k_d cos / (pi pdf).
     share = np.where(delta, 0, np.mean(diffuse) * cosine / (np.pi * np.maximum(density, 1e-30)))
     weights = np.maximum(weights - share, 0)
-    slope = (1 - cosine) / (1 + cosine)  # tan^2 of half the angle to the normal
-    slope = np.where(delta, 0, slope)
-    return float(np.sqrt(np.sum(weights * slope) / max(np.sum(weights), 1e-30)))
+    slope = np.where(delta, 0, (1 - cosine) / (1 + cosine))  # tan^2 of half the angle
+    order = np.argsort(slope)
+    reached = np.cumsum(weights[order])
+    median = slope[order][np.searchsorted(reached, reached[-1] / 2)] if reached[-1] > 0 else 0.0
+    return float(np.sqrt(median / log(2)))
