@@ -143,7 +143,9 @@ def compare(source, options=None, progress=None, command="", kept=None):
             "reference": record.times_data(reference.pass_times()),
             "stages": stages.seconds,
         },
-        "unrepresentable": [],
+        "unrepresentable": record.unrepresentable_data(ready.pair),
+        "integrator_given": ready.pair.integrator,
+        "overridden": record.overridden_data(ready.pair, ready.plan, reference.spp * ready.passes),
         "warnings": list(ready.pair.warnings),
         "versions": record.versions(),
         "command": command,
@@ -161,6 +163,7 @@ def _pair(source, options):
         options.interpolation,
         options.tessellation,
         prune=not options.everything,
+        sensor=options.sensor,
     )
 
 

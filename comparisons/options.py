@@ -36,6 +36,8 @@ class Options:
         spectral reference.
     everything
         Switch off all pruning, in the kernel and in the reference.
+    sensor
+        Number of the sensor, of several, from 0.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class Options:
     viewing: Viewing = DEFAULT_VIEWING
     heuristic_variant: str | None = None
     everything: bool = False
+    sensor: int = 0
 
     def __post_init__(self):
         if self.spp is not None and self.spp < 2:

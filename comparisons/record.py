@@ -58,9 +58,40 @@ def pairing_data(pair):
             }
             for record in pair.bsdfs
         ],
-        "emitters": [asdict(record) for record in pair.emitters],
+        "emitters": [
+            {key: value for key, value in asdict(record).items() if key != "lost"}
+            for record in pair.emitters
+        ],
         "misses": [asdict(miss) for miss in pair.misses],
     }
+
+
+def unrepresentable_data(pair):
+    """Return what the heuristic model has no form for: where it is, and what is taken instead."""
+    found = [
+        (record.name, record.given, lost, nearest)
+        for record in pair.bsdfs
+        for lost, nearest in record.lost
+    ]
+    found += [
+        (record.name, record.given, record.lost, record.note)
+        for record in pair.emitters
+        if record.lost
+    ]
+    found += [(name, plugin, "participating medium", "left out") for name, plugin in pair.media]
+    names = ("name", "plugin", "lost", "nearest")
+    return [dict(zip(names, entry, strict=True)) for entry in dict.fromkeys(found)]
+
+
+def overridden_data(pair, plan, spp):
+    """Return what the scene asks for and does not get, and what it gets instead."""
+    found = [asdict(entry) for entry in pair.overridden]
+    for entry in found:
+        if entry["what"] == "sampler":
+            entry["used"] = f"{plan.sampler}, {spp} samples a pixel"
+    if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
+        found.append({"what": "rr_depth", "given": str(pair.rr_depth), "used": str(plan.rr_depth)})
+    return found
 
 
 def plan_data(plan, spp, passes):

@@ -156,7 +156,7 @@ def of_scene(scene, width, height, sensor=0):
     """Collect the :class:`Surfaces` that the centres of a scene's pixels see."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     place = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
-    ray, _ = scene.sensors()[sensor].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
+    ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
 

@@ -53,6 +53,35 @@ def of_roughplastic(plastic):
     return Albedo(diffuse, specular)
 
 
+def of_smooth_plastic(level, int_ior, ext_ior, nonlinear):
+    """Return the diffuse albedo of Mitsuba's ``plastic`` for one reflectance, and the mirror's.
+
+    The latter is Fresnel's at normal incidence, ``((n_i - n_e) / (n_i + n_e))^2``.
+    """
+    bsdf = mi.load_dict(
+        {
+            "type": "plastic",
+            "diffuse_reflectance": float(level),
+            "int_ior": float(int_ior),
+            "ext_ior": float(ext_ior),
+            "nonlinear": nonlinear,
+        }
+    )
+    theta, weight = nodes(1.0)
+    si, wo = _head_on(theta)
+    value = bsdf.eval(mi.BSDFContext(), si, wo)
+    return float(weight @ np.array(value[0])), ((int_ior - ext_ior) / (int_ior + ext_ior)) ** 2
+
+
+def _head_on(theta):
+    """Return interactions at normal incidence, and directions at polar angles."""
+    si = dr.zeros(mi.SurfaceInteraction3f, len(theta))
+    si.wi = mi.Vector3f(0, 0, 1)
+    if mi.is_spectral:
+        si.wavelengths = 550.0  # any will do: all spectra here are uniform
+    return si, mi.Vector3f(mi.Float(np.sin(theta)), 0, mi.Float(np.cos(theta)))
+
+
 def _parts(plastic, level):
     """Return the diffuse albedo for one reflectance, and the specular one for unit reflectance."""
     bsdf = mi.load_dict(
@@ -67,11 +96,7 @@ def _parts(plastic, level):
         }
     )
     theta, weight = nodes(plastic.alpha)
-    si = dr.zeros(mi.SurfaceInteraction3f, NODES)
-    si.wi = mi.Vector3f(0, 0, 1)
-    if mi.is_spectral:
-        si.wavelengths = 550.0  # any will do: all spectra here are uniform
-    wo = mi.Vector3f(mi.Float(np.sin(theta)), 0, mi.Float(np.cos(theta)))
+    si, wo = _head_on(theta)
     # Each part by itself: near an IOR of 1 their difference from the whole would be rounding. Which
     # component is which is told by its flags, not by its place.
     parts = []

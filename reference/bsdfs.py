@@ -1,13 +1,12 @@
 """Replacing the BSDFs of a scene by their counterparts, after the conventions of pairing."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 
 import mitsuba as mi
 
-from heuristic.errors import InputError
 from reference import pairing, values
-from reference.albedo import RoughPlastic
+from reference.nearest import WRAPPERS, nearest_of
 from reference.pairing import Convention, Phong
 from reference.scene import properties
 
@@ -16,89 +15,93 @@ COLOURS = {
     "diffuse": ("reflectance",),
     "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
     "phong": ("k_i", "k_a", "k_d", "k_s"),
-    "twosided": (),
 }
-"""The BSDFs that can be paired, and their colours."""
+"""Colours that are read when a scene is paired, and checked before."""
 
 
 @dataclass(frozen=True)
 class PairedBSDF:
-    """What a BSDF was replaced by, and what the replacement misses."""
+    """What a BSDF was replaced by, what the replacement misses, and what it has no form for."""
 
     name: str
     given: str
     derived: str
     parameters: dict
-    misses: tuple = field(default=())
-
-
-def to_heuristic(graph, convention):
-    """Replace every physical BSDF of the graph by ``phong``; returns a :class:`PairedBSDF` each."""
-    return _replace(graph, convention, _phong_properties)
-
-
-def to_physical(graph, convention):
-    """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
-    return _replace(graph, convention, _physical_properties)
+    misses: tuple = ()
+    lost: tuple = ()
 
 
 def give_default(graph):
     """Give shapes without a BSDF the one that Mitsuba gives them, so that it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
         if not graph.children(shape, BSDF) and not graph.children(shape, mi.ObjectType.Shape):
-            default = graph.add(BSDF, properties("diffuse", reflectance=0.5))
-            graph.attach(shape, "bsdf", default)
+            glows = graph.children(shape, mi.ObjectType.Emitter)
+            default = properties("diffuse", reflectance=0.0 if glows else 0.5)
+            graph.attach(shape, "bsdf", graph.add(BSDF, default))
 
 
 def check(graph):
-    """Refuse BSDFs that are not in the pairing table, and coefficients that are no reflectances.
+    """Refuse coefficients that are no reflectances.
 
     Raises
     ------
     InputError
-        Naming the plugin and its place, or the coefficient and its value.
+        Naming the coefficient and its value.
     """
     for index in graph.nodes(BSDF):
-        plugin = graph.plugin(index)
-        if plugin not in COLOURS:
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: the BSDF {plugin!r} cannot be paired yet."
-                f" Known are {', '.join(COLOURS)}."
-            )
-        values.check_colours(graph, index, COLOURS[plugin])
-        if plugin == "twosided" and len(graph.children(index, BSDF)) != 1:
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: twosided with two different sides cannot be"
-                " paired yet. Give one BSDF."
-            )
+        values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
 
 
-def _replace(graph, convention, convert):
-    """Apply ``convert(graph, index, convention) -> (properties, record) or None`` to all BSDFs."""
+def to_heuristic(graph, convention):
+    """Replace the BSDFs of all shapes by the nearest ``phong`` (:mod:`reference.nearest`).
+
+    Returns
+    -------
+    list of PairedBSDF
+        One for each BSDF that was not ``phong``, nested ones included, those around them not.
+    """
+    nodes = graph.nodes(BSDF)
+    found = {}
+    for shape in graph.nodes(mi.ObjectType.Shape):
+        for _, index in graph.children(shape, BSDF):
+            nearest_of(graph, index, convention, found)
+    records = [
+        PairedBSDF(
+            graph.label(index),
+            graph.plugin(index),
+            "phong",
+            _shown(graph, index, material),
+            material.misses,
+            material.lost,
+        )
+        for index, material in sorted(found.items())
+        if graph.plugin(index) not in ("phong", *WRAPPERS)
+    ]
+    for index in nodes:
+        if index in found:
+            graph.replace(index, found[index].properties())
+    return records
+
+
+def to_physical(graph, convention):
+    """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
     records = []
     for index in graph.nodes(BSDF):
-        if graph.plugin(index) == "twosided":
-            continue
-        converted = convert(graph, index, convention)
+        converted = _physical_properties(graph, index, convention)
         if converted is not None:
             props, record = converted
             graph.replace(index, props)
             records.append(record)
     for index in graph.nodes(BSDF):
-        if graph.plugin(index) == "twosided":
-            _fold_twosided(graph, index)
-        elif graph.plugin(index) != "phong":
+        if graph.plugin(index) not in WRAPPERS:
             _unfold_twosided(graph, index)
     return records
 
 
-def _fold_twosided(graph, index):
-    """Turn ``twosided`` around a ``phong`` into the phong's own parameter."""
-    ((_, inner),) = graph.children(index, BSDF)
-    if graph.plugin(inner) == "phong":
-        props = mi.Properties(graph.props(inner))
-        props["twosided"] = True
-        graph.replace(index, props)
+def _shown(graph, index, material):
+    if graph.plugin(index) == "diffuse":
+        return {"k_d": "reflectance"}
+    return material.parameters()
 
 
 def _unfold_twosided(graph, index):
@@ -111,21 +114,6 @@ def _unfold_twosided(graph, index):
         outer = mi.Properties("twosided")
         graph.replace(index, outer)
         graph.attach(index, "bsdf", graph.add(BSDF, inner))
-
-
-def _phong_properties(graph, index, convention):
-    plugin = graph.plugin(index)
-    if plugin == "phong":
-        return None
-    if plugin == "diffuse":
-        given = graph.props(index)
-        reflectance = given.get("reflectance", 0.5)
-        props = properties("phong", k_a=reflectance, k_d=reflectance)
-        return props, PairedBSDF(graph.label(index), "diffuse", "phong", {"k_d": "reflectance"})
-    found, misses = _phong_of(_roughplastic(graph, index), convention)
-    props = properties("phong", k_a=found.k_d, **asdict(found))
-    record = PairedBSDF(graph.label(index), "roughplastic", "phong", asdict(found), tuple(misses))
-    return props, record
 
 
 def _physical_properties(graph, index, convention):
@@ -166,25 +154,6 @@ def phong(graph, index):
         form=props.get("form", "phong"),
         normalised=props.get("normalised", False),
     )
-
-
-def _roughplastic(graph, index):
-    """Read a roughplastic's parameters, with Mitsuba's defaults."""
-    props = graph.props(index)
-    return RoughPlastic(
-        diffuse_reflectance=values.colour(graph, index, "diffuse_reflectance", 0.5),
-        alpha=values.number(graph, index, "alpha", 0.1),
-        int_ior=values.index_of_refraction(graph, index, "int_ior", "polypropylene"),
-        ext_ior=values.index_of_refraction(graph, index, "ext_ior", "air"),
-        specular_reflectance=values.colour(graph, index, "specular_reflectance", 1.0),
-        distribution=props.get("distribution", "beckmann"),
-        nonlinear=props.get("nonlinear", False),
-    )
-
-
-@lru_cache(maxsize=256)
-def _phong_of(plastic: RoughPlastic, convention: Convention):
-    return pairing.to_phong(plastic, convention)
 
 
 @lru_cache(maxsize=256)

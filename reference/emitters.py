@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
 from heuristic.lights import INVERSE_SQUARE
 from reference import values
 
@@ -22,14 +21,14 @@ COLOURS = {
     "heuristic_spot": "intensity",
     "heuristic_directional": "intensity",
 }
-"""The emitters that can be paired, and their colour."""
+"""The emitters that are paired by their parameters, and their colour."""
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
 
 @dataclass(frozen=True)
 class PairedEmitter:
-    """What a light was replaced by, and the factor between the two intensities."""
+    """What a light was replaced by, the factor between the intensities, and what has no form."""
 
     name: str
     given: str
@@ -37,23 +36,20 @@ class PairedEmitter:
     factor: float
     exact: bool
     note: str = ""
+    lost: str = ""
 
 
 def check(graph):
-    """Refuse emitters that are not in the pairing table.
+    """Refuse intensities that are negative or not finite.
 
     Raises
     ------
     InputError
-        Naming the plugin and its place.
+        Naming the parameter, its value and its place.
     """
     for index in graph.nodes(EMITTER):
-        if graph.plugin(index) not in COLOURS:
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: the emitter {graph.plugin(index)!r} cannot be"
-                f" paired yet. Known are {', '.join(COLOURS)}."
-            )
-        values.check_colours(graph, index, (COLOURS[graph.plugin(index)],))
+        if graph.plugin(index) in COLOURS:
+            values.check_colours(graph, index, (COLOURS[graph.plugin(index)],))
 
 
 def position(graph, index):

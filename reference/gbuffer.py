@@ -44,7 +44,7 @@ def gbuffer(scene, width=GRID, height=GRID, sensor=0):
     """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     position = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
-    ray, _ = scene.sensors()[sensor].sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)

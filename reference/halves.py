@@ -15,14 +15,14 @@ from heuristic import meshes
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
-from reference import bsdfs, emitters, meshing, to_heuristic, to_physical, values
+from reference import bsdfs, emitters, meshing, preparation, to_heuristic, to_physical, values
 from reference.gbuffer import gbuffer
 from reference.pairing import Convention, Miss, specular_albedo
+from reference.preparation import Overridden
 from reference.scene import Graph, properties
 
-BSDF, EMITTER, FILM, INTEGRATOR, SENSOR, SHAPE = (
-    getattr(mi.ObjectType, kind)
-    for kind in ("BSDF", "Emitter", "Film", "Integrator", "Sensor", "Shape")
+BSDF, EMITTER, INTEGRATOR, SENSOR = (
+    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Integrator", "Sensor")
 )
 
 
@@ -42,6 +42,12 @@ class Pair:
         The scene's own limit on path length, -1 for none.
     convention, bsdfs, emitters, misses, warnings
         What was replaced by what.
+    integrator, rr_depth
+        The scene's own integrator and where it begins Russian roulette, None where not given.
+    media
+        Labels and plugins of participating media.
+    overridden
+        What the scene asks for and does not get, :class:`reference.preparation.Overridden`.
     """
 
     name: str
@@ -54,6 +60,10 @@ class Pair:
     emitters: tuple
     misses: tuple[Miss, ...]
     warnings: tuple[str, ...]
+    integrator: str | None = None
+    rr_depth: int | None = None
+    media: tuple[tuple[str, str], ...] = ()
+    overridden: tuple[Overridden, ...] = ()
 
 
 def pair(
@@ -63,6 +73,7 @@ def pair(
     interpolation=Interpolation.PHONG,
     tessellation=None,
     prune=True,
+    sensor=0,
 ):
     """Derive both halves of a scene, for the current variant.
 
@@ -81,16 +92,17 @@ def pair(
         given, it makes meshes for PHONG too.
     prune
         Whether the kernel leaves out the terms that no material has.
+    sensor
+        Number of the sensor among those of the scene.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or holds something that cannot be paired.
+        When Mitsuba cannot read the scene or make it, or it has no such sensor.
     """
     register()
     graph = source.parse()
-    _prepare(graph, resolution)
-    settings = _integrator_settings(graph)
+    settings = preparation.prepare(graph, resolution, sensor)
     geometry = cache(graph.copy().instantiate)
 
     heuristic = graph.copy()
@@ -122,17 +134,11 @@ def pair(
         emitters=tuple(lights),
         misses=tuple(miss for record in records for miss in record.misses),
         warnings=tuple(_energy_warnings(heuristic)),
+        integrator=settings.integrator,
+        rr_depth=settings.rr_depth,
+        media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
+        overridden=tuple(settings.overridden),
     )
-
-
-@dataclass(frozen=True)
-class _Settings:
-    """What the scene's own integrator asks for."""
-
-    ambient: object = None
-    hide_emitters: bool = False
-    max_depth: int = -1
-    occlusion: bool = False
 
 
 def with_sampler(graph, plugin):
@@ -145,60 +151,6 @@ def with_sampler(graph, plugin):
     return copy
 
 
-def _prepare(graph, resolution):
-    """Check the graph, and fill in what both halves need: ids, BSDFs and film."""
-    bsdfs.give_default(graph)
-    bsdfs.check(graph)
-    emitters.check(graph)
-    for shape in graph.nodes(SHAPE):
-        if not graph.props(shape).id():
-            graph.props(shape).set_id(f"shape-{shape}")
-    sensors = graph.nodes(SENSOR)
-    if not sensors:
-        raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
-    for sensor in sensors:
-        _prepare_film(graph, sensor, resolution)
-
-
-def _prepare_film(graph, sensor, resolution):
-    """Set the film to linear RGB floats, and to the resolution that was asked for."""
-    films = graph.children(sensor, FILM)
-    if not films:
-        films = [("film", graph.add(FILM, properties("hdrfilm")))]
-        graph.attach(sensor, *films[0])
-    ((_, film),) = films
-    if graph.plugin(film) != "hdrfilm":
-        raise InputError(
-            f"{graph.name}: {graph.label(film)}: the film {graph.plugin(film)!r} cannot be compared"
-            " yet. Use hdrfilm."
-        )
-    props = graph.props(film)
-    props["pixel_format"] = "luminance" if mi.is_monochromatic else "rgb"
-    props["component_format"] = "float32"
-    if resolution is not None:
-        props["width"], props["height"] = resolution
-
-
-def _integrator_settings(graph):
-    """Read the scene's integrator, and take it out: each half gets its own."""
-    settings = _Settings()
-    for index in graph.nodes(INTEGRATOR):
-        props = graph.props(index)
-        hidden = props.get("hide_emitters", None)
-        if graph.plugin(index) == "heuristic":
-            ambient = props.get("ambient", None)
-            # The chapters' background is black, though their ambient light fills the room.
-            settings = _Settings(
-                ambient=ambient,
-                hide_emitters=ambient is not None if hidden is None else hidden,
-                occlusion=props.get("occlusion", False),
-            )
-        else:
-            settings = _Settings(hide_emitters=bool(hidden), max_depth=props.get("max_depth", -1))
-        graph.remove(index)
-    return settings
-
-
 def _set_integrator(graph, ambient, settings, interpolation, prune):
     props = properties(
         "heuristic",
@@ -208,7 +160,7 @@ def _set_integrator(graph, ambient, settings, interpolation, prune):
         prune=prune,
     )
     if ambient is not None:
-        props["ambient"] = ambient
+        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 

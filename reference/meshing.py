@@ -8,6 +8,7 @@ from tempfile import mkdtemp
 import mitsuba as mi
 
 from heuristic import meshes
+from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.scene import Reference, properties
 
@@ -38,6 +39,11 @@ def replace_shapes(graph, scene, resolution, interpolation):
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(SHAPE):
         given = graph.props(index)
+        if given.id() not in shapes or graph.plugin(index) == "instance":
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: instances and their groups cannot be made"
+                " into meshes of their own. Use --interpolation phong."
+            )
         mesh = meshes.to_mesh(shapes[given.id()], resolution)
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:

@@ -12,6 +12,9 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
+a BSDF that may let light through       ``path``, whatever the depth
+participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
+                                        or its extinction has a colour
 ======================================  ===========================================================
 
 All take the sampler of least noise for its time. Where no light needs random numbers, only the
@@ -27,6 +30,8 @@ from heuristic.interpolation import Interpolation
 from reference import rules, values
 from reference.effects import Decision, Effect
 from reference.indirect import RR_DEPTH
+from reference.nearest import WRAPPERS
+from reference.nearest.operations import plain
 from reference.structure import BSDF, EMITTER, examine
 
 SAMPLER = "multijitter"
@@ -102,16 +107,22 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     if everything:
         decisions = tuple(Decision(effect, True, "asked", "--everything") for effect in Effect)
         terms = ("k_i", "k_a", "k_d", "k_s")
-        return Plan(decisions, terms, "path", pair.max_depth, sampler(True), SPP, PASSES)
+        stock = _stock(pair)
+        return Plan(decisions, terms, stock, pair.max_depth, sampler(True), SPP, PASSES)
     structure = examine(pair.physical, scene)
     occlusion, interreflection = rules.occlusion(structure), rules.interreflection(structure)
     decisions = _decisions(pair, structure, interpolation, occlusion, interreflection)
     terms = tuple(name for name in ("k_i", "k_a", "k_d", "k_s") if _present(pair.heuristic, name))
     exact = [light for light in structure.lights if light.kind in EXACT_LIGHTS]
+    rr_depth = pair.rr_depth or RR_DEPTH
+    is_clear = any(not shape.opaque for shape in structure.shapes)
+    if pair.media or is_clear or 0 <= pair.max_depth < 2:
+        stock = _stock(pair)
+        return Plan(decisions, terms, stock, pair.max_depth, SAMPLER, SPP, PASSES, rr_depth)
     if interreflection[0] and pair.max_depth != 2 and len(exact) > 1 and _diffuse(pair.physical):
         return Plan(decisions, terms, "direct_all", pair.max_depth, SAMPLER, SPP, PASSES)
     if interreflection[0] and pair.max_depth != 2:
-        return Plan(decisions, terms, "path", pair.max_depth, SAMPLER, SPP, PASSES, RR_DEPTH)
+        return Plan(decisions, terms, "path", pair.max_depth, SAMPLER, SPP, PASSES, rr_depth)
     tabulated = not occlusion[0] and _can_tabulate(pair.physical)
     random = [
         light
@@ -132,12 +143,30 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     )
 
 
+def _stock(pair):
+    """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media."""
+    if pair.integrator in ("volpath", "volpathmis"):
+        return pair.integrator
+    if not pair.media:
+        return "path"
+    graph = pair.physical
+    extinctions = (
+        graph.props(index).get(key, 0.0)
+        for index in graph.nodes(mi.ObjectType.Medium)
+        for key in ("sigma_t", "sigma_s")
+    )
+    coloured = any(isinstance(plain(value), tuple) for value in extinctions)
+    return "volpathmis" if coloured else "volpath"
+
+
 def wants_spectra(graph):
     """Tell whether a scene holds spectra that three numbers cannot stand for.
 
-    Those are tabulated spectra and black bodies; uniform values, RGB and Mitsuba's own daylight
-    (``d65``), which RGB values are relative to, are not.
+    Those are tabulated spectra, black bodies and spectral films; uniform values, RGB and Mitsuba's
+    own daylight (``d65``), which RGB values are relative to, are not.
     """
+    if any(graph.plugin(i) == "specfilm" for i in graph.nodes(mi.ObjectType.Film)):
+        return True
     if any(graph.plugin(i) in SPECTRAL_TEXTURES for i in graph.nodes(mi.ObjectType.Texture)):
         return True
     return any(
@@ -158,6 +187,10 @@ def _decisions(pair, structure, interpolation, occlusion, interreflection):
     kinds = [light.kind for light in structure.lights]
     listing = ", ".join(sorted(set(kinds))) or "none"
     plugins = {physical.plugin(index) for index in physical.nodes(BSDF)}
+    has_environment = any(
+        light.shape is None and light.kind not in (*EXACT_LIGHTS, "projector")
+        for light in structure.lights
+    )
     found = {
         Effect.EMISSION: _coefficient(heuristic, "k_i"),
         Effect.AMBIENT: _coefficient(heuristic, "k_a")
@@ -172,9 +205,15 @@ def _decisions(pair, structure, interpolation, occlusion, interreflection):
             f"interpolation {interpolation.value}",
         ),
         Effect.OCCLUSION: occlusion,
-        Effect.MICROFACETS: ("roughplastic" in plugins, f"BSDFs: {', '.join(sorted(plugins))}"),
-        Effect.EXTENDED: ("area" in kinds, f"lights: {listing}"),
-        Effect.ENVIRONMENT: ("constant" in kinds, f"lights: {listing}"),
+        Effect.MICROFACETS: (
+            bool(plugins - {"diffuse", "null", *WRAPPERS}),
+            f"BSDFs: {', '.join(sorted(plugins))}",
+        ),
+        Effect.EXTENDED: (
+            any(light.shape is not None for light in structure.lights),
+            f"lights: {listing}",
+        ),
+        Effect.ENVIRONMENT: (has_environment, f"lights: {listing}"),
         Effect.INTERREFLECTION: interreflection,
         Effect.TRANSMISSION: (
             any(not shape.opaque for shape in structure.shapes),

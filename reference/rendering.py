@@ -15,9 +15,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import NonFiniteError
+from heuristic.errors import InputError, NonFiniteError
 from reference import direct
 from reference.environment import AlbedoTable
+from reference.preparation import PATHS
 
 
 @dataclass(frozen=True)
@@ -153,20 +154,27 @@ class Renderer:
 
         Raises
         ------
+        InputError
+            With Mitsuba's own reason when it cannot render the scene.
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
         """
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
-            image = mi.render(
-                self.scene,
-                integrator=self.integrator,
-                spp=self.spp,
-                seed=dr.opaque(mi.UInt32, seed),
-            )
-            dr.eval(image)
-            dr.sync_thread()
+            try:
+                image = mi.render(
+                    self.scene,
+                    integrator=self.integrator,
+                    spp=self.spp,
+                    seed=dr.opaque(mi.UInt32, seed),
+                )
+                dr.eval(image)
+                dr.sync_thread()
+            except RuntimeError as error:
+                raise InputError(
+                    f"{self.label}: Mitsuba cannot render it: {_reason(error)}"
+                ) from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
@@ -200,9 +208,9 @@ def variant(name):
 def physical_integrator(plan, scene, hide_emitters):
     """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
-    if plan.integrator == "path":
-        description = {"type": "path", "hide_emitters": hide_emitters, "max_depth": plan.max_depth}
-        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
+    if plan.integrator in PATHS:
+        description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+        return mi.load_dict(description | {"max_depth": plan.max_depth, "rr_depth": plan.rr_depth})
     integrator = mi.load_dict(
         {
             "type": plan.integrator,
@@ -214,6 +222,13 @@ def physical_integrator(plan, scene, hide_emitters):
     if plan.tabulate_environment:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
+
+
+def _reason(error):
+    """Return the message of the error that began a chain of them."""
+    while (cause := error.__cause__ or error.__context__) is not None:
+        error = cause
+    return str(error).strip()
 
 
 def _require_finite(image, label, seed):

@@ -5,6 +5,7 @@ dictionary, and knows the file and line of each node, which is what error messag
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import mitsuba as mi
 
 from heuristic.errors import InputError
-from heuristic.plugins import lights
+from heuristic.plugins import lights, mapped
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -21,7 +22,10 @@ KINDS_OF_OWN_PLUGINS = {
     "phong": mi.ObjectType.BSDF,
     "heuristic": mi.ObjectType.Integrator,
     "heuristic_glow": mi.ObjectType.Emitter,
-} | dict.fromkeys(lights.KINDS, mi.ObjectType.Emitter)
+    "heuristic_tilt": mi.ObjectType.Texture,
+}
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(lights.KINDS, mi.ObjectType.Emitter)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
@@ -90,7 +94,10 @@ class Source:
             raise InputError(
                 f"{self.name}: this is no scene. Its outermost element must be a scene."
             )
-        return Graph(self.name, config, state)
+        graph = Graph(self.name, config, state)
+        if not isinstance(content, Mapping):
+            graph.folder = path.resolve().parent
+        return graph
 
 
 class Graph:
@@ -104,15 +111,19 @@ class Graph:
         self.config = config
         self.state = state
         self.folders = []  # temporary ones with files that nodes refer to
+        self.kinds = {}  # of plugins written in Python
+        self.folder = None  # where relative names of files begin
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
+        copy.kinds = self.kinds
+        copy.folder = self.folder
         return copy
 
-    def instantiate(self):
-        """Make the Mitsuba scene, without merging shapes.
+    def instantiate(self, index=0):
+        """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
 
         Raises
         ------
@@ -120,12 +131,15 @@ class Graph:
             With Mitsuba's own message when a plugin refuses its parameters.
         """
         state = Parser.ParserState(self.state)
+        if index:
+            state.nodes[0] = Parser.SceneNode(state.nodes[index])
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
         try:
-            made = Parser.instantiate(self.config, state)
+            with _files_from(self.folder):
+                made = Parser.instantiate(self.config, state)
         except RuntimeError as error:
             raise InputError(f"{self.name}: {_message(error)}") from error
         return made[0] if isinstance(made, list) else made
@@ -137,9 +151,20 @@ class Graph:
     def kind(self, index):
         """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
         kind = self.state.nodes[index].type
-        if kind == mi.ObjectType.Unknown:
-            return KINDS_OF_OWN_PLUGINS.get(self.plugin(index), kind)
-        return kind
+        if kind != mi.ObjectType.Unknown:
+            return kind
+        plugin = self.plugin(index)
+        if plugin not in self.kinds:
+            self.kinds[plugin] = KINDS_OF_OWN_PLUGINS.get(plugin) or self._kind_of_object(index)
+        return self.kinds[plugin]
+
+    def _kind_of_object(self, index):
+        """Return the kind of a user's own plugin: that of the object that it makes."""
+        made = self.instantiate(index)
+        for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
+            if isinstance(made, getattr(mi, kind)):
+                return getattr(mi.ObjectType, kind)
+        return mi.ObjectType.Unknown
 
     def plugin(self, index):
         """Return the name of a node's plugin."""
@@ -206,6 +231,22 @@ class Graph:
                 if isinstance(value, Reference):
                     queue.append(value.index())
         return sorted(seen)
+
+
+@contextmanager
+def _files_from(folder):
+    """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
+    if folder is None:
+        yield
+        return
+    before = mi.file_resolver()
+    widened = mi.FileResolver(before)
+    widened.prepend(str(folder))
+    mi.set_file_resolver(widened)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
 
 
 def _message(error):

@@ -14,12 +14,15 @@ from reference import values
 
 BSDF, EMITTER, SHAPE = (getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Shape"))
 
-OPAQUE = ("diffuse", "roughplastic", "phong")
+OPAQUE = ("diffuse", "plastic", "roughplastic", "conductor", "roughconductor", "phong")
 """BSDFs that only reflect, on the side that the normal points to."""
 
 REFLECTANCES = {
     "diffuse": ("reflectance",),
+    "plastic": ("diffuse_reflectance", "specular_reflectance"),
     "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
+    "conductor": ("specular_reflectance",),
+    "roughconductor": ("specular_reflectance",),
     "phong": ("k_d", "k_s"),
 }
 
@@ -108,7 +111,8 @@ def examine(graph, scene):
 
 def _shape_facts(graph, index, shape):
     box = shape.bbox()
-    bsdf = graph.children(index, BSDF)[0][1] if index is not None else None
+    nested = graph.children(index, BSDF) if index is not None else []
+    bsdf = nested[0][1] if nested else None  # an instance has those of its group
     plugins, reflects, twosided = _surface(graph, bsdf)
     convex, plane = _geometry(shape, twosided)
     return ShapeFacts(
@@ -143,10 +147,10 @@ def _surface(graph, bsdf):
 
 def _geometry(shape, twosided):
     """Tell whether a shape is convex, and its plane if it is flat and one-sided."""
-    kind = mi.ShapeType(shape.shape_type())
-    if kind == mi.ShapeType.Sphere:
+    kind = shape.shape_type()
+    if kind == +mi.ShapeType.Sphere:
         return True, None
-    if kind in (mi.ShapeType.Rectangle, mi.ShapeType.Disk):
+    if kind in (+mi.ShapeType.Rectangle, +mi.ShapeType.Disk):
         sample = shape.sample_position(0.0, mi.Point2f(0.5))
         plane = np.array(sample.p)[:, 0], np.array(sample.n)[:, 0]
         return True, None if twosided else plane

@@ -1,12 +1,29 @@
-"""Replacing physical lights by heuristic ones (table in :mod:`reference.pairing`)."""
+"""Replacing physical lights by heuristic ones (table in :mod:`reference.pairing`).
+
+What that table has no row for gets the nearest light that there is:
+
+==================================  ===============================================================
+Physical                            Nearest
+==================================  ===============================================================
+``envmap`` and other environments   ``I_a``, its mean radiance over the sphere
+``sunsky``, ``timed_sunsky``        the same for the sky; the sun is a directional light of its
+                                    irradiance and mean direction
+``projector``, textured ``spot``    a spot: the even cone of the same solid angle and flux
+textured ``area``                   as ``area``, of its mean radiance
+any other                           none: it is left out
+==================================  ===============================================================
+"""
 
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
-from reference import emitters, pairing, spots, values
+from heuristic.plugins import lights
+from reference import emitters, measured_lights, pairing, spots, values
 from reference.emitters import BSDF, EMITTER, FALLOFF_OF_MITSUBA, SHAPE, PairedEmitter
-from reference.scene import properties
+from reference.scene import Reference, properties
+
+SUN_AND_SKY = ("sunsky", "timed_sunsky")
+MEAN = "I_a is the mean radiance over the sphere"
 
 FLATNESS = 0.5
 """A light whose mean normal is longer is treated as flat; a closed one has a mean normal of 0."""
@@ -26,10 +43,17 @@ def replace_lights(graph, geometry, hide_emitters):
         The radiance of a constant environment, as the parser keeps it, to become ``I_a``.
     """
     records, ambient = [], None
+    on_shapes = {
+        index for shape in graph.nodes(SHAPE) for _, index in graph.children(shape, EMITTER)
+    }
     for index in graph.nodes(EMITTER):
         plugin, props = graph.plugin(index), graph.props(index)
+        if index in on_shapes or plugin in lights.KINDS:
+            continue
         if plugin == "point":
             record = _point_to_heuristic(graph, index)
+        elif plugin == "projector" or _is_textured_spot(graph, index):
+            record = _beam_to_heuristic(graph, index)
         elif plugin == "spot":
             record = _spot_to_heuristic(graph, index)
         elif plugin == "directional":
@@ -37,8 +61,15 @@ def replace_lights(graph, geometry, hide_emitters):
         elif plugin == "constant":
             ambient = props.get("radiance", 1.0)
             record = PairedEmitter(graph.label(index), plugin, "ambient", 1.0, True)
+        elif plugin in SUN_AND_SKY:
+            ambient, record = _sun_and_sky(graph, index)
+        elif (emitter := graph.instantiate(index)).is_environment():
+            ambient = measured_lights.mean_radiance(graph, emitter)
+            lost = "directions of the environment's light"
+            record = PairedEmitter(graph.label(index), plugin, "ambient", 1.0, False, MEAN, lost)
         else:
-            continue
+            record = _dropped(graph, index)
+            graph.remove(index)
         records.append(record)
     records += _area_to_heuristic(graph, geometry, hide_emitters)
     return records, ambient
@@ -59,10 +90,6 @@ def _point_to_heuristic(graph, index):
 
 
 def _spot_to_heuristic(graph, index):
-    if graph.children(index, mi.ObjectType.Texture):
-        raise InputError(
-            f"{graph.name}: {graph.label(index)}: a spot with a texture cannot be paired yet."
-        )
     cutoff = values.number(graph, index, "cutoff_angle", 20.0)
     beam_width = values.number(graph, index, "beam_width", 0.75 * cutoff)
     to_world = emitters.given(graph, index, "to_world", mi.ScalarTransform4f())
@@ -82,6 +109,70 @@ def _spot_to_heuristic(graph, index):
     return PairedEmitter(
         graph.label(index), "spot", "heuristic_spot", pairing.INTENSITY_FACTOR, False, note
     )
+
+
+def _is_textured_spot(graph, index):
+    return graph.plugin(index) == "spot" and "texture" in graph.props(index)
+
+
+def _beam_to_heuristic(graph, index):
+    plugin, label = graph.plugin(index), graph.label(index)
+    to_world = emitters.given(graph, index, "to_world", mi.ScalarTransform4f())
+    place, axis = emitters.column(to_world, 3), emitters.column(to_world, 2)
+    beam = measured_lights.beam(graph, graph.instantiate(index), place, axis)
+    if beam is None:
+        record = _dropped(graph, index)
+        graph.remove(index)
+        return record
+    derived = properties(
+        "heuristic_spot",
+        position=mi.ScalarPoint3f(*place),
+        direction=mi.ScalarVector3f(*axis),
+        cutoff=beam.cutoff,
+        exponent=0.0,
+        intensity=beam.intensity,
+        scale=pairing.INTENSITY_FACTOR,
+        **FALLOFF_OF_MITSUBA,
+    )
+    graph.replace(index, derived)
+    note = f"an even cone of {beam.cutoff:.4g} deg, of the same solid angle and flux"
+    factor = pairing.INTENSITY_FACTOR
+    return PairedEmitter(label, plugin, "heuristic_spot", factor, False, note, "its picture")
+
+
+def _sun_and_sky(graph, index):
+    """Return the mean radiance of the sky; the sun becomes a light of its own."""
+    label, plugin = graph.label(index), graph.plugin(index)
+    sky, sun = (
+        measured_lights.mean_radiance(graph, _only(graph, index, "sun_scale")),
+        measured_lights.irradiance(graph, _only(graph, index, "sky_scale")),
+    )
+    note = MEAN
+    if sun is not None:
+        intensity, direction = sun
+        light = properties(
+            "heuristic_directional",
+            direction=mi.ScalarVector3f(*direction),
+            intensity=intensity,
+        )
+        light.set_id(f"sun of {label}")
+        graph.attach(0, f"sun_of_{index}", graph.add(EMITTER, light))
+        note += "; the sun a directional light of its irradiance"
+    lost = "directions of the sky's light, and the sun's extent"
+    return sky, PairedEmitter(label, plugin, "ambient", 1.0, False, note, lost)
+
+
+def _only(graph, index, off):
+    """Return a sunsky with one of its two parts switched off."""
+    copy = graph.copy()
+    copy.props(index)[off] = 0.0
+    return copy.instantiate(index)
+
+
+def _dropped(graph, index):
+    note = "left out: it has no nearest form"
+    label, plugin = graph.label(index), graph.plugin(index)
+    return PairedEmitter(label, plugin, "none", 0.0, False, note, "this kind of light")
 
 
 def _directional_to_heuristic(graph, index):
@@ -106,15 +197,23 @@ def _directional_to_heuristic(graph, index):
 def _area_to_heuristic(graph, geometry, hide_emitters):
     """Replace each area light by emission of its shape and a spot or point at its centroid."""
     records = []
+    made = None
     for shape in graph.nodes(SHAPE):
         for key, index in graph.children(shape, EMITTER):
+            if graph.plugin(index) == "heuristic_glow":
+                continue
             graph.detach(shape, key)
+            if graph.plugin(index) != "area":
+                records.append(_dropped(graph, index))
+                continue
             radiance = emitters.given(graph, index, "radiance", 1.0)
             if hide_emitters:
                 graph.remove(shape)
             else:
                 _glow(graph, shape, radiance)
-            derived, record = _area_light(graph, shape, index, radiance, geometry())
+            made = made or {found.id(): found for found in geometry().shapes()}
+            emitting = made[graph.props(shape).id()]
+            derived, record = _area_light(graph, shape, radiance, emitting)
             derived.set_id(f"light of {graph.label(shape)}")
             light = graph.add(EMITTER, derived)
             graph.attach(0, f"light_of_{shape}", light)
@@ -122,8 +221,10 @@ def _area_to_heuristic(graph, geometry, hide_emitters):
     return records
 
 
-def _area_light(graph, shape, index, radiance, scene):
-    centroid, area, normal = _extent(scene, graph.props(shape).id())
+def _area_light(graph, shape, radiance, emitting):
+    centroid, area, normal = _extent(emitting)
+    if _varies(graph, radiance):
+        radiance = measured_lights.surface_mean(graph, emitting)
     common = {
         "position": mi.ScalarPoint3f(*centroid),
         "intensity": radiance,
@@ -149,9 +250,15 @@ def _area_light(graph, shape, index, radiance, scene):
     return derived, PairedEmitter(name, "area", "heuristic_point", factor, False, note)
 
 
-def _extent(scene, identifier):
+def _varies(graph, value):
+    """Tell whether a value is a texture that differs from point to point."""
+    if not isinstance(value, Reference):
+        return False
+    return graph.instantiate(value.index()).is_spatially_varying()
+
+
+def _extent(shape):
     """Return centroid, area and mean normal of a shape, by its own sampling on a regular grid."""
-    shape = next(shape for shape in scene.shapes() if shape.id() == identifier)
     cells = (np.arange(64) + 0.5) / 64
     x, y = (axis.ravel() for axis in np.meshgrid(cells, cells))
     sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))

@@ -69,6 +69,34 @@ def rendering_options(command):
     return command
 
 
+class Parameter(click.ParamType):
+    """``NAME=VALUE`` for a placeholder ``$NAME`` of a scene file."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value, param, ctx):
+        """Split the text, or fail with what is allowed."""
+        if isinstance(value, tuple):
+            return value
+        key, separator, text = value.partition("=")
+        if not (separator and key):
+            self.fail(f"{value!r} is no parameter; write it like name=value.", param, ctx)
+        return key, text
+
+
+def scene_options(command):
+    """Add the options that say what is taken from a scene file."""
+    options = (
+        click.option("-D", "define", type=Parameter(), multiple=True,
+                     help="Value for a placeholder $NAME of a scene file; may be repeated."),
+        click.option("--sensor", type=click.IntRange(min=0), metavar="N",
+                     help="Which sensor of the scene, from 0. [default: the first]"),
+    )  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 def check_installation():
     """See that LLVM is usable, before anything compiles.
 
@@ -98,7 +126,7 @@ def job(name, rendering):
                 f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
                 " built-in scene; `fotismos scenes` lists them."
             )
-        source = Source(path.stem, path)
+        source = Source(path.stem, path, dict(rendering.get("define") or ()))
         spectral = rendering["variant"] is None and wants_spectra(source.parse())
         scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
     else:
@@ -132,6 +160,7 @@ def options(rendering):
         interpolation=Interpolation(rendering["interpolation"]),
         tessellation=rendering["tessellation"],
         everything=rendering["everything"],
+        sensor=rendering.get("sensor") or 0,
     )
 
 
@@ -139,7 +168,11 @@ def command(source, rendering, verb="compare"):
     """Return the command that repeats what was done with one scene."""
     scene = source.name if callable(source.content) else str(source.content)
     words = ["fotismos", verb, scene]
+    for name, value in source.parameters.items():
+        words += ["-D", f"{name}={value}"]
     for key, value in rendering.items():
+        if key == "define":
+            continue
         if value is True:
             words.append(f"--{key.replace('_', '-')}")
         elif value not in (None, False):

@@ -9,7 +9,7 @@ import numpy as np
 
 from comparisons.fit.samples import VECTORS, Samples, Surface, gathered
 from heuristic.materials import Material
-from heuristic.plugins.integrator import SceneMaterials
+from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.shading import shade
 from reference.rendering import Accumulator, Renderer, variant
 

@@ -10,6 +10,9 @@ Plugin                      Kind        What it is
 ``heuristic_directional``   emitter     parallel light
 ``heuristic_glow``          emitter     emission and ambient light of a shape, for Mitsuba's own
                                         integrators; it lights nothing else
+``heuristic_product`` …     textures    coefficients computed from textures
+                                        (:mod:`heuristic.plugins.mapped`)
+``heuristic_tilt``          texture     the normal that a bump or normal map gives
 ==========================  ==========  ==========================================================
 """
 
@@ -17,7 +20,7 @@ import mitsuba as mi
 
 from heuristic import backend
 from heuristic.errors import InputError
-from heuristic.plugins import glow, integrator, lights, phong
+from heuristic.plugins import glow, integrator, lights, mapped, phong, tilted
 
 _registered = set()
 
@@ -42,6 +45,6 @@ def register():
         return
     if variant.startswith("llvm"):
         backend.check()
-    for module in (phong, glow, lights, integrator):
+    for module in (mapped, tilted, phong, glow, lights, integrator):
         module.define()
     _registered.add(variant)

@@ -25,15 +25,16 @@ equal seeds give equal rays. Python::
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import terms
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from heuristic.materials import Material
 from heuristic.plugins.interpolated import interpolating
 from heuristic.plugins.lights import FAR
-from heuristic.plugins.phong import COEFFICIENTS
+from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.shading import shade
+
+LAYERS = 64
+"""Surfaces that a camera ray passes at most: a bound for a tower of empty ones."""
 
 
 def define():
@@ -50,19 +51,27 @@ def define():
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
+            if any(bsdf.is_clear for bsdf in SceneMaterials(scene).bsdfs):
+                colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
+            else:
+                colour, hit, _ = self.layer(scene, ray, active)
+            sees_all = scene.environment() is not None and not self.hide_emitters
+            return colour, active if sees_all else hit, []
+
+        def layer(self, scene, ray, active):
+            """Return what a ray shows where it first hits, or else the background; and the hit."""
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
             colour = self.surface_colour(scene, si, mi.Vector3f(-ray.d), hit)
             environment = scene.environment()
             if environment is not None and not self.hide_emitters:
                 colour += dr.select(active & ~hit, environment.eval(si, active & ~hit), 0)
-                hit = active
-            return colour, hit, []
+            return colour, hit, si
 
         def surface_colour(self, scene, si, view, active):
             """Return the value that is seen at what a ray hits: Phong shading (6.37, 6.38)."""
             twosided = self.twosided(scene, si, active)
-            normal = mi.Vector3f(si.sh_frame.n)
+            normal = SceneMaterials(scene).normal(si, active)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             colour = self.shaded(scene, si, view, normal, active)
@@ -111,91 +120,33 @@ def define():
     mi.register_integrator("heuristic", make)
 
 
+@dr.syntax
+def _through_layers(integrator, scene, ray, active):
+    """Follow rays straight through what lets light through, at most :data:`LAYERS` surfaces.
+
+    ``C = sum_j c_j prod_(i < j) T_i``: each surface adds its own light ``c_j``, in which its
+    opacity is contained, behind the transmittances ``T_i`` of those before it.
+    """
+    colour, throughput = mi.Spectrum(0), mi.Spectrum(1)
+    hit_any = mi.Bool(False)
+    layer = mi.UInt32(0)
+    while active & (layer < LAYERS):
+        seen, hit, si = integrator.layer(scene, ray, active)
+        colour += throughput * mi.Spectrum(seen)
+        throughput *= mi.Spectrum(SceneMaterials(scene).transmittance(si, hit))
+        hit_any |= hit
+        ray = si.spawn_ray(ray.d)
+        active = hit & (dr.max(throughput) > 0)
+        layer += 1
+    return colour, hit_any
+
+
 def _interpolation(props):
     name = props.get("interpolation", "phong")
     known = [kind.value for kind in Interpolation]
     if name not in known:
         raise InputError(f"interpolation {name!r} is not known: choose one of {', '.join(known)}.")
     return Interpolation(name)
-
-
-class SceneMaterials:
-    """The ``phong`` BSDFs of a scene, and which shape has which.
-
-    Raises
-    ------
-    InputError
-        For a shape whose BSDF is no ``phong``.
-    """
-
-    def __init__(self, scene, prune=True):
-        self.prune = prune
-        numbers = {}
-        places = {}
-        for shape in scene.shapes():
-            bsdf = shape.bsdf()
-            if not hasattr(bsdf, "material"):
-                raise InputError(
-                    f"shape {shape.id()!r}: its BSDF {bsdf.class_name()} is no phong. The"
-                    " integrator heuristic renders the heuristic half of a pair, which"
-                    " reference.pair makes."
-                )
-            places[_registry_index(shape)] = numbers.setdefault(bsdf, len(numbers))
-        self.bsdfs = list(numbers)
-        self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
-
-    def at(self, si, active):
-        """Return the materials at a surface interaction, as pairs of a material and a mask.
-
-        There is one pair for each form of the lobe that the scene has, since the form decides on
-        the kernel's code; the mask tells where it holds.
-        """
-        if len(self.bsdfs) == 1:
-            return [(self.bsdfs[0].material(si, active, self.prune), True)]
-        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
-        present = present if self.prune else list(COEFFICIENTS)
-        readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
-        *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
-        forms = sorted({bsdf.form for bsdf in self.bsdfs})
-        is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
-        coefficients = dict(zip(present, values, strict=True))
-        return [
-            (
-                Material(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
-                len(forms) == 1 or is_blinn == (form == "blinn"),
-            )
-            for form in forms
-        ]
-
-    def twosided(self, si, active):
-        """Return whether the surface is two-sided; a plain value where all agree."""
-        sides = [bsdf.twosided for bsdf in self.bsdfs]
-        if len(set(sides)) <= 1:
-            return any(sides)
-        return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
-
-    def index(self, si, active):
-        """Return the number in ``bsdfs`` of the material at a surface interaction."""
-        shape = dr.reinterpret_array(mi.UInt32, si.shape)
-        return dr.gather(mi.UInt32, mi.UInt32(self.table), shape, active)
-
-
-def _reader(bsdf, present):
-    """Return the function that reads one BSDF's coefficients, normalisation applied."""
-
-    def read(si, active):
-        material = bsdf.material(si, active)
-        values = {name: mi.Spectrum(getattr(material, name)) for name in present}
-        if bsdf.normalised and "k_s" in values:
-            values["k_s"] *= terms.normalisation(bsdf.form, bsdf.n)
-        return (*values.values(), mi.Float(bsdf.n), mi.Bool(bsdf.form == "blinn"))
-
-    return read
-
-
-def _registry_index(shape):
-    """Return the number under which Dr.Jit knows a shape, as found in ``si.shape``."""
-    return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
 
 
 def _shadow_test(scene, si, active):

@@ -7,11 +7,16 @@ Parameter           Type (default)    Meaning
                                       ``heuristic`` alone, as they are no matter of reflection
 ``k_d``, ``k_s``    spectrum or       diffuse and specular coefficient
                     texture (0)
-``n``               float (1)         Phong's exponent
+``n``               float or          Phong's exponent
+                    texture (1)
 ``form``            string (phong)    ``phong`` for ``(R.V)^n``, ``blinn`` for ``(N.H)^n``
 ``normalised``      boolean (false)   scale the lobe so that ``k_s`` is its albedo at normal
                                       incidence
 ``twosided``        boolean (false)   shade the side that faces the viewer, whichever it is
+``transmittance``   spectrum or       share of the light that passes straight through; read by the
+                    texture (0)       integrator ``heuristic`` alone
+``tilt``            texture (none)    unit normal in the shading frame, such as ``heuristic_tilt``;
+                                      read by the integrator ``heuristic`` alone
 ==================  ================  =============================================================
 
 All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
@@ -22,6 +27,8 @@ The reflected radiance for irradiance ``E`` at normal incidence is that of 8.10 
 (:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
 has no cosine of its own; as the chapters have it, it neither conserves energy nor is reciprocal.
 """
+
+from numbers import Real
 
 import drjit as dr
 import mitsuba as mi
@@ -49,12 +56,9 @@ def define():
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
             self.k_a, self.k_d, self.k_s = (coefficient(props, k) for k in ("k_a", "k_d", "k_s"))
-            n = props.get("n", 1.0)
-            if not 0 <= n < float("inf"):
-                raise InputError(
-                    f"phong: n = {n} is not allowed: give a finite value of 0 or more."
-                )
-            self.n = mi.Float(n)
+            self.transmittance = coefficient(props, "transmittance")
+            self.tilt = props.get_texture("tilt") if "tilt" in props else None
+            self.n = _exponent(props)
             self.form = props.get("form", "phong")
             check_form(self.form)
             self.normalised = props.get("normalised", False)
@@ -75,11 +79,17 @@ def define():
             }
             return Material(
                 **coefficients,
-                n=self.n,
+                n=self.exponent(si, active),
                 form=self.form,
                 normalised=self.normalised,
                 n_is_moderate=self.n_is_moderate,
             )
+
+        def exponent(self, si, active=True):
+            """Return ``n`` at a surface interaction."""
+            if isinstance(self.n, mi.Texture):
+                return dr.maximum(self.n.eval_1(si, active), 0)
+            return self.n
 
         def eval(self, ctx, si, wo, active=True):
             wi, wo = self._facing(si.wi, wo)
@@ -89,9 +99,10 @@ def define():
                 k_d = self.k_d.eval(si, above)
                 value += terms.diffuse(RADIANCE_PER_IRRADIANCE, k_d, wo.z)
             if "k_s" in self.present and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-                k_s = self.k_s.eval(si, above) * self._scale()
+                n = self.exponent(si, above)
+                k_s = self.k_s.eval(si, above) * self._scale(n)
                 cosine = self._lobe_cosine(wi, wo)
-                value += terms.specular(RADIANCE_PER_IRRADIANCE, k_s, cosine, self.n)
+                value += terms.specular(RADIANCE_PER_IRRADIANCE, k_s, cosine, n)
             return dr.select(above, value, 0)
 
         def pdf(self, ctx, si, wo, active=True):
@@ -99,7 +110,7 @@ def define():
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
-            specular = self._lobe_pdf(wi, wo)
+            specular = self._lobe_pdf(wi, wo, self.exponent(si, above))
             return dr.select(above, dr.lerp(diffuse, specular, probability), 0)
 
         def sample(self, ctx, si, sample1, sample2, active=True):
@@ -109,7 +120,7 @@ def define():
             is_specular = sample1 < probability
             wo = dr.select(
                 is_specular,
-                self._sample_lobe(wi, sample2),
+                self._sample_lobe(wi, sample2, self.exponent(si, active)),
                 mi.warp.square_to_cosine_hemisphere(sample2),
             )
             if self.twosided:
@@ -134,7 +145,7 @@ def define():
             return self.k_d.eval(si, active)
 
         def traverse(self, callback):
-            for name in ("k_i", "k_a", "k_d", "k_s", "n"):
+            for name in (*COEFFICIENTS, "n", "transmittance"):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
@@ -146,8 +157,11 @@ def define():
             self.present = {
                 name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
             }
-            dr.make_opaque(self.n)
-            self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
+            self.is_clear = may_be_nonzero(self.transmittance)
+            self.n_is_moderate = False
+            if not isinstance(self.n, mi.Texture):
+                dr.make_opaque(self.n)
+                self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
 
         def to_string(self):
             parts = ", ".join(
@@ -171,19 +185,20 @@ def define():
             if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
                 return mi.Float(0)
             diffuse = dr.mean(self.k_d.eval(si, active))
-            albedo = self._scale() / terms.normalisation(self.form, self.n)
+            n = self.exponent(si, active)
+            albedo = self._scale(n) / terms.normalisation(self.form, n)
             specular = dr.mean(self.k_s.eval(si, active)) * albedo
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
 
-        def _scale(self):
-            return terms.normalisation(self.form, self.n) if self.normalised else 1
+        def _scale(self, n):
+            return terms.normalisation(self.form, n) if self.normalised else 1
 
         def _lobe_cosine(self, wi, wo):
             """Return ``R.V`` or ``N.H`` in the local frame."""
             return lobes.local_lobe(self.form, self.n_is_moderate, wi, wo)
 
-        def _sample_lobe(self, wi, sample2):
+        def _sample_lobe(self, wi, sample2, n):
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
 
             That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
@@ -191,7 +206,7 @@ def define():
             ``1 - c^2`` would leave nothing for large ``n``: with ``c = 2^-x`` the sine comes from
             ``1 - 2^(-2x)`` (:func:`heuristic.numerics.one_less_exp2`).
             """
-            halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (self.n + 1)
+            halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (n + 1)
             sine = dr.sqrt(numerics.one_less_exp2(2 * halvings))
             cosine = numerics.exp2(-halvings)
             sin_phi, cos_phi = dr.sincos(dr.two_pi * sample2.x)
@@ -200,14 +215,24 @@ def define():
                 return mi.Vector3f(vectors.normalise(mi.reflect(wi, local)))
             return mi.Vector3f(vectors.normalise(mi.Frame3f(mi.reflect(wi)).to_world(local)))
 
-        def _lobe_pdf(self, wi, wo):
+        def _lobe_pdf(self, wi, wo, n):
             """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``.
 
             ``wi.H = |wi + wo| / 2``, which is 0 for opposite directions alone.
             """
-            density = (self.n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), self.n)
+            density = (n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), n)
             if self.form == "blinn":
                 density /= numerics.at_least(2 * dr.norm(wi + wo), numerics.smallest(wo))
             return density
 
     mi.register_bsdf("phong", PhongBSDF)
+
+
+def _exponent(props):
+    """Read ``n``: a number, or a texture."""
+    n = props.get("n", 1.0)
+    if not isinstance(n, Real):
+        return props.get_unbounded_texture("n")
+    if not 0 <= n < float("inf"):
+        raise InputError(f"phong: n = {n} is not allowed: give a finite value of 0 or more.")
+    return mi.Float(n)

@@ -42,5 +42,10 @@ def _plain(props, name, default):
 
 
 def may_be_nonzero(texture):
-    """Tell whether a texture can be other than zero anywhere."""
-    return texture.is_spatially_varying() or dr.max(texture.max()) > 0
+    """Tell whether a texture can be other than zero anywhere; one that cannot tell counts as so."""
+    if texture.is_spatially_varying():
+        return True
+    try:
+        return dr.max(texture.max()) > 0
+    except RuntimeError:
+        return True

@@ -16,6 +16,7 @@ from reports import batch, jobs
     help="Go on until 95 % of pixels have noise under this ΔE2000; --spp is then the most samples"
     " a pixel. [default limit: 4096]",
 )
+@jobs.scene_options
 def compare(scenes, output, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
@@ -28,5 +29,6 @@ def compare(scenes, output, **rendering):
       fotismos compare fig-8-9
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
       fotismos compare cornell-box --noise 0.5 --spp 2048
+      fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
     """  # noqa: D301 click reads the \b as: keep these lines
     batch.run(scenes, output, rendering)

@@ -12,6 +12,7 @@ from reports import jobs
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
 @jobs.rendering_options
+@jobs.scene_options
 def plan(scene, as_json, verify, **rendering):
     """Say which effects a scene calls for, by which rule, and what will be simulated.
 

@@ -1,0 +1,137 @@
+"""Textures that compute a coefficient from other textures, point by point.
+
+=======================  ==================================  =======================================
+Plugin                   Operands                            Value
+=======================  ==================================  =======================================
+``heuristic_product``    ``a``, ``b``                        ``a b``
+``heuristic_share``      ``a``, scalar ``weight``            ``a weight``
+``heuristic_rest``       ``a``, scalar ``weight``            ``a (1 - weight)``
+``heuristic_sum``        ``a``, ``b``                        ``a + b``
+``heuristic_blend``      ``a``, ``b``, scalar ``weight``     ``a (1 - weight) + b weight``
+``heuristic_sides``      ``front``, ``back``                 that of the side that is seen
+``heuristic_exponent``   scalar ``alpha``                    ``(1 / alpha^2 - 1) / 2``, 0 or more
+``heuristic_interior``   ``rho``; numbers ``scale``,         ``scale rho / (1 - rho return)``
+                         ``return``
+=======================  ==================================  =======================================
+
+Operands are numbers, colours or textures. Scalars are read as Mitsuba reads an ``alpha`` or an
+opacity (``eval_1``), weights clipped to [0, 1], the others in the form that is asked for.
+"""
+
+import drjit as dr
+import mitsuba as mi
+
+SMALLEST_ALPHA = 1e-4
+"""Mitsuba takes every smaller roughness for this one."""
+
+SCALARS = ("weight", "alpha")
+LARGEST = 1e9
+
+
+def _exponent(si, alpha):
+    alpha = dr.maximum(alpha, SMALLEST_ALPHA)
+    return dr.maximum((1 / dr.square(alpha) - 1) / 2, 0)
+
+
+OPERATIONS = {
+    "heuristic_product": (("a", "b"), lambda si, a, b: a * b),
+    "heuristic_share": (("a", "weight"), lambda si, a, weight: a * dr.clip(weight, 0, 1)),
+    "heuristic_rest": (("a", "weight"), lambda si, a, weight: a * (1 - dr.clip(weight, 0, 1))),
+    "heuristic_sum": (("a", "b"), lambda si, a, b: a + b),
+    "heuristic_blend": (
+        ("a", "b", "weight"),
+        lambda si, a, b, weight: dr.lerp(a, b, dr.clip(weight, 0, 1)),
+    ),
+    "heuristic_sides": (
+        ("front", "back"),
+        lambda si, front, back: dr.select(si.wi.z > 0, front, back),
+    ),
+    "heuristic_exponent": (("alpha",), _exponent),
+}
+
+KINDS = (*OPERATIONS, "heuristic_interior")
+
+
+def define():
+    """Create the classes for the current variant and register them."""
+
+    class Mapped(mi.Texture):
+        """See the module's docstring."""
+
+        operands = ()
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.children = {name: _operand(props, name) for name in self.operands}
+
+        def value(self, si, *operands):
+            """Return the value for those of the operands."""
+            raise NotImplementedError
+
+        def eval(self, si, active=True):
+            return mi.Spectrum(self._value("eval", si, active))
+
+        def eval_1(self, si, active=True):
+            return mi.Float(self._value("eval_1", si, active))
+
+        def eval_3(self, si, active=True):
+            return mi.Color3f(self._value("eval_3", si, active))
+
+        def is_spatially_varying(self):
+            return True
+
+        def mean(self):
+            return mi.Float(0.5)
+
+        def max(self):
+            return LARGEST
+
+        def traverse(self, callback):
+            for name, child in self.children.items():
+                callback.put(name, child, mi.ParamFlags.Differentiable)
+
+        def to_string(self):
+            return f"{type(self).__name__}[{', '.join(map(str, self.children))}]"
+
+        def _value(self, method, si, active):
+            found = [
+                getattr(child, "eval_1" if name in SCALARS else method)(si, active)
+                for name, child in self.children.items()
+            ]
+            return self.value(si, *found)
+
+    def operation(names, function):
+        class Operation(Mapped):
+            """One of :data:`OPERATIONS`."""
+
+            operands = names
+
+            def value(self, si, *operands):
+                return function(si, *operands)
+
+        return Operation
+
+    class Interior(Mapped):
+        """Light that a diffuse base sends out again after any number of inner reflections."""
+
+        operands = ("rho",)
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.scale, self.returned = props["scale"], props["return"]
+
+        def value(self, si, rho):
+            return self.scale * rho / (1 - self.returned * rho)
+
+    for name, (names, function) in OPERATIONS.items():
+        mi.register_texture(name, operation(names, function))
+    mi.register_texture("heuristic_interior", Interior)
+
+
+def _operand(props, name):
+    """Read an operand; plain numbers and colours may be larger than a reflectance."""
+    value = props[name]
+    components = tuple(value) if isinstance(value, mi.ScalarColor3f) else (value,)
+    if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
+        return props.get_unbounded_texture(name)
+    return props.get_texture(name)

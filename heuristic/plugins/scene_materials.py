@@ -1,0 +1,137 @@
+"""The materials of a scene, read at what a ray hits."""
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic import terms
+from heuristic.errors import InputError
+from heuristic.materials import Material
+from heuristic.plugins.phong import COEFFICIENTS
+
+
+class SceneMaterials:
+    """The ``phong`` BSDFs of a scene, and what they are at a surface interaction.
+
+    Raises
+    ------
+    InputError
+        For a BSDF that is no ``phong``.
+    """
+
+    def __init__(self, scene, prune=True):
+        self.prune = prune
+        self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
+        for bsdf in self.bsdfs:
+            if not hasattr(bsdf, "material"):
+                raise InputError(
+                    f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is no phong. The integrator heuristic"
+                    " renders the heuristic half of a pair, which reference.pair makes."
+                )
+        places = {_registry_index(bsdf): number for number, bsdf in enumerate(self.bsdfs)}
+        self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
+
+    def at(self, si, active):
+        """Return the materials at a surface interaction, as pairs of a material and a mask.
+
+        There is one pair for each form of the lobe that the scene has, since the form decides on
+        the kernel's code; the mask tells where it holds.
+        """
+        if not self.bsdfs:
+            return []  # a scene without shapes
+        if len(self.bsdfs) == 1:
+            return [(self.bsdfs[0].material(si, active, self.prune), True)]
+        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+        present = present if self.prune else list(COEFFICIENTS)
+        readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
+        *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
+        forms = sorted({bsdf.form for bsdf in self.bsdfs})
+        is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
+        coefficients = dict(zip(present, values, strict=True))
+        return [
+            (
+                Material(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
+                len(forms) == 1 or is_blinn == (form == "blinn"),
+            )
+            for form in forms
+        ]
+
+    def twosided(self, si, active):
+        """Return whether the surface is two-sided; a plain value where all agree."""
+        sides = [bsdf.twosided for bsdf in self.bsdfs]
+        if len(set(sides)) <= 1:
+            return any(sides)
+        return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
+
+    def transmittance(self, si, active):
+        """Return the share of light that passes straight through; a plain 0 where none can."""
+        if not any(bsdf.is_clear for bsdf in self.bsdfs):
+            return 0
+        readers = [_transmittance_of(bsdf) for bsdf in self.bsdfs]
+        return dr.select(active, self._switch(readers, si, active), 0)
+
+    def normal(self, si, active):
+        """Return the shading normal in world space, bump and normal maps applied."""
+        if not any(bsdf.tilt for bsdf in self.bsdfs):
+            return mi.Vector3f(si.sh_frame.n)
+        readers = [_normal_of(bsdf) for bsdf in self.bsdfs]
+        return mi.Vector3f(self._switch(readers, si, active))
+
+    def _switch(self, readers, si, active):
+        if len(readers) == 1:
+            return readers[0](si, active)
+        return dr.switch(self.index(si, active), readers, si, active)
+
+    def index(self, si, active):
+        """Return the number in ``bsdfs`` of the material at a surface interaction."""
+        bsdf = dr.reinterpret_array(mi.UInt32, si.bsdf())
+        return dr.gather(mi.UInt32, mi.UInt32(self.table), bsdf, active)
+
+
+def _reader(bsdf, present):
+    """Return the function that reads one BSDF's coefficients, normalisation applied."""
+
+    def read(si, active):
+        material = bsdf.material(si, active)
+        values = {name: mi.Spectrum(getattr(material, name)) for name in present}
+        if bsdf.normalised and "k_s" in values:
+            values["k_s"] *= terms.normalisation(bsdf.form, material.n)
+        return (*values.values(), mi.Float(material.n), mi.Bool(bsdf.form == "blinn"))
+
+    return read
+
+
+def _transmittance_of(bsdf):
+    if not bsdf.is_clear:
+        return lambda si, active: mi.Spectrum(0)
+    return lambda si, active: mi.Spectrum(bsdf.transmittance.eval(si, active))
+
+
+def _normal_of(bsdf):
+    if bsdf.tilt is None:
+        return lambda si, active: mi.Vector3f(si.sh_frame.n)
+    return lambda si, active: si.to_world(mi.Vector3f(bsdf.tilt.eval_3(si, active)))
+
+
+def _bsdfs(scene):
+    """Return the BSDFs of a scene; those inside shape groups show by traversing it alone."""
+    shapes = scene.shapes()
+    if not any(shape.class_name() == "Instance" for shape in shapes):
+        return [shape.bsdf() for shape in shapes]
+    found = {}
+
+    class Below(mi.TraversalCallback):
+        """Collects the outermost BSDFs below an object."""
+
+        def put(self, name, value, *details):
+            if isinstance(value, mi.BSDF):
+                found.setdefault(value)
+            elif isinstance(value, mi.Object):
+                value.traverse(Below())
+
+    scene.traverse(Below())
+    return list(found)
+
+
+def _registry_index(bsdf):
+    """Return the number under which Dr.Jit knows a BSDF, as found in ``si.bsdf()``."""
+    return int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])

@@ -1,0 +1,135 @@
+"""Every plugin that Mitsuba ships goes through `compare`, or is refused for Mitsuba's own reason.
+
+The scenes of `tests/corpus` are small and one feature each; the files that they read are made by
+`tests.corpus_files`.
+"""
+
+import re
+import shutil
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import compare
+from comparisons.options import Options
+from heuristic.errors import InputError
+from reference import Source
+from reference.plan import wants_spectra
+from tests import corpus_files
+
+CORPUS = Path(__file__).parent / "corpus"
+
+REFUSED = {
+    "emitter-timed-sunsky",  # its table of the sun's path cannot be read inside a kernel
+    "refused-missing",
+    "refused-parameter",
+    "refused-unknown",
+}
+"""Scenes that Mitsuba itself does not render."""
+
+IN_EVERY_RUN = (
+    "bsdf-b*", "bsdf-[cdmnt]*", "bsdf-pr*", "emitter-*area*", "emitter-envmap", "emitter-sunsky",
+    "film-crop", "integrator-aov", "integrator-direct-hidden", "medium-c*", "refused-*",
+    "sensor-irr*", "sensor-several", "shape-instance", "shape-merge", "shape-ply",
+)  # fmt: skip
+"""What the project's code treats in its own way; the rest is Mitsuba's alone, and marked slow."""
+
+EXCEPTIONS = {
+    "measured_polarized": "only polarised variants have it",
+    "blender": "reads a pointer into a running Blender",
+    "rawconstant": "made by Mitsuba's parser, from a colour that is no spectrum",
+    "srgb": "made by Mitsuba's parser, from RGB",
+    "uniform": "made by Mitsuba's parser, from a number",
+    "irregular": "made by Mitsuba's parser, from a tabulated spectrum",
+    "regular": "made by Mitsuba's parser, from an evenly tabulated spectrum",
+}
+
+
+def scenes(patterns=("*",)):
+    return sorted({path.stem for pattern in patterns for path in CORPUS.glob(f"{pattern}.xml")})
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    """A folder with the scenes and the files that they read."""
+    mi.set_variant("llvm_ad_rgb")
+    folder = tmp_path_factory.mktemp("corpus")
+    shutil.copytree(CORPUS, folder, dirs_exist_ok=True)
+    corpus_files.write(folder)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def silent():
+    """Mitsuba's own warnings, such as that a filter is wider than a meter's pixel, are not ours."""
+    mi.set_variant("llvm_ad_rgb")
+    level = mi.log_level()
+    mi.set_log_level(mi.LogLevel.Error)
+    yield
+    mi.set_log_level(level)
+
+
+def variant_of(path):
+    mi.set_variant("llvm_ad_rgb")
+    try:
+        return (
+            "llvm_ad_spectral" if wants_spectra(Source(path.stem, path).parse()) else mi.variant()
+        )
+    except InputError:
+        return mi.variant()
+
+
+def mitsuba_renders(path):
+    try:
+        image = mi.render(mi.load_file(str(path)), spp=1)
+    except RuntimeError:
+        return False
+    return bool(np.isfinite(np.array(image)).all())
+
+
+def check(path):
+    mi.set_variant(variant_of(path))
+    source, options = Source(path.stem, path), Options(spp=4)
+    if path.stem in REFUSED:
+        with pytest.raises(InputError):
+            compare(source, options)
+        assert not mitsuba_renders(path)
+        return
+    comparison = compare(source, options)
+    for image in (comparison.images.heuristic, comparison.images.reference):
+        assert np.isfinite(image).all()
+        assert image.max() > 0, "a black picture compares nothing"
+
+
+QUICK = scenes(IN_EVERY_RUN)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_scene_is_compared_or_refused_as_mitsuba_refuses_it(name, rgb, corpus):
+    check(corpus / f"{name}.xml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({*scenes()} - {*QUICK}))
+def test_any_other_scene_is_compared_or_refused_as_mitsuba_refuses_it(name, rgb, corpus):
+    check(corpus / f"{name}.xml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scenes(("bsdf-*", "emitter-*", "medium-*")))
+def test_a_scene_is_compared_in_spectra(name, spectral, corpus):
+    path = corpus / f"{name}.xml"
+    if path.stem in REFUSED:
+        assert not mitsuba_renders(path)
+        return
+    assert np.isfinite(compare(Source(name, path), Options(spp=4)).images.heuristic).all()
+
+
+def test_the_corpus_covers_all_plugins_but_those_that_it_says():
+    shipped = {path.stem for path in (Path(mi.__file__).parent / "plugins").glob("*.so")}
+    used = set()
+    for path in CORPUS.glob("*.xml"):
+        used |= set(re.findall(r'type="(\w+)"', path.read_text()))
+    assert shipped - used == set(EXCEPTIONS)

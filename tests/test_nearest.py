@@ -1,0 +1,311 @@
+"""The nearest phong of other materials, nearest lights, and straight-through transparency."""
+
+from math import cos, pi, radians
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import prepare
+from comparisons.options import Options
+from comparisons.verification import verify
+from reference import Convention, Source, albedo, halves
+from reference.albedo import RoughPlastic
+from reference.measured_lights import beam, mean_radiance
+from reference.nearest import nearest_of
+from tests.test_physics import look_at
+
+BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
+CHECKS = {
+    "type": "checkerboard",
+    "color0": {"type": "rgb", "value": [0.9, 0.6, 0.3]},
+    "color1": {"type": "rgb", "value": [0.1, 0.2, 0.4]},
+}
+GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 0.8}
+SUN = {"type": "directional", "direction": [0.4, 0.2, -1.0], "irradiance": 2.0}
+
+
+def scene(shapes, light=SUN, integrator="direct"):
+    """Shapes seen from above, of which nothing shadows another."""
+    return {
+        "type": "scene",
+        "integrator": {"type": integrator},
+        "sensor": {
+            "type": "perspective",
+            "fov": 30.0,
+            "to_world": look_at((0.5, -1, 4)),
+            "film": {"type": "hdrfilm", "width": 24, "height": 16, "rfilter": {"type": "box"}},
+        },
+        "light": light,
+    } | shapes
+
+
+def images(description, spp=4):
+    """Render both halves of a pair with the same camera rays."""
+    ready = prepare(Source("a test", description), Options(spp=spp))
+    return [np.array(half.render(0)) for half in (ready.heuristic, ready.reference)]
+
+
+def material(bsdf, convention=Convention.MATCHED):
+    graph = Source("a test", {"type": "scene", "shape": {"type": "sphere", "bsdf": bsdf}}).parse()
+    ((_, index),) = graph.children(1, BSDF)
+    return nearest_of(graph, index, convention)
+
+
+def raw(values):
+    return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(np.asarray(values, np.float32))}
+
+
+def waves(size=32):
+    x, y = np.meshgrid(*[2 * pi * (np.arange(size) + 0.5) / size] * 2)
+    return np.sin(x), np.cos(y)
+
+
+def normal_map():
+    x, y = (0.4 * wave for wave in waves())
+    return raw((np.stack([x, y, np.sqrt(1 - x**2 - y**2)], axis=2) + 1) / 2)
+
+
+# --- Exact pairs -----------------------------------------------------------------------------
+
+DIFFUSE = {"type": "diffuse", "reflectance": CHECKS}
+OTHER = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.3, 0.8]}}
+EXACT = {
+    "texture": DIFFUSE,
+    "blend": {"type": "blendbsdf", "weight": GREY_CHECKS, "a": OTHER, "b": DIFFUSE},
+    "front": {"type": "twosided", "a": DIFFUSE, "b": OTHER},
+    "normal map": {
+        "type": "normalmap",
+        "normalmap": normal_map,
+        "use_shadowing_function": False,
+        "nested": DIFFUSE,
+    },
+    "bump map": {
+        "type": "bumpmap",
+        "heights": lambda: raw((0.5 + 0.1 * waves()[0] * waves()[1])[..., None]),
+        "scale": 2.0,
+        "use_shadowing_function": False,
+        "nested": DIFFUSE,
+    },
+}
+
+
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize("turned", [False, True], ids=["front", "back"])
+def test_diffuse_surfaces_inside_other_bsdfs_stay_exact_pairs(name, turned, rgb):
+    bsdf = {key: value() if callable(value) else value for key, value in EXACT[name].items()}
+    flip = mi.ScalarTransform4f().rotate([1, 0, 0], 180 if turned else 0)
+    heuristic, reference = images(scene({"s": {"type": "rectangle", "to_world": flip, "b": bsdf}}))
+    assert turned or reference.max() > 0.1
+    np.testing.assert_allclose(heuristic, reference, atol=2e-5)
+
+
+def test_the_back_of_a_twosided_has_its_own_material(rgb):
+    flip = mi.ScalarTransform4f().rotate([1, 0, 0], 180)
+    shape = {"type": "rectangle", "to_world": flip, "b": EXACT["front"]}
+    heuristic, _ = images(scene({"s": shape}))
+    cosine = 1 / np.sqrt(0.4**2 + 0.2**2 + 1)
+    expected = np.array([0.2, 0.3, 0.8]) * 2.0 / pi * cosine
+    np.testing.assert_allclose(heuristic.max(axis=(0, 1)), expected, rtol=1e-5)
+
+
+# --- Transparency ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rgb", "spectral"])
+def test_layers_of_opacity_let_through_the_product_of_their_transmittances(name, request):
+    request.getfixturevalue(name)
+    opacities = (0.5, 0.3, 0.8)
+    black = {"type": "diffuse", "reflectance": 0.0}
+    layers = {
+        f"layer {number}": {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().translate([0, 0, number]).scale(9),
+            "b": {"type": "mask", "opacity": opacity, "nested": black},
+        }
+        for number, opacity in enumerate(opacities)
+    }
+    sky = {"type": "constant", "radiance": 2.0}
+    through, _ = images(scene(layers, sky))
+    sky_alone, _ = images(scene({"far": {"type": "sphere", "center": [0, 0, -99]}}, sky))
+    expected = sky_alone * np.prod([1 - opacity for opacity in opacities])
+    np.testing.assert_allclose(through, expected, rtol=2e-5)
+
+
+def test_a_box_that_is_not_there_changes_nothing(rgb):
+    floor = {"floor": {"type": "rectangle", "b": DIFFUSE}}
+    box = {
+        "box": {
+            "type": "cube",
+            "to_world": mi.ScalarTransform4f().scale(0.5),
+            "b": {"type": "null"},
+        }
+    }
+    without, _ = images(scene(floor))
+    with_box, _ = images(scene(floor | box))
+    np.testing.assert_allclose(with_box, without, atol=1e-5)
+
+
+def test_nothing_is_traced_for_transparency_where_no_material_has_it(rgb, kernel_history):
+    def kernel(bsdf):
+        pair = halves.pair(Source("a test", scene({"floor": {"type": "rectangle", "b": bsdf}})))
+        made = pair.heuristic.instantiate()
+        kernels = kernel_history(lambda: mi.render(made, spp=1))
+        return max(kernel["operation_count"] for kernel in kernels)
+
+    opaque = {"type": "mask", "opacity": 1.0, "nested": OTHER}
+    holed = {"type": "mask", "opacity": 0.5, "nested": OTHER}
+    assert kernel(opaque) == kernel(OTHER) < kernel(holed)
+
+
+# --- Materials -------------------------------------------------------------------------------
+
+
+def test_a_metal_reflects_at_normal_incidence_what_fresnel_says(rgb):
+    found = material({"type": "conductor", "eta": 1.5, "k": 2.5})
+    expected = ((1.5 - 1) ** 2 + 2.5**2) / ((1.5 + 1) ** 2 + 2.5**2)
+    assert found.k_s * 2 / (found.n + 2) == pytest.approx(expected, rel=1e-5)
+    assert found.k_a == pytest.approx(expected, rel=1e-5)
+    assert found.k_d == 0
+
+
+def test_glass_lets_through_what_it_does_not_reflect(rgb):
+    found = material({"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0})
+    assert found.k_s * 2 / (found.n + 2) == pytest.approx(0.04, abs=2e-4)
+    assert found.transmittance == pytest.approx(0.96, abs=2e-4)
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_a_textured_plastic_is_at_each_point_what_its_colour_alone_is(rgb, nonlinear):
+    """White light on two reflectances: each texel shows the value of one plain material."""
+    bsdf = {"type": "roughplastic", "alpha": 0.2, "nonlinear": nonlinear}
+    levels = (0.9, 0.3)
+    checks = {"type": "checkerboard", "color0": levels[0], "color1": levels[1]}
+    textured, *plain = (
+        images(scene({"s": {"type": "rectangle", "b": bsdf | {"diffuse_reflectance": given}}}))[0]
+        for given in (checks, *levels)
+    )
+    assert (textured <= plain[0] + 2e-5).all()
+    assert (textured >= plain[1] - 2e-5).all()
+    for image, other in (plain, plain[::-1]):
+        assert (np.abs(textured - image).max(axis=2) < 2e-5).sum() > 20
+        assert np.abs(image - other).max() > 0.1
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_the_base_of_a_plastic_follows_from_two_albedos(rgb, nonlinear):
+    plastic = {"type": "roughplastic", "alpha": 0.3, "nonlinear": nonlinear}
+    tint = {"type": "checkerboard", "color0": 0.65, "color1": 0.65}
+    graph = Source(
+        "a test",
+        {"type": "scene", "s": {"type": "sphere", "b": plastic | {"diffuse_reflectance": tint}}},
+    ).parse()
+    ((_, index),) = graph.children(1, BSDF)
+    texture = graph.instantiate(nearest_of(graph, index, Convention.MATCHED).k_d.index())
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    ior = float(mi.lookup_ior(mi.Properties("x"), "int_ior", "polypropylene"))
+    air = float(mi.lookup_ior(mi.Properties("x"), "ext_ior", "air"))
+    wanted = albedo.of_roughplastic(RoughPlastic((0.65,) * 3, 0.3, ior, air, nonlinear=nonlinear))
+    assert texture.eval(si)[0][0] == pytest.approx(wanted.diffuse[0], rel=1e-4)
+
+
+@pytest.mark.parametrize(("alpha", "diffuse"), [(0.1, 0.3), (0.3, 0.6)])
+def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
+    """A plugin of a user's own around ``roughplastic``, for which there is a rule to compare."""
+    given = {"type": "roughplastic", "alpha": alpha, "diffuse_reflectance": diffuse}
+
+    class Own(mi.BSDF):
+        def __init__(self, props):
+            super().__init__(props)
+            self.inner = mi.load_dict(given)
+            self.m_components = [self.inner.flags(i) for i in range(2)]
+            self.m_flags = self.inner.flags()
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            return self.inner.sample(ctx, si, sample1, sample2, active)
+
+        def eval(self, ctx, si, wo, active=True):
+            return self.inner.eval(ctx, si, wo, active)
+
+        def pdf(self, ctx, si, wo, active=True):
+            return self.inner.pdf(ctx, si, wo, active)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.inner.eval_pdf(ctx, si, wo, active)
+
+        def to_string(self):
+            return "Own[]"
+
+    mi.register_bsdf("own", Own)
+    known, found = material(given), material({"type": "own"})
+    assert found.k_d == pytest.approx(known.k_d[0], rel=0.1)
+    assert found.n == pytest.approx(known.n, rel=0.3)
+    whole = [np.max(m.k_s) * 2 / (m.n + 2) + np.max(m.k_d) for m in (known, found)]
+    assert whole[1] == pytest.approx(whole[0], rel=0.02)
+    heuristic, reference = images(scene({"s": {"type": "rectangle", "b": {"type": "own"}}}))
+    assert heuristic.mean() == pytest.approx(reference.mean(), rel=0.15)
+
+
+# --- Lights ----------------------------------------------------------------------------------
+
+
+def lone(emitter):
+    graph = Source("a test", {"type": "scene", "e": emitter}).parse()
+    (index,) = graph.nodes(EMITTER)
+    return graph, graph.instantiate(index)
+
+
+def test_ambient_light_is_the_mean_of_the_map_over_the_sphere(rgb):
+    """``L = cos^2`` of the angle to the axis has the mean 1/3."""
+    rows = 256
+    theta = np.linspace(0, pi, rows)  # Mitsuba's first row is the pole itself
+    radiance = np.repeat(np.cos(theta)[:, None, None] ** 2, 2 * rows, axis=1) * [3.0, 6.0, 9.0]
+    bitmap = mi.Bitmap(radiance.astype(np.float32))
+    graph, emitter = lone({"type": "envmap", "bitmap": bitmap, "scale": 1.0})
+    np.testing.assert_allclose(mean_radiance(graph, emitter), [1, 2, 3], rtol=2e-3)
+
+
+def test_an_even_spot_is_its_own_nearest_beam(rgb):
+    look = mi.ScalarTransform4f().look_at([1, 2, 3], [1, 2, 0], [0, 1, 0])
+    spot = {"type": "spot", "to_world": look, "intensity": 5.0, "cutoff_angle": 12.0}
+    graph, emitter = lone(spot | {"beam_width": 11.999})
+    found = beam(graph, emitter, [1, 2, 3], [0, 0, -1])
+    assert found.cutoff == pytest.approx(12, rel=2e-3)
+    assert found.intensity == pytest.approx(5, rel=2e-3)
+
+
+def test_a_beam_keeps_the_flux_of_a_spot_that_falls_off(rgb):
+    """A linear fall-off of the angle from the axis on, integrated in closed form."""
+    edge = radians(30)
+    flux = 2 * pi * (1 - np.sin(edge) / edge)  # int (1 - t / edge) sin(t) dt
+    graph, emitter = lone(
+        {"type": "spot", "intensity": 1.0, "cutoff_angle": 30.0, "beam_width": 0.0}
+    )
+    found = beam(graph, emitter, [0, 0, 0], [0, 0, 1])
+    cone = 2 * pi * (1 - cos(radians(found.cutoff)))
+    assert found.intensity * cone == pytest.approx(flux, rel=2e-3)
+
+
+# --- Planning --------------------------------------------------------------------------------
+
+
+def test_metals_are_opaque_and_pruning_is_right_about_them(rgb):
+    ball = {"s": {"type": "sphere", "b": {"type": "roughconductor", "alpha": 0.3}}}
+    description = scene(ball, {"type": "constant"}, integrator="path")
+    result = verify(Source("a test", description), Options(spp=64))
+    assert "direct_all" in result.planned
+    assert result.significant == 0
+
+
+def test_nothing_is_pruned_for_a_material_that_lets_light_through(rgb):
+    ball = {"s": {"type": "sphere", "b": {"type": "dielectric"}}}
+    ready = prepare(Source("a test", scene(ball, integrator="path")), Options(spp=4))
+    assert (ready.plan.integrator, ready.plan.max_depth) == ("path", -1)
+
+
+@pytest.mark.parametrize(("given", "expected"), [("path", "path"), ("volpathmis", "volpathmis")])
+def test_a_path_tracer_that_the_scene_names_is_kept(rgb, given, expected):
+    ball = {"s": {"type": "sphere", "b": {"type": "null"}}}
+    ready = prepare(Source("a test", scene(ball, integrator=given)), Options(spp=4))
+    assert ready.plan.integrator == expected
