@@ -195,8 +195,11 @@ def _furnace(plastic):
 def lights_of(scene):
     """Return the :class:`Lights` of a scene."""
     points, directions, surrounding = [], [], False
+    shining = [shape for shape in scene.shapes() if shape.is_emitter()]
     for emitter in scene.emitters():
         flags = emitter.flags()
+        if flags & +mi.EmitterFlags.Surface:
+            continue
         params = mi.traverse(emitter)
         if flags & +mi.EmitterFlags.DeltaPosition:
             points.append(_given(params, "position", column=3))
@@ -204,9 +207,12 @@ def lights_of(scene):
             directions.append(-_given(params, "direction", column=2))
         elif flags & +mi.EmitterFlags.Infinite:
             surrounding = True
-    for shape in scene.shapes():
-        if shape.is_emitter():
-            points.extend(_points_on(shape))
+    for shape in shining:
+        places, normals = _points_on(shape)
+        if shape.emitter().flags() & +mi.EmitterFlags.DeltaDirection:
+            directions.extend(-np.unique(normals, axis=0))
+        else:
+            points.extend(places)
     return Lights(np.reshape(points, (-1, 3)), np.reshape(directions, (-1, 3)), surrounding)
 
 
@@ -218,7 +224,8 @@ def _given(params, name, column):
 
 
 def _points_on(shape):
-    """Return points of a shape, (N, 3), by its own sampling on a grid with its edges."""
+    """Return points of a shape and its normals, (N, 3) each, by sampling a grid with its edges."""
     places = np.linspace(0, 1 - 2**-24, LIGHT_GRID)
     x, y = (axis.ravel() for axis in np.meshgrid(places, places))
-    return np.array(shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y))).p, float).T
+    found = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
+    return np.array(found.p, float).T, np.array(found.n, float).T

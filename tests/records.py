@@ -75,7 +75,16 @@ def record():
             "reference": {**side, "total_s": 2.79},
             "stages": {"page": 0.1},
         },
-        "unrepresentable": ["dielectric: refraction"],
+        "unrepresentable": [
+            {
+                "name": "pane",
+                "plugin": "dielectric",
+                "lost": "refraction",
+                "nearest": "seen straight through",
+            }
+        ],
+        "integrator_given": "path",
+        "overridden": [{"what": "sampler", "given": "independent", "used": "multijitter"}],
         "warnings": ["material reflects more than it receives"],
         "versions": {"mitsuba": "3.9.1"},
         "command": "fotismos compare fig-8-9 --seed 7",

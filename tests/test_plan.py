@@ -8,7 +8,6 @@ import pytest
 from comparisons.compare import Options, prepare
 from comparisons.scenes import SCENES
 from comparisons.verification import verify
-from heuristic.errors import InputError
 from reference.effects import Effect
 from reference.environment import AlbedoTable
 from reference.plan import wants_spectra
@@ -164,10 +163,12 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
     assert result.heuristic_largest < 1e-6
 
 
-def test_light_through_glass_is_not_planned_at_all_yet(rgb):
+def test_nothing_is_pruned_where_light_may_come_through_glass(rgb):
     pane = {"type": "rectangle", "bsdf": {"type": "dielectric"}}
-    with pytest.raises(InputError, match="dielectric"):
-        prepare(Source("glass", scene(object=ball(), pane=pane, light=lamp((0, 0, 5)))))
+    ready = prepare(Source("glass", scene(object=ball(), pane=pane, light=lamp((0, 0, 5)))))
+    for effect in (Effect.TRANSMISSION, Effect.OCCLUSION, Effect.INTERREFLECTION):
+        assert ready.plan.calls_for(effect)
+    assert (ready.plan.integrator, ready.plan.max_depth) == ("path", -1)
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if "lamp" not in name])

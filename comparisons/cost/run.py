@@ -202,10 +202,10 @@ def quick(source, options=None, progress=None, command=""):
 
 def default_resolution(source, options, width=WIDTH):
     """Return the film's resolution, reduced to a width; smaller films stay as they are."""
-    from reference import halves
+    from reference import halves, preparation
 
     graph = halves.pair(source, options.convention).physical
-    ((_, film),) = graph.children(graph.nodes(halves.SENSOR)[0], halves.FILM)
+    ((_, film),) = graph.children(graph.nodes(preparation.SENSOR)[0], preparation.FILM)
     props = graph.props(film)
     given = int(props.get("width", 768)), int(props.get("height", 576))
     if given[0] <= width:
