@@ -137,6 +137,9 @@ class Graph:
             for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
+        # A plugin written in Python that evaluates something, made by one of several threads, would
+        # wait for ever for another that waits for Python.
+        self.config.parallel = not any(map(_is_python, state.nodes))
         try:
             with _files_from(self.folder):
                 made = Parser.instantiate(self.config, state)
@@ -247,6 +250,12 @@ def _files_from(folder):
         yield
     finally:
         mi.set_file_resolver(before)
+
+
+def _is_python(node):
+    """Tell whether a node's plugin is written in Python, a user's own included."""
+    is_unknown = node.type == mi.ObjectType.Unknown
+    return is_unknown or node.props.plugin_name() in KINDS_OF_OWN_PLUGINS
 
 
 def _message(error):

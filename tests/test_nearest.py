@@ -67,6 +67,14 @@ def normal_map():
     return raw((np.stack([x, y, np.sqrt(1 - x**2 - y**2)], axis=2) + 1) / 2)
 
 
+def test_only_what_has_no_plugin_in_python_is_made_in_parallel(rgb):
+    """Two threads would wait for each other: one for Python, one for what Python evaluates."""
+    pair = halves.pair(Source("a test", scene({"ball": {"type": "sphere", "bsdf": DIFFUSE}})))
+    for graph, expected in ((pair.heuristic, False), (pair.physical, True)):
+        graph.instantiate()
+        assert graph.config.parallel is expected
+
+
 # --- Exact pairs -----------------------------------------------------------------------------
 
 DIFFUSE = {"type": "diffuse", "reflectance": CHECKS}
