@@ -23,7 +23,7 @@ from heuristic.interpolation import Interpolation
 from reference.effects import Effect
 from reference.rendering import Accumulator
 from reference.scene import set_variant
-from reports import cli
+from reports import cli, cost_tables
 from reports import cost as results
 from tests.test_plan import scene as described
 
@@ -137,12 +137,12 @@ def test_the_record_holds_to_its_schema_and_survives_json(study):
     record = json.loads(made["cost.json"])
     jsonschema.Draft202012Validator(SCHEMA).validate(record)
     assert made["cost.svg"].startswith(b"<svg")
-    rungs = {name for name in made if name.startswith("rung-")}
+    rungs = {name for name in made if name.startswith("cost-rung-")}
     assert len(rungs) == len(record["rungs"])
 
 
 def test_every_method_and_effect_is_in_the_tables(study):
-    text = "\n".join(results.lines(study.data))
+    text = "\n".join(cost_tables.lines(study.data))
     for rung in study.data["rungs"]:
         assert rung["name"].split(",")[0] in text
     for price in study.data["prices"]["effects"]:
@@ -326,7 +326,7 @@ def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
     assert "Price of an effect" in printed
     assert record["command"].startswith("fotismos cost fig-8-9")
     assert "--rounds 2" in record["command"]
-    assert {"cost.svg", "reference.png", "rung-phong-kernel.png"} <= {
+    assert {"cost.svg", "cost-reference.png", "cost-rung-phong-kernel.png"} <= {
         path.name for path in place.iterdir()
     }
     assert not list(place.glob("*.partial"))
