@@ -1,5 +1,6 @@
 """Comparing the halves of a scene: both rendered pass by pass, and the difference measured."""
 
+import gc
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from time import perf_counter
@@ -57,6 +58,8 @@ def prepare(source, options=None):
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
     planning = perf_counter() - begin
     width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
+    # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
+    gc.collect()
     planned = passes.schedule(chosen, width * height, options.spp, options.noise)
     return Prepared(
         pair=pair,

@@ -1,8 +1,10 @@
 """The record of a comparison: images, and the plain data that ``comparison.json`` holds."""
 
+import os
 import platform
 from dataclasses import asdict, dataclass
 from importlib import metadata
+from pathlib import Path
 
 import drjit as dr
 import numpy as np
@@ -43,6 +45,26 @@ def versions():
     found |= {library: metadata.version(library) for library in LIBRARIES}
     found["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
     return found
+
+
+def machine():
+    """Return what times depend on: processor, cores that may be used, system."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count() or 1,
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _processor():
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
 
 
 def pairing_data(pair):

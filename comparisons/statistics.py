@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from comparisons.exposure import best_exposure, least_squares_factor
 from comparisons.metrics import (
     DEFAULT_VIEWING,
     Array,
@@ -26,12 +27,6 @@ from comparisons.metrics import (
     log2_luminance_ratio,
     rmse,
 )
-
-#: The best exposure is sought within this many stops on either side of none.
-EXPOSURE_STOPS = 6.0
-
-#: Pixels on which the best exposure is sought, and those that bracket it first.
-_SEARCH_PIXELS, _BRACKET_PIXELS = 16_384, 2_048
 
 #: Pixels measured at a time: temporaries stay small whatever the image's size.
 _BLOCK_PIXELS = 2**20
@@ -115,7 +110,7 @@ def summarise(
     distance = _distance(metric, test, reference, viewing)
     numbers = _numbers(distance[mask])
 
-    factor = _best_exposure(metric, test, reference, mask, viewing)
+    factor = best_exposure(metric, test, reference, mask, viewing)
     after = numbers
     if factor != 1.0:
         exposed = _distance(metric, test, reference, viewing, factor)
@@ -138,7 +133,7 @@ def summarise_rmse(
     mask = np.asarray(mask, bool)
     test, reference = test[mask], reference[mask]
     value = rmse(test, reference)
-    factor = _least_squares_factor(test, reference)
+    factor = least_squares_factor(test, reference)
     after = rmse(factor * test, reference)
     if after > value:
         factor, after = 1.0, value
@@ -158,36 +153,6 @@ def summarise_log2_luminance(
         return RatioSummary(0.0, 0.0, 0.0, 0.0), ratio
     p05, p50, p95 = np.percentile(values, (5, 50, 95))
     return RatioSummary(float(values.mean()), float(p05), float(p50), float(p95)), ratio
-
-
-def best_exposure(
-    metric: Metric,
-    test: ArrayLike,
-    reference: ArrayLike,
-    mask: ArrayLike,
-    viewing: Viewing = DEFAULT_VIEWING,
-) -> float:
-    """The factor on `test`, within ±6 stops, that makes the mean of `metric` over `mask` smallest.
-
-    The mean is taken over at most 16,384 counted pixels, drawn with a fixed seed. Whole stops
-    bracket the minimum, a bounded scalar search (Brent) finds it to 0.001 stop, and the factors
-    1 and least squares compete with it, so an image that is a multiple of the reference gives
-    that multiple exactly. 1 if no pixel counts or if either image has no positive value there.
-    Raises as `comparisons.metrics.delta_e_2000`.
-    """
-    test, reference = checked_pair(test, reference)
-    return _best_exposure(metric, test, reference, np.asarray(mask, bool), viewing)
-
-
-def best_exposure_rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike) -> float:
-    """The factor on `test` that makes the linear RMSE over `mask` smallest.
-
-    Least squares in closed form, ``Σ test·reference / Σ test²``; 1 where that is not positive.
-    Raises as `comparisons.metrics.delta_e_2000`.
-    """
-    test, reference = checked_pair(test, reference)
-    mask = np.asarray(mask, bool)
-    return _least_squares_factor(test[mask], reference[mask])
 
 
 def noise_floor(
@@ -253,36 +218,3 @@ def _noise_floor(
         )
         place += len(here)
     return float(values.mean())
-
-
-def _least_squares_factor(test: Array, reference: Array) -> float:
-    energy, overlap = float(np.vdot(test, test)), float(np.vdot(test, reference))
-    return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
-
-
-def _best_exposure(
-    metric: Metric, test: Array, reference: Array, mask: Array, viewing: Viewing
-) -> float:
-    from scipy.optimize import minimize_scalar
-
-    lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
-    if not all(lit):
-        return 1.0
-    # A random draw, not every n-th pixel: a stride would fall in step with the columns.
-    places = np.flatnonzero(mask)
-    count = min(len(places), _SEARCH_PIXELS)
-    drawn = places[np.random.default_rng(0).choice(len(places), count, replace=False)]
-    test, reference = test.reshape(-1, 3)[drawn], reference.reshape(-1, 3)[drawn]
-    coordinates = metric.coordinates(reference, viewing)
-
-    def mean_at(stops: float, count: int | None = None) -> float:
-        exposed = metric.coordinates(2.0**stops * test[:count], viewing)
-        return float(metric.difference(coordinates[:count], exposed).mean())
-
-    whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
-    start = whole_stops[np.argmin([mean_at(s, _BRACKET_PIXELS) for s in whole_stops])]
-    bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
-    found = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-    least_squares = np.log2(_least_squares_factor(test, reference))
-    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), found.x]
-    return float(2.0 ** min(candidates, key=mean_at))

@@ -4,62 +4,66 @@ A scene that cannot be compared does not keep the others from it: the page names
 and the command ends with that error's exit code.
 """
 
+import shlex
+import sys
 from time import perf_counter
 
 import click
 
 from heuristic.errors import FotismosError
 from reports import jobs
+from reports.run import Run
 
-START = perf_counter()
 
+def start():
+    """Load what renders, and begin the record of a run.
 
-def run(names, folder, rendering, equations=(), verifications=(), with_hard_cases=False):
-    """Compare scenes and write the results of each, then the page of all."""
+    Raises
+    ------
+    InstallationError
+        When LLVM cannot be used.
+    """
     jobs.check_installation()
-    from comparisons.compare import compare
-    from comparisons.hard import record
-    from reference.scene import set_variant
-    from reports import hard_cases, output, passes, progress
+    import comparisons.compare  # noqa: F401  part of start-up
+
+    return Run(shlex.join(["fotismos", *sys.argv[1:]]))
+
+
+def run(names, folder, rendering, with_cost=False):
+    """Compare scenes and write the results of each, then the page of all."""
+    finish(start(), names, folder, rendering, with_cost)
+
+
+def finish(run, names, folder, rendering, with_cost=False, with_hard_cases=False, **shown):
+    """Do the same for a run that has begun; ``shown`` is what else the page shows."""
+    from reports import hard_cases, output, progress
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
     views, failures = {}, {}
     with progress.shown() as bar:
         for source, chosen in wanted:
-            start_up = perf_counter() - START if not views else 0.0
-            set_variant(chosen["variant"])
             name = output.folder_name(source.name, views)
-            options = jobs.options(chosen)
-            kept = passes.of_scene(folder, name, source, options, chosen["variant"])
             try:
-                result = compare(
-                    source, options, bar.of(source.name), jobs.command(source, chosen), kept
-                )
+                views[name] = _scene(run, folder, name, source, chosen, with_cost, bar)
             except FotismosError as error:
                 if len(wanted) == 1:
                     raise
                 failures[source.name] = error
-                continue
-            begin = perf_counter()
-            views[name] = output.write_scene(folder, name, result)
-            kept.remove()
-            stages = result.data["time"]["stages"]
-            stages |= {"start-up": start_up, "files": perf_counter() - begin}
-    begin = perf_counter()
-    shown = hard_cases.view(record.collect()) if with_hard_cases else None
+    if with_hard_cases:
+        from comparisons.hard import record
+
+        with run.timing("hard cases"):
+            shown["hard_cases"] = hard_cases.view(record.collect())
+    run.begin_page()
     output.write_page(
         folder,
         list(views.values()),
-        equations=equations,
-        verifications=verifications,
-        hard_cases=shown,
         failures=[(name, str(error)) for name, error in failures.items()],
+        run=run,
+        **shown,
     )
-    share = (perf_counter() - begin) / max(len(views), 1)
-    for name, view in views.items():
-        view["record"]["time"]["stages"]["page"] = share
-        output.rewrite_record(folder, name, view["record"])
+    output.write_run(folder, run.data())
     if views:
         for line in progress.summary(view["record"] for view in views.values()):
             click.echo(line)
@@ -68,3 +72,38 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
         name, error = next(iter(failures.items()))
         count = f"{len(failures)} of {len(wanted)} scenes failed, "
         raise type(error)(f"{count}the first of them {name}: {error}") from error
+
+
+def _scene(run, folder, name, source, chosen, with_cost, bar):
+    """Compare one scene, write its files, and return what the page needs of it."""
+    from comparisons.compare import compare
+    from reference.scene import set_variant
+    from reports import output, passes
+
+    set_variant(chosen["variant"])
+    options, progress = jobs.options(chosen), bar.of(source.name)
+    kept = passes.of_scene(folder, name, source, options, chosen["variant"])
+    begin = perf_counter()
+    result = compare(source, options, progress, jobs.command(source, chosen), kept)
+    run.compared(result.data, perf_counter() - begin)
+    study = None
+    if with_cost:
+        with run.timing("cost"):
+            study = _cost(source, chosen, options, progress, result.data)
+    with run.timing("files"):
+        view = output.write_scene(folder, name, result, study)
+    kept.remove()
+    return view
+
+
+def _cost(source, chosen, options, progress, data):
+    """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
+    from comparisons.cost.dominance import in_region
+    from comparisons.cost.run import quick
+
+    study = quick(source, options, progress, jobs.command(source, chosen) + " --cost")
+    for region in data["regions"]:
+        effect = in_region(region, data["resolution"], study.effects)
+        if effect is not None:
+            region["effect"] = effect
+    return study

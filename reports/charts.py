@@ -5,6 +5,8 @@ A specification carries its data and names no address, so that nothing is loaded
 
 from math import log10
 
+from reports.labels import LABEL_GAP, label, rule, spread
+
 SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
 
 WIDTH, HEIGHT = 560, 380
@@ -13,21 +15,42 @@ WIDTH, HEIGHT = 560, 380
 LEAST_ERROR = 1e-3
 """ΔE2000: smaller ones are drawn at the lower border, since a logarithmic axis has no 0."""
 
-LABEL_GAP = 15
-"""Pixels from one name to the next, at least."""
-
 MARKS = {
-    "kernel": ("#b3450b", "square"),
-    "phong BSDF": ("#6a51a3", "triangle-up"),
-    "physical": ("#08519c", "circle"),
+    "kernel": ("#c8601d", "square"),
+    "phong BSDF": ("#8a74c9", "triangle-up"),
+    "physical": ("#2f7fc1", "circle"),
 }
-"""Colour and shape of each family; the shape tells them apart without colour."""
+"""Colour and shape of each family; the shape tells them apart without colour.
+Each is seen on white and on a dark ground."""
 
-INK, FAINT = "#222222", "#8a8a8a"
+FAINT = "#8a8a8a"
 
 
 def error_over_time(data):
     """Return the chart of ``cost.json``: mean ΔE2000 over seconds, both logarithmic.
+
+    It stands alone, with a title and a white ground; :func:`plot` is what a page shows.
+    """
+    return plot(data, ground="white") | {
+        "$schema": SCHEMA,
+        "description": f"Error against time of the methods on {data['scene']}",
+        "title": {
+            "text": f"{data['scene']}: error against time",
+            "subtitle": [f"{size(data)}, {machine(data)}", *reading(data)],
+            "anchor": "start",
+        },
+        "config": {
+            "font": "sans-serif",
+            "background": "white",
+            "axis": {"labelFontSize": 12, "titleFontSize": 13, "gridColor": "#e4e4e4"},
+            "title": {"fontSize": 15, "subtitleFontSize": 12, "subtitleColor": "#555555"},
+            "view": {"stroke": "#bbbbbb"},
+        },
+    }
+
+
+def plot(data, ground="transparent"):
+    """Return the plot of ``cost.json`` without a title, on a ground of any colour.
 
     Points of the Pareto front are filled. Lines join the sample counts of one rung. The dashed line
     is the slope −1/2 of plain Monte Carlo; the dotted one the reference's own noise, below which
@@ -41,34 +64,37 @@ def error_over_time(data):
     lowest = max(min(errors), LEAST_ERROR)
     y = _Axis(lowest, max(lowest, *errors), HEIGHT, flipped=True)
     for point in points:
-        point["error"] = max(point["error"], y.low)
+        point["shown"] = max(point["error"], y.low)
     layers = [
         *_slope(points, x, y),
         *_floor(floor, y),
         _lines(points, x, y),
-        _symbols(points, x, y),
+        _symbols(points, x, y, ground),
         *_names(points, x, y),
     ]
-    return {
-        "$schema": SCHEMA,
-        "description": f"Error against time of the methods on {data['scene']}",
-        "title": {
-            "text": f"{data['scene']}: error against time",
-            "subtitle": _subtitle(data),
-            "anchor": "start",
-        },
-        "width": WIDTH,
-        "height": HEIGHT,
-        "padding": {"left": 8, "right": 8, "top": 8, "bottom": 8},
-        "layer": layers,
-        "config": {
-            "font": "sans-serif",
-            "background": "white",
-            "axis": {"labelFontSize": 12, "titleFontSize": 13, "gridColor": "#e4e4e4"},
-            "title": {"fontSize": 15, "subtitleFontSize": 12, "subtitleColor": "#555555"},
-            "view": {"stroke": "#bbbbbb"},
-        },
-    }
+    # Names may be wider in the reader's font than where the picture is drawn.
+    padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
+    return {"width": WIDTH, "height": HEIGHT, "padding": padding, "layer": layers}
+
+
+def size(data):
+    """Say how large the images were, and how often each was rendered."""
+    width, height = data["resolution"]
+    return f"{width} × {height} pixels, {data['rounds']} rounds"
+
+
+def machine(data):
+    """Say what machine the times are of."""
+    return f"{data['machine']['cores']} cores, {data['machine']['processor']}"
+
+
+def reading(data):
+    """Return how to read the chart, in lines."""
+    slope = "dashed: slope −1/2, plain Monte Carlo; " if _sampled(data["points"]) else ""
+    return [
+        "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
+        f"{slope}dotted: noise of the reference itself",
+    ]
 
 
 class _Axis:
@@ -103,18 +129,6 @@ def _row(point):
     }
 
 
-def _subtitle(data):
-    width, height = data["resolution"]
-    machine = data["machine"]
-    return [
-        f"{width} × {height} pixels, {data['rounds']} rounds, {machine['cores']} cores,"
-        f" {machine['processor']}",
-        "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
-        f"{'dashed: slope −1/2, plain Monte Carlo; ' if _sampled(data['points']) else ''}"
-        "dotted: noise of the reference itself",
-    ]
-
-
 def _lines(points, x, y):
     return {
         "data": {"values": points},
@@ -123,7 +137,7 @@ def _lines(points, x, y):
     }
 
 
-def _symbols(points, x, y):
+def _symbols(points, x, y, ground):
     symbol = {
         "mark": {"type": "point", "size": 55, "strokeWidth": 1.6, "opacity": 1},
         "encoding": _encoding(x, y)
@@ -136,7 +150,7 @@ def _symbols(points, x, y):
             },
             "fill": {
                 "condition": {"test": "datum.front", **_colour()},
-                "value": "white",
+                "value": ground,
             },
             "tooltip": [
                 {"field": "rung", "title": "method"},
@@ -168,7 +182,7 @@ def _encoding(x, y):
             "axis": {"format": "~g", "tickCount": 6},
         },
         "y": {
-            "field": "error",
+            "field": "shown",
             "type": "quantitative",
             "scale": y.scale(),
             "title": "mean ΔE2000 to the reference (logarithmic)",
@@ -186,53 +200,6 @@ def _colour():
     }
 
 
-def _names(points, x, y):
-    """Return the rungs' names beside the plot, apart from each other, with lines to their points.
-
-    Each name belongs to its rung's slowest point.
-    """
-    last = {}
-    for point in sorted(points, key=lambda p: p["time"]):
-        last[point["rung"]] = point
-    ordered = sorted(last.values(), key=lambda p: y.pixel(p["error"]))
-    places = spread([y.pixel(p["error"]) for p in ordered], LABEL_GAP, HEIGHT)
-    layers = []
-    for point, place in zip(ordered, places, strict=True):
-        start = {"x": x.pixel(point["time"]) + 6, "y": y.pixel(point["error"])}
-        layers += [
-            _rule((start["x"], start["y"]), (WIDTH + 10, place), color="#c4c4c4", strokeWidth=0.7),
-            _text(point["rung"], WIDTH + 14, place, color=MARKS[point["family"]][0]),
-        ]
-    return layers
-
-
-def spread(wanted, gap, length):
-    """Move places on a line apart: at least ``gap`` between neighbours, in the same order.
-
-    ``wanted`` are pixels in ascending order. Neighbours that would touch become a block about the
-    mean of what they want; blocks stay within ``[0, length]`` where they fit.
-    """
-    blocks = []
-    for place in wanted:
-        blocks.append([place])
-        while len(blocks) > 1 and _top(blocks[-1], gap) < _top(blocks[-2], gap) + gap * len(
-            blocks[-2]
-        ):
-            block = blocks.pop()
-            blocks[-1] += block
-    places = [_top(block, gap) + gap * i for block in blocks for i in range(len(block))]
-    for i in reversed(range(len(places))):  # pushed up from the lower end, then down from the upper
-        limit = places[i + 1] - gap if i + 1 < len(places) else length
-        places[i] = min(places[i], limit)
-    for i in range(len(places)):
-        places[i] = max(places[i], places[i - 1] + gap if i else 0)
-    return places
-
-
-def _top(block, gap):
-    return sum(block) / len(block) - gap * (len(block) - 1) / 2
-
-
 def _slope(points, x, y):
     """Return the line of slope −1/2 through the best point of any Monte Carlo rung."""
     sampled = _sampled(points)
@@ -248,7 +215,7 @@ def _slope(points, x, y):
         (x.pixel(time), y.pixel(last["error"] * (time / last["time"]) ** -0.5))
         for time in (begin, end)
     )
-    return [_rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
+    return [rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
 
 
 def _sampled(points):
@@ -261,33 +228,24 @@ def _floor(floor, y):
     if floor <= y.low:
         return []
     place = y.pixel(floor)
-    return [_rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3])]
+    return [rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3])]
 
 
-def _rule(start, end, **style):
-    return {
-        "data": {"values": [{}]},
-        "mark": {"type": "rule", "clip": False, **style},
-        "encoding": {
-            "x": {"value": start[0]},
-            "y": {"value": start[1]},
-            "x2": {"value": end[0]},
-            "y2": {"value": end[1]},
-        },
-    }
+def _names(points, x, y):
+    """Return the rungs' names beside the plot, apart from each other, with lines to their points.
 
-
-def _text(text, x, y, color):
-    return {
-        "data": {"values": [{}]},
-        "mark": {
-            "type": "text",
-            "text": text,
-            "align": "left",
-            "baseline": "middle",
-            "fontSize": 12,
-            "color": color,
-            "clip": False,
-        },
-        "encoding": {"x": {"value": x}, "y": {"value": y}},
-    }
+    Each name belongs to its rung's slowest point.
+    """
+    last = {}
+    for point in sorted(points, key=lambda p: p["time"]):
+        last[point["rung"]] = point
+    ordered = sorted(last.values(), key=lambda p: y.pixel(p["shown"]))
+    places = spread([y.pixel(p["shown"]) for p in ordered], LABEL_GAP, HEIGHT)
+    layers = []
+    for point, place in zip(ordered, places, strict=True):
+        start = x.pixel(point["time"]) + 6, y.pixel(point["shown"])
+        layers += [
+            rule(start, (WIDTH + 10, place), color="#9a9a9a", strokeWidth=0.7, opacity=0.6),
+            label(point["rung"], WIDTH + 14, place),
+        ]
+    return layers

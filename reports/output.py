@@ -8,10 +8,13 @@ from pathlib import Path
 
 from comparisons.metrics import METRICS
 from heuristic.errors import InputError
-from reports import embedding, exr, images, page
+from reports import cost, embedding, exr, images, page
 
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
+
+COST_FILES = "cost*"
+"""What `fotismos cost` writes."""
 
 
 def prepare(folder):
@@ -35,8 +38,10 @@ def prepare(folder):
     return folder
 
 
-def write_scene(folder, name, comparison):
+def write_scene(folder, name, comparison, study=None):
     """Write the files of one comparison to ``folder/name``, in place of an earlier result.
+
+    With a study of cost its files are written as well; without one, those of an earlier study stay.
 
     Returns
     -------
@@ -60,12 +65,16 @@ def write_scene(folder, name, comparison):
 
     layers = _layers(shown)
     files = pictures()
+    priced = cost.files(study) if study else {}
     with _replacing(folder / name) as place:
         for key, png in files.items():
             (place / f"{key}.png").write_bytes(png)
         exr.write(place / "comparison.exr", layers, _header(data))
         (place / "comparison.json").write_text(_json(data), encoding="utf-8")
+        for key, content in priced.items() if study else _kept(folder / name, COST_FILES):
+            (place / key).write_bytes(content)
     largest = max(data["resolution"])
+    links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
     return {
         "record": data,
         "images": files if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
@@ -73,7 +82,9 @@ def write_scene(folder, name, comparison):
             shown.heuristic, shown.reference, shown.maps["dE2000"], exposure
         ),
         "embedded": embedding.embed(exr.channels(layers), shown.counted),
-        "files": {file: f"{name}/{file}" for file in ("comparison.json", "comparison.exr")},
+        "files": {file: f"{name}/{file}" for file in links},
+        "charts": cost.figures(study.data) if study else (),
+        "cost": cost.view(study, priced) if study else None,
     }
 
 
@@ -82,9 +93,9 @@ def write_page(folder, views, **shown):
     _write(folder / "index.html", page.render(views, **shown))
 
 
-def rewrite_record(folder, name, data):
-    """Write a scene's record again, once the times of the page are known."""
-    _write(folder / name / "comparison.json", _json(data))
+def write_run(folder, data):
+    """Write ``run.json``: the command, where its time went, machine and versions."""
+    _write(folder / "run.json", _json(data))
 
 
 def folder_name(name, taken):
@@ -111,6 +122,12 @@ def _layers(shown):
         **{name: shown.maps[name] for name in METRICS},
         "significant": shown.significant,
     }
+
+
+def _kept(place, pattern):
+    """Yield the names and contents of an earlier result's files."""
+    for path in sorted(place.glob(pattern)):
+        yield path.name, path.read_bytes()
 
 
 def _header(data):

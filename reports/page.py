@@ -26,9 +26,10 @@ from markupsafe import Markup
 from comparisons.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
 from comparisons.spaces import luminance
 from heuristic.equations import Entry
-from reports import histograms, images, overview, vega
+from reports import cost_overview, effects, histograms, images, overview, vega
 from reports.legends import legends
 from reports.printing import about_noise, code_spans, number, parameter, percent, seconds
+from reports.run import Run
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
@@ -44,8 +45,8 @@ TEMPLATES = Path(__file__).parent / "templates"
 #: The parts of the page's style and of its script, in their order.
 STYLES = ("base", "overview", "scene", "viewer", "print")
 SCRIPTS = (
-    "numbers", "decoding", "tonemaps", "painting", "fragment", "viewport", "drawing", "inspector",
-    "pointer", "viewer", "keyboard", "overview", "charts", "main",
+    "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "viewport", "drawing",
+    "inspector", "pointer", "viewer", "keyboard", "overview", "charts", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
@@ -59,6 +60,7 @@ def render(
     verifications: Sequence[Mapping[str, Any]] = (),
     hard_cases: Mapping[str, Any] | None = None,
     failures: Sequence[tuple[str, str]] = (),
+    run: Run | None = None,
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
@@ -74,14 +76,16 @@ def render(
     embedded (optional)
         The scene's `reports.embedding.Embedded`, without which it has no viewer.
     charts (optional)
-        `reports.vega.Figure` records to show beside the histograms, such as what accuracy costs.
+        `reports.vega.Figure` records of what accuracy costs.
+    cost (optional)
+        What `reports.cost.view` returns, where the cost of accuracy was studied.
     files (optional)
         Paths relative to the page by label, shown as links.
 
     `equations` is the index of `heuristic.equations`, `verifications` the data of
     `comparisons.verification`, `hard_cases` what `reports.hard_cases.view` returns; each is a
     section of its own, left out where it is empty. `failures` are the scenes that could not be
-    compared, each with its message.
+    compared, each with its message. `run` says where the time went.
     """
     taken: set[str] = set()
     scenes = [_scene(comparison, taken) for comparison in comparisons]
@@ -108,6 +112,9 @@ def render(
             equations=equations,
             hard_cases=hard_cases,
             verifications=verifications,
+            cost_methods=cost_overview.METHODS,
+            cost_rows=cost_overview.rows(s["cost"]["record"] for s in scenes if s["cost"]),
+            run=run,
         )
     )
 
@@ -125,17 +132,25 @@ def _scene(comparison: Mapping[str, Any], taken: set[str]) -> dict[str, Any]:
         "embedded": comparison.get("embedded"),
         "histograms": histograms.figures(record),
         "charts": comparison.get("charts", ()),
+        "cost": _cost(comparison.get("cost")),
         "files": {
             label: "./" + quote(str(path)) for label, path in comparison.get("files", {}).items()
         },
     }
 
 
+def _cost(view: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    if view is None:
+        return None
+    return {**view, "images": {name: _data_uri(png) for name, png in view["images"].items()}}
+
+
 def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
     """What the page's script needs: the scenes, and how maps are drawn."""
     return {
         "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
-        "titles": {legend.name: legend.title for legend in legends()},
+        "titles": {legend.name: legend.title for legend in legends()} | {"effects": effects.TITLE},
+        "noEffect": effects.NO_EFFECT,
         "ranges": {name: metric.map_range[1] for name, metric in METRICS.items()}
         | {"log2_luminance": LOG2_RANGE},
         "colours": {
@@ -159,6 +174,7 @@ def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
         "exposure": record["viewing"]["exposure"],
         "regions": record.get("regions", []),
         "images": embedded.manifest() if embedded else None,
+        "effects": scene["cost"]["effects"] if scene["cost"] else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
         "failed": False,
@@ -209,6 +225,7 @@ def _environment() -> Environment:
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),
+        effects_title=effects.TITLE,
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
     )

@@ -35,7 +35,7 @@ def seconds(value: float | None) -> str:
     if value is None:
         return "–"
     for scale, unit in ((1.0, "s"), (1e-3, "ms")):
-        if value >= scale:
+        if abs(value) >= scale:
             return f"{number(value / scale)} {unit}"
     return f"{number(value / 1e-6)} µs" if value else "0 s"
 

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 import vl_convert
 
-from reports import charts
+from reports import charts, labels
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_names_stand_apart_in_order_and_inside(seed):
     wanted = np.sort(np.random.default_rng(seed).uniform(0, 380, 3 + seed))
-    places = charts.spread(list(wanted), 15, 380)
+    places = labels.spread(list(wanted), 15, 380)
     assert np.all(np.diff(places) >= 15 - 1e-9)
     assert min(places) >= 0
     assert max(places) <= 380 + 1e-9
 
 
 def test_names_with_room_stay_where_they_want_to_be():
-    assert charts.spread([10, 50, 300], 15, 380) == [10, 50, 300]
-    assert charts.spread([100, 102], 15, 380) == [93.5, 108.5]
+    assert labels.spread([10, 50, 300], 15, 380) == [10, 50, 300]
+    assert labels.spread([100, 102], 15, 380) == [93.5, 108.5]
 
 
 def point(rung, spp, time, error, pareto=False):

@@ -9,6 +9,7 @@ import pytest
 from comparisons.cost import shapley
 from comparisons.cost.front import Point, equal_error, equal_time, pareto
 from comparisons.cost.measure import interval
+from tests.benchmarks import cost as repeats
 
 NOISY = [Point("noise alone", n, 0.01 * n, 8 / sqrt(n)) for n in (1, 4, 16, 64)]
 FLAT = [Point("flat", 16, 0.002, 12.0)]
@@ -148,3 +149,27 @@ def test_a_player_without_influence_gets_nothing_and_equals_share_alike():
 
 def test_no_effects_no_shares():
     assert shapley.shares((), lambda subset: 1.0).values == ()
+
+
+def test_fewer_orders_than_asked_for_by_default_still_add_up():
+    players = "abcde"
+    value = game(players, shape=(3,))
+    found = shapley.shares(players, value, exact_players=4, orders=4)
+    whole = value(frozenset(players)) - value(frozenset())
+    np.testing.assert_allclose(sum(found.values), whole, atol=1e-12)
+    assert found.orders == 4
+    assert all(error > 0 for error in found.sampling_error)
+
+
+def test_the_benchmark_of_repeats_sees_a_pair_that_changes_places_and_no_other():
+    def run(**spans):
+        return {
+            name: {"seconds": {"low": low, "high": high}} for name, (low, high) in spans.items()
+        }
+
+    first = run(a=(1, 2), b=(3, 4), c=(3.5, 5))
+    assert repeats.reordered(first, first, repeats.times) == []
+    swapped = run(a=(5, 6), b=(3, 4), c=(1, 2))
+    assert repeats.reordered(first, swapped, repeats.times) == [("a", "b"), ("a", "c")]
+    overlapping = run(a=(3, 4), b=(3, 4), c=(3, 4))
+    assert repeats.reordered(first, overlapping, repeats.times) == []

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from comparisons.exposure import best_exposure, best_exposure_rmse
 from comparisons.metrics import (
     LOG2_EPSILON,
     METRICS,
@@ -20,8 +21,6 @@ from comparisons.metrics import (
 )
 from comparisons.significance import critical_t, significance
 from comparisons.statistics import (
-    best_exposure,
-    best_exposure_rmse,
     noise_floor,
     summarise,
     summarise_log2_luminance,

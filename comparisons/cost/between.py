@@ -6,7 +6,7 @@ and ambient light of the heuristic half do not travel, so they are a picture of 
 a camera ray meets, to be added to the light that does.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import mitsuba as mi
@@ -25,6 +25,12 @@ OF_LIGHT = {"heuristic_point": Effect.ATTENUATION, "heuristic_spot": Effect.CONE
 """The effect that tells a light's two forms apart. A spot's attenuation goes with its cone, since
 Mitsuba has no spot that falls off in another way."""
 
+OF_BSDFS = {Effect.MICROFACETS, Effect.TRANSMISSION}
+"""Effects that tell a surface's two forms apart."""
+
+OF_INTEGRATOR = {Effect.OCCLUSION, Effect.INTERREFLECTION}
+"""Effects that the integrator simulates or leaves out: the scene is the same."""
+
 
 @dataclass(frozen=True)
 class Between:
@@ -36,10 +42,19 @@ class Between:
         Both halves, without tessellation.
     plan : reference.plan.Plan
         Of the reference.
+
+    scene : mitsuba.Scene
+        The physical half, with the plan's sampler.
+
+    The last scene is kept for subsets that differ in what the integrator does alone, and no other:
+    Dr.Jit traces every BSDF that is alive, in whatever scene.
     """
 
     pair: object
     plan: Plan
+    scene: object
+    _last: dict = field(default_factory=dict, init=False, repr=False)
+    _tables: dict = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def differences(self):
@@ -60,13 +75,28 @@ class Between:
         """Whether the heuristic half itself has shadows."""
         return self._integrator.get("occlusion", False)
 
-    def renderer(self, simulated, spp):
-        """Return what renders the scene with the effects ``simulated``, and the others left out."""
-        simulated = frozenset(simulated)
-        parts = [self._travelling(simulated, spp)]
-        if not {Effect.EXTENDED, Effect.ENVIRONMENT} <= simulated:
-            parts.append(self._glowing(simulated, spp))
-        return Sum([part for part in parts if part is not None])
+    def of(self, simulated):
+        """Return the Mitsuba scene of some effects, whose light travels."""
+        key = self.scene_key(simulated)
+        if key == self.scene_key(self.differences):
+            return self.scene
+        if key not in self._last:
+            self._last.clear()
+            graph = with_sampler(self.graph(simulated), self.plan.sampler)
+            self._last[key] = graph.instantiate()
+        return self._last[key]
+
+    def scene_key(self, simulated):
+        """Return those of the effects that tell one scene from another."""
+        return frozenset(simulated) & set(self.differences) - OF_INTEGRATOR
+
+    def glow_key(self, simulated):
+        """Return those of the effects that tell what glows."""
+        return frozenset(simulated) & {Effect.EXTENDED, Effect.ENVIRONMENT}
+
+    def forget(self):
+        """Let go of the last scene."""
+        self._last.clear()
 
     def graph(self, simulated):
         """Return the graph of the scene whose light travels."""
@@ -101,8 +131,9 @@ class Between:
             if key not in given:
                 graph.attach(0, key, _graft(graph, self.pair.heuristic, index))
 
-    def _travelling(self, simulated, spp):
-        scene = with_sampler(self.graph(simulated), self.plan.sampler).instantiate()
+    def travelling(self, simulated, spp):
+        """Return what renders the light that travels, with the effects ``simulated``."""
+        scene = self.of(simulated)
         hidden = self.plan.calls_for(Effect.OCCLUSION)
         shadows = hidden and (self.has_occlusion or Effect.OCCLUSION in simulated)
         direct.register()
@@ -116,11 +147,19 @@ class Between:
             }
         )
         if self.plan.tabulate_environment and Effect.ENVIRONMENT in simulated:
-            integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
+            bsdfs = frozenset(simulated) & OF_BSDFS
+            if bsdfs not in self._tables:
+                self._tables[bsdfs] = AlbedoTable(scene.shapes()[0].bsdf())
+            integrator.environment_albedo = self._tables[bsdfs]
         return Renderer(scene, integrator, spp, "image of some effects")
 
-    def _glowing(self, simulated, spp):
-        """Make what renders emission, ambient light and background; None where there is none."""
+    def glowing(self, simulated, spp):
+        """Return what renders emission, ambient light and background; None where there is none.
+
+        It is to be added to the light that travels, with equal seeds.
+        """
+        if {Effect.EXTENDED, Effect.ENVIRONMENT} <= set(simulated):
+            return None
         graph = self.pair.heuristic.copy()
         ambient = self._integrator.get("ambient", None)
         for key, index in graph.children(0, EMITTER):
@@ -170,7 +209,7 @@ class Between:
 
     @cached_property
     def _structure(self):
-        return examine(self.pair.physical, self.pair.physical.instantiate())
+        return examine(self.pair.physical, self.scene)
 
     @cached_property
     def _light_effects(self):
@@ -190,26 +229,6 @@ class Between:
         known = ("point", "spot", "directional")
         graph = self.pair.physical
         return [k for k, index in graph.children(0, EMITTER) if graph.plugin(index) not in known]
-
-
-class Sum:
-    """Renders the sum of images, with equal camera rays; a :class:`Renderer` in what it offers.
-
-    Its times are those of the first image, whose light travels: what a camera ray meets shows its
-    emission and ambient light at next to no cost, in one rendering of both.
-    """
-
-    def __init__(self, parts):
-        self.parts = parts
-
-    @property
-    def times(self):
-        """Seconds of each pass."""
-        return self.parts[0].times
-
-    def render(self, seed):
-        """Render one pass of each, and return their sum (H, W, 3)."""
-        return sum(mi.TensorXf(part.render(seed)) for part in self.parts)
 
 
 def _graft(graph, other, index):

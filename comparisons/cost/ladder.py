@@ -106,7 +106,7 @@ def scope(plan, pair, differences, kernel_occlusion):
     )
 
 
-def ladder(scope, interpolations=tuple(Interpolation)):
+def ladder(scope, interpolations=tuple(Interpolation), depths=DEPTHS):
     """Return the rungs of a scene, cheapest idea first.
 
     Parameters
@@ -115,9 +115,11 @@ def ladder(scope, interpolations=tuple(Interpolation)):
         What the scene has.
     interpolations
         Those that its shapes allow.
+    depths
+        Depths of ``path`` that are rungs.
     """
     rungs = {}
-    for name, method in _methods(scope.max_depth, interpolations):
+    for name, method in _methods(scope.max_depth, interpolations, depths):
         distinct = _distinguished(method, scope)
         names = rungs[distinct].names if distinct in rungs else ()
         monte_carlo = not distinct.is_kernel and (scope.random or distinct.max_depth != 2)
@@ -125,14 +127,14 @@ def ladder(scope, interpolations=tuple(Interpolation)):
     return tuple(rungs.values())
 
 
-def _methods(max_depth, interpolations):
+def _methods(max_depth, interpolations, depths):
     """Yield the ladder's methods by name, as if every scene could tell them apart."""
     for interpolation in interpolations:
         yield f"{NAMES[interpolation]} kernel", Method(interpolation, occlusion=False)
     yield "kernel with shadows", Method(Interpolation.PHONG)
     yield "phong BSDF, full transport", Method(physical_bsdfs=False, max_depth=max_depth)
     yield "direct", Method()
-    for depth in DEPTHS:
+    for depth in depths:
         if depth <= max_depth or max_depth == UNLIMITED:
             yield f"path {depth}", Method(max_depth=depth)
     yield "full plan", Method(max_depth=max_depth)

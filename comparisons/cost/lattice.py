@@ -4,26 +4,24 @@ Every image is rendered in a few replicates, each with a seed of its own, which 
 that differences between images keep little noise, and the spread of the replicates tells how much.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
+import mitsuba as mi
 import numpy as np
 
 from comparisons.cost.between import Between
 from heuristic.interpolation import Interpolation
-from reference import halves
 from reference.effects import Effect
 from reference.halves import with_sampler
 from reference.rendering import Renderer, variant
-
-REPLICATES = 4
 
 KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
 
 
 @dataclass(frozen=True)
 class Replicates:
-    """The replicates of one image: (R, H, W, 3), and the seconds that each took."""
+    """The replicates of one image: (R, H, W, 3), and the seconds that each but the first took."""
 
     images: np.ndarray
     seconds: np.ndarray
@@ -34,25 +32,26 @@ class Lattice:
 
     Parameters
     ----------
-    source, options
+    options
         As of :func:`comparisons.compare.compare`.
-    ready : comparisons.compare.Prepared
-        The scene, paired and planned.
-    between : Between
-        The scenes between, in the reference's variant.
+    methods : comparisons.cost.methods.Methods
+        What has the scene, its pairs, and the scenes between.
+    replicates
+        Of each image, at least 3. The first compiles: its image counts, its time does not.
     spp
         Samples a pixel of each replicate.
     seed
-        Of the first replicate; one before it warms up.
+        Of the first replicate.
     """
 
-    def __init__(self, source, options, ready, between, spp, seed):
-        self.ready, self.spp, self.seed = ready, spp, seed
-        self.variant = ready.reference.variant
-        self.heuristic_variant = options.heuristic_variant or self.variant
-        self._source, self._options = source, options
-        self._between = {self.variant: between}
-        self._known = {}
+    def __init__(self, options, methods, replicates, spp, seed):
+        self.ready, self.replicates = methods.ready, replicates
+        self.spp, self.seed = spp, seed
+        self.variant = self.ready.reference.variant
+        self.heuristic_variant = methods.heuristic_variant
+        self._options, self._pairs = options, methods.pairs
+        self._between = {self.variant: methods.between}
+        self._known, self._glows = {}, {}
 
     @cached_property
     def effects(self):
@@ -66,7 +65,9 @@ class Lattice:
         return tuple(effect for effect in Effect if effect in found)
 
     def render(self, wanted):
-        """Render what is not known yet, in turn.
+        """Render what is not known yet, image by image.
+
+        Not in turn: every scene that is alive slows all others, since Dr.Jit traces its BSDFs too.
 
         Parameters
         ----------
@@ -74,15 +75,12 @@ class Lattice:
             :data:`KERNEL`, :data:`PLAIN_KERNEL`, :data:`REFERENCE`, or sets of effects.
         """
         wanted = [key for key in dict.fromkeys(wanted) if key not in self._known]
-        renderers = {key: self._renderer(key) for key in wanted}
-        images = {key: [] for key in wanted}
-        for number in range(REPLICATES + 1):
-            for key, renderer in renderers.items():
-                image = renderer.render(self.seed + number)
-                if number:
-                    images[key].append(np.array(image))
-        for key, renderer in renderers.items():
-            self._known[key] = Replicates(np.stack(images[key]), np.array(renderer.times[1:]))
+        for name, keys in self._by_variant(wanted).items():
+            with variant(name):
+                for key in keys:
+                    self._known[key] = self._replicates(key)
+        for between in self._between.values():
+            between.forget()
 
     def of(self, key):
         """Return the :class:`Replicates` of one of the images that :meth:`render` knows."""
@@ -118,39 +116,61 @@ class Lattice:
         kernels = [KERNEL, PLAIN_KERNEL] if Effect.POLYGONS in self.effects else []
         return [*kernels, frozenset(effects) - {Effect.POLYGONS}]
 
-    def _renderer(self, key):
+    def _by_variant(self, keys):
+        """Group keys by the variant that renders them, equal scenes next to each other."""
+        groups = {}
+        for key in keys:
+            groups.setdefault(self._variant_of(key), []).append(key)
+        return {name: sorted(group, key=self._scene_name) for name, group in groups.items()}
+
+    def _variant_of(self, key):
         if key == REFERENCE:
-            return Renderer(
-                self.ready.scene, self.ready.reference.integrator, self.spp, "reference image"
-            )
-        if key == KERNEL:
-            return self._kernel(self._options)
-        if key == PLAIN_KERNEL:
-            plain = replace(self._options, interpolation=Interpolation.PHONG, tessellation=None)
-            return self._kernel(plain)
+            return self.variant
+        if key in (KERNEL, PLAIN_KERNEL):
+            return self.heuristic_variant
         is_current = Effect.SPECTRAL in key or Effect.SPECTRAL not in self.effects
-        return self._in_variant(self.variant if is_current else self.heuristic_variant, key)
+        return self.variant if is_current else self.heuristic_variant
 
-    def _kernel(self, options):
-        with variant(self.heuristic_variant):
-            pair = _pair(self._source, options)
-            scene = with_sampler(pair.heuristic, self.ready.plan.sampler).instantiate()
-            return Renderer(scene, None, self.spp, "image of the kernel")
+    def _scene_name(self, key):
+        if isinstance(key, str):
+            return key
+        scene = self._between[self.variant].scene_key(key)
+        return " ".join(sorted(effect.name for effect in scene))
 
-    def _in_variant(self, name, effects):
-        with variant(name):
-            if name not in self._between:
-                plain = replace(self._options, interpolation=Interpolation.PHONG, tessellation=None)
-                self._between[name] = Between(_pair(self._source, plain), self.ready.plan)
-            return self._between[name].renderer(effects, self.spp)
+    def _replicates(self, key):
+        """Render an image in the current variant, which is its own."""
+        if isinstance(key, str):
+            return Replicates(*self._passes(self._end(key)))
+        between = self._between_here()
+        images, seconds = self._passes(between.travelling(key, self.spp))
+        # What a camera ray meets shows its emission at next to no cost in one rendering of both.
+        return Replicates(images + self._glow(between, key), seconds)
 
+    def _end(self, key):
+        """Return what renders one of the images that are a half, or nearly."""
+        ready = self.ready
+        if key == REFERENCE:
+            return Renderer(ready.scene, ready.reference.integrator, self.spp, "reference image")
+        if key == KERNEL:
+            return Renderer(ready.heuristic.scene, None, self.spp, "image of the kernel")
+        graph = with_sampler(self._pairs.plain().heuristic, ready.plan.sampler)
+        return Renderer(graph.instantiate(), None, self.spp, "image of the kernel")
 
-def _pair(source, options):
-    return halves.pair(
-        source,
-        options.convention,
-        options.resolution,
-        options.interpolation,
-        options.tessellation,
-        prune=not options.everything,
-    )
+    def _glow(self, between, key):
+        """Return the replicates of what glows, which several images share."""
+        glow = mi.variant(), between.glow_key(key)
+        if glow not in self._glows:
+            renderer = between.glowing(key, self.spp)
+            self._glows[glow] = self._passes(renderer)[0] if renderer else np.float32(0)
+        return self._glows[glow]
+
+    def _passes(self, renderer):
+        images = [np.array(renderer.render(self.seed + i)) for i in range(self.replicates)]
+        return np.stack(images), np.array(renderer.times[1:])
+
+    def _between_here(self):
+        if mi.variant() not in self._between:
+            pair = self._pairs.plain()
+            physical = with_sampler(pair.physical, self.ready.plan.sampler).instantiate()
+            self._between[mi.variant()] = Between(pair, self.ready.plan, physical)
+        return self._between[mi.variant()]

@@ -11,6 +11,7 @@ from math import comb
 import numpy as np
 
 from comparisons.metrics import METRICS
+from reference.rendering import variant
 
 LEVEL = 0.95
 
@@ -158,14 +159,24 @@ def measure(renderers, judge, rounds, seed, progress):
     images = {}
     for number in range(rounds + 2):
         progress("timing", number, rounds + 2)
-        for key, renderer in renderers.items():
-            image = renderer.render(seed + number)
-            if number > 1:
-                images[key] = np.array(image)
-                errors[key].append(judge.errors(images[key]))
+        for name, group in by_variant(renderers).items():
+            with variant(name):
+                for key, renderer in group.items():
+                    images[key] = np.array(renderer.render(seed + number))
+        if number > 1:
+            for key, image in images.items():
+                errors[key].append(judge.errors(image))
     return tuple(
         _summarise(key, renderer, errors[key], images[key]) for key, renderer in renderers.items()
     )
+
+
+def by_variant(renderers):
+    """Group renderers by their variant: changing it takes Mitsuba as long as a small rendering."""
+    groups = {}
+    for key, renderer in renderers.items():
+        groups.setdefault(renderer.variant, {})[key] = renderer
+    return groups
 
 
 def _summarise(key, renderer, errors, image):

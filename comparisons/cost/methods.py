@@ -3,11 +3,11 @@
 from dataclasses import replace
 from functools import cache
 
-from comparisons.cost.between import Between
-from comparisons.cost.ladder import ladder, scope
+from comparisons.cost.between import OF_BSDFS, Between
+from comparisons.cost.ladder import DEPTHS, ladder, scope
+from comparisons.cost.pairs import Pairs
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference import halves
 from reference.effects import Effect
 from reference.halves import INTEGRATOR, with_sampler
 from reference.rendering import Renderer, physical_integrator, variant
@@ -22,51 +22,54 @@ class Methods:
         As of :func:`comparisons.compare.compare`.
     ready : comparisons.compare.Prepared
         The scene, paired and planned.
+    depths
+        Depths of ``path`` that are rungs.
     """
 
-    def __init__(self, source, options, ready):
+    def __init__(self, source, options, ready, depths=DEPTHS):
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
 
-        @cache
-        def kernel_pair(interpolation):
-            tessellation = options.tessellation
-            return halves.pair(
-                source,
-                options.convention,
-                options.resolution,
-                interpolation,
-                tessellation,
-                prune=not options.everything,
-            )
-
-        self._kernel_pair = kernel_pair
-        self.between = Between(_plain(source, options), ready.plan)
+        self.pairs = Pairs(source, options, ready)
+        self.between = Between(self.pairs.plain(), ready.plan, ready.scene)
         self.scope = scope(
             ready.plan, ready.pair, self.between.differences, self.between.has_occlusion
         )
-        self.rungs = ladder(self.scope, self._interpolations())
-        self._scene = cache(self._make_scene)
+        self.rungs = ladder(self.scope, self._interpolations(), depths)
+        self._asked_for = options.interpolation
+        self._kernel_scene = cache(self._make_kernel_scene)
 
     def renderer(self, method, spp):
         """Return a renderer of a method, with samples a pixel a pass."""
         if method.is_kernel:
             with variant(self.heuristic_variant):
-                return Renderer(self._scene(method), None, spp, "image of the kernel")
-        scene = self._scene(method)
+                scene, integrator = self._kernel_scene(method.interpolation), self._kernel(method)
+                return Renderer(scene, integrator, spp, "image of the kernel")
+        scene = self._physical_scene(method.physical_bsdfs)
         integrator = physical_integrator(self._plan(method), scene, self.ready.pair.hide_emitters)
         return Renderer(scene, integrator, spp, "image of a rung")
 
-    def _make_scene(self, method):
-        plan = self.ready.plan
-        if method.is_kernel:
-            graph = self._kernel_pair(method.interpolation).heuristic.copy()
-            graph.props(graph.nodes(INTEGRATOR)[0])["occlusion"] = method.occlusion
-            return with_sampler(graph, plan.sampler).instantiate()
-        if method.physical_bsdfs:
+    def forget(self):
+        """Let go of the scenes of rungs."""
+        self._kernel_scene.cache_clear()
+        self.between.forget()
+
+    def _make_kernel_scene(self, interpolation):
+        if interpolation is self._asked_for:
+            return self.ready.heuristic.scene
+        graph = self.pairs.interpolated(interpolation).heuristic
+        return with_sampler(graph, self.ready.plan.sampler).instantiate()
+
+    def _kernel(self, method):
+        """Return the integrator alone: a scene of its own would slow all others."""
+        graph = self.pairs.interpolated(method.interpolation).heuristic.copy()
+        graph.props(graph.nodes(INTEGRATOR)[0])["occlusion"] = method.occlusion
+        return graph.instantiate().integrator()
+
+    def _physical_scene(self, physical_bsdfs):
+        if physical_bsdfs:
             return self.ready.scene
-        simulated = set(Effect) - {Effect.MICROFACETS, Effect.TRANSMISSION}
-        return with_sampler(self.between.graph(simulated), plan.sampler).instantiate()
+        return self.between.of(set(Effect) - OF_BSDFS)
 
     def _plan(self, method):
         """Return the plan of a method: its own depth, as the scene's plan has it for the rest."""
@@ -83,15 +86,10 @@ class Methods:
         for interpolation in Interpolation:
             try:
                 with variant(self.heuristic_variant):
-                    self._kernel_pair(interpolation)
+                    self.pairs.interpolated(interpolation)
             except InputError:
                 if interpolation is Interpolation.PHONG:
                     raise
                 continue
             allowed.append(interpolation)
         return tuple(allowed)
-
-
-def _plain(source, options):
-    """Return the pair with its own geometry, that is without tessellation."""
-    return halves.pair(source, options.convention, options.resolution)

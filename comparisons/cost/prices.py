@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.cost import shapley
-from comparisons.cost.lattice import REPLICATES
 
 LEVEL = 0.95
 
@@ -72,6 +71,8 @@ class Prices:
         Seconds that none of the effects and all of them take.
     spp, replicates, orders
         Samples a pixel of each replicate, their number, and orders drawn (0: every subset).
+    map
+        (H, W): the ΔE2000 of the heuristic half in each pixel, which the effects' maps add up to.
     """
 
     effects: tuple[Price, ...]
@@ -82,9 +83,10 @@ class Prices:
     spp: int
     replicates: int
     orders: int
+    map: np.ndarray
 
 
-def prices(lattice, judge, seed=0):
+def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
     """Return the :class:`Prices` of the effects of a lattice.
 
     Parameters
@@ -95,9 +97,11 @@ def prices(lattice, judge, seed=0):
         What tells their errors.
     seed
         Of the orders drawn where there are many effects.
+    exact_effects, orders
+        As of :func:`comparisons.cost.shapley.shares`.
     """
     effects, everything = lattice.effects, frozenset(lattice.effects)
-    if len(effects) <= shapley.EXACT_PLAYERS:
+    if len(effects) <= exact_effects:
         lattice.render(key for each in shapley.subsets(effects) for key in lattice.needed(each))
     errors, seconds = {}, {}
 
@@ -106,7 +110,7 @@ def prices(lattice, judge, seed=0):
         if simulated not in errors:
             images = lattice.simulating(simulated).images
             if simulated == everything:
-                errors[simulated] = np.zeros((REPLICATES + 1, int(judge.counted.sum())))
+                errors[simulated] = np.zeros((lattice.replicates + 1, int(judge.counted.sum())))
             else:
                 kept = [images.mean(axis=0), *_leaving_one_out(images)]
                 errors[simulated] = np.stack([judge.map(image)[judge.counted] for image in kept])
@@ -118,8 +122,8 @@ def prices(lattice, judge, seed=0):
         return seconds[simulated]
 
     nothing = frozenset()
-    shares = shapley.shares(effects, error, seed)
-    times = shapley.shares(effects, time, seed)
+    shares = shapley.shares(effects, error, seed, exact_effects, orders)
+    times = shapley.shares(effects, time, seed, exact_effects, orders)
     found = []
     for place, effect in enumerate(effects):
         removed = -shares.values[place]
@@ -136,17 +140,17 @@ def prices(lattice, judge, seed=0):
             )
         )
     own = lattice.of("reference")
+    departure = judge.map(lattice.simulating(nothing).images.mean(axis=0))
     return Prices(
         effects=tuple(found),
-        departure=float(
-            judge.map(lattice.simulating(nothing).images.mean(axis=0))[judge.counted].mean()
-        ),
+        departure=float(departure[judge.counted].mean()),
         floor=judge.errors(own.images.mean(axis=0))[0],
         kernel_s=float(lattice.of("kernel").seconds.mean()),
         reference_s=float(own.seconds.mean()),
         spp=lattice.spp,
-        replicates=REPLICATES,
+        replicates=lattice.replicates,
         orders=shares.orders,
+        map=departure if effects else np.zeros_like(departure),
     )
 
 

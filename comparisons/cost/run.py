@@ -1,16 +1,13 @@
 """What accuracy costs on one scene: the whole study."""
 
-import os
-import platform
+import gc
 from dataclasses import asdict, dataclass, replace
-from itertools import count as count_from
-from itertools import takewhile
-from pathlib import Path
 
 import numpy as np
 
 from comparisons import record
 from comparisons.compare import prepare
+from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
 from comparisons.cost.front import Point, equal_error, equal_time, pareto
 from comparisons.cost.lattice import Lattice
 from comparisons.cost.measure import Judge, measure
@@ -18,55 +15,8 @@ from comparisons.cost.methods import Methods
 from comparisons.cost.prices import prices
 from comparisons.cost.split import split
 from comparisons.options import Options
-from heuristic.errors import InputError
 from reference.gbuffer import gbuffer
 from reference.rendering import Accumulator, Renderer
-
-DETERMINISTIC_SPP = 16
-"""Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
-
-WIDTH = 128
-"""Pixels: the default width of an image; costs are in proportion to the pixels."""
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is rendered for a study.
-
-    Parameters
-    ----------
-    rounds
-        Timed repeats of each rung, at least 2. From 6 on the median has a 95 % interval.
-    largest
-        Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
-        those the sampler is fastest.
-    reference_spp
-        Samples a pixel of each pass of the reference that errors are told against.
-    replicate_spp
-        Samples a pixel of each replicate for prices and parts.
-    """
-
-    rounds: int = 7
-    largest: int = 64
-    reference_spp: int = 64
-    replicate_spp: int = 16
-
-    def __post_init__(self):
-        if self.rounds < 2:
-            raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
-
-    @property
-    def counts(self):
-        """The sample counts of the Monte Carlo rungs."""
-        powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
-        return tuple(powers) or (self.largest,)
-
-
-QUICK = Effort(rounds=3, largest=16)
-"""For many scenes in one report, at :data:`QUICK_WIDTH`: there, tracing takes most of the time, so
-that renderings are few and samples are not spared."""
-
-QUICK_WIDTH = 48
 
 
 @dataclass(frozen=True)
@@ -81,8 +31,12 @@ class Study:
         ``{rung name: (H, W, 3)}``, of the most samples.
     parts
         ``{part: (H, W, 3)}``, signed and linear.
+    difference
+        (H, W, 3): reference minus kernel, which the parts add up to.
     effects
         ``{effect: (H, W)}``: the ΔE2000 that it removes.
+    error
+        (H, W): the kernel's ΔE2000, which those of the effects add up to.
     reference
         (H, W, 3).
     counted
@@ -92,7 +46,9 @@ class Study:
     data: dict
     rungs: dict
     parts: dict
+    difference: np.ndarray
     effects: dict
+    error: np.ndarray
     reference: np.ndarray
     counted: np.ndarray
 
@@ -121,7 +77,8 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     """
     options, effort = options or Options(), effort or Effort()
     progress = progress or _silent
-    options = replace(options, resolution=options.resolution or default_resolution(source, options))
+    if options.resolution is None:
+        options = replace(options, resolution=reduced(source, options, WIDTH))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
     ready = prepare(source, replace(options, spp=None))
@@ -130,17 +87,14 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     reference = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)
 
-    methods = Methods(source, options, ready)
-    renderers = {
-        (rung.name, spp): methods.renderer(rung.method, spp)
-        for rung in methods.rungs
-        for spp in (effort.counts if rung.monte_carlo else (DETERMINISTIC_SPP,))
-    }
-    measured = measure(renderers, judge, effort.rounds, options.seed, progress)
-    seed = options.seed + 2_000_000
-    lattice = Lattice(source, options, ready, methods.between, effort.replicate_spp, seed)
+    methods = Methods(source, options, ready, effort.depths)
+    rungs = methods.rungs
+    measured = _measured(methods, effort, judge, options.seed, progress)
+    lattice = Lattice(
+        options, methods, effort.replicates, effort.replicate_spp, options.seed + 2_000_000
+    )
     progress("pricing effects", 0, 1)
-    priced = prices(lattice, judge, options.seed)
+    priced = prices(lattice, judge, options.seed, effort.exact_effects, effort.orders)
     parts, whole = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
 
@@ -164,13 +118,13 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         },
         "rungs": [
             {"name": rung.name, "names": list(rung.names), "monte_carlo": rung.monte_carlo}
-            for rung in methods.rungs
+            for rung in rungs
         ],
         "points": [_without(m, "image") | {"pareto": (m.rung, m.spp) in front} for m in measured],
         "equal_time": [asdict(row) for row in equal_time(points)],
         "equal_error": [asdict(row) for row in equal_error(points)],
         "prices": {
-            **_without(priced, "effects"),
+            **_without(priced, "effects", "map"),
             "effects": [_without(price, "map") for price in priced.effects],
         },
         "split": {
@@ -179,7 +133,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         },
         "viewing": options.viewing.record(),
         "pixels": {"counted": int(counted.sum()), "total": width * height},
-        "machine": machine(),
+        "machine": record.machine(),
         "versions": record.versions(),
         "command": command,
     }
@@ -187,7 +141,9 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         data=data,
         rungs={m.rung: m.image for m in measured},
         parts={part.name: part.map for part in parts},
+        difference=whole.map,
         effects={price.effect: price.map for price in priced.effects},
+        error=priced.map,
         reference=reference.mean,
         counted=counted,
     )
@@ -196,41 +152,21 @@ def cost(source, options=None, effort=None, progress=None, command=""):
 def quick(source, options=None, progress=None, command=""):
     """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
     options = options or Options()
-    small = default_resolution(source, options, QUICK_WIDTH)
-    return cost(source, replace(options, resolution=small), QUICK, progress, command)
+    small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
+    return cost(source, small, QUICK, progress, command)
 
 
-def default_resolution(source, options, width=WIDTH):
-    """Return the film's resolution, reduced to a width; smaller films stay as they are."""
-    from reference import halves, preparation
-
-    graph = halves.pair(source, options.convention).physical
-    ((_, film),) = graph.children(graph.nodes(preparation.SENSOR)[0], preparation.FILM)
-    props = graph.props(film)
-    given = int(props.get("width", 768)), int(props.get("height", 576))
-    if given[0] <= width:
-        return given
-    return width, max(1, round(given[1] * width / given[0]))
-
-
-def machine():
-    """Return what times depend on: processor, cores that may be used, system."""
-    return {
-        "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1,
-        "system": f"{platform.system()} {platform.machine()}",
+def _measured(methods, effort, judge, seed, progress):
+    """Time and judge the rungs; their scenes are let go of, since they would slow what follows."""
+    renderers = {
+        (rung.name, spp): methods.renderer(rung.method, spp)
+        for rung in methods.rungs
+        for spp in (effort.counts if rung.monte_carlo else (DETERMINISTIC_SPP,))
     }
-
-
-def _processor():
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
+    gc.collect()  # scenes that pairing left behind
+    measured = measure(renderers, judge, effort.rounds, seed, progress)
+    methods.forget()
+    return measured
 
 
 def _converged(ready, effort, seed, progress):

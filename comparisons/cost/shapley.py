@@ -49,24 +49,28 @@ def subsets(players):
     ]
 
 
-def shares(players, value, seed=0):
+def shares(players, value, seed=0, exact_players=EXACT_PLAYERS, orders=ORDERS):
     """Return the :class:`Shares` of players in a game.
 
     Parameters
     ----------
     players
-        Hashable names; exact up to :data:`EXACT_PLAYERS` of them.
+        Hashable names.
     value : callable
         ``value(frozenset) -> number or array``. Called more than once for a subset: it should
         remember what is dear.
     seed
         Of the orders drawn.
+    exact_players
+        Players up to which every subset is valued.
+    orders
+        Orders drawn where there are more: an even number, at least 4.
     """
     players = tuple(players)
-    if len(players) <= EXACT_PLAYERS:
+    if len(players) <= exact_players:
         exact = tuple(_exact(player, players, value) for player in players)
         return Shares(exact, (0.0,) * len(players), 0)
-    return _sampled(players, value, np.random.default_rng(seed))
+    return _sampled(players, value, orders, np.random.default_rng(seed))
 
 
 def _exact(player, players, value):
@@ -78,10 +82,10 @@ def _exact(player, players, value):
     return total
 
 
-def _sampled(players, value, rng):
+def _sampled(players, value, orders, rng):
     """Average over orders drawn in pairs, each followed by its reverse, which cancels noise."""
     gains = {player: [] for player in players}
-    for _ in range(ORDERS // 2):
+    for _ in range(orders // 2):
         order = rng.permutation(len(players))
         for way in (order, order[::-1]):
             subset, before = frozenset(), value(frozenset())
@@ -90,9 +94,9 @@ def _sampled(players, value, rng):
                 after = value(subset)
                 gains[players[place]].append(after - before)
                 before = after
-    values = tuple(sum(gains[player]) / ORDERS for player in players)
+    values = tuple(sum(gains[player]) / orders for player in players)
     errors = tuple(_pair_error(gains[player]) for player in players)
-    return Shares(values, errors, ORDERS)
+    return Shares(values, errors, orders)
 
 
 def _pair_error(gains):

@@ -17,7 +17,10 @@ from reports import batch, jobs
     " a pixel. [default limit: 4096]",
 )
 @jobs.scene_options
-def compare(scenes, output, **rendering):
+@click.option(
+    "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
+)
+def compare(scenes, output, with_cost, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`) or a Mitsuba file (.xml). Writes OUTPUT/index.html
@@ -30,5 +33,6 @@ def compare(scenes, output, **rendering):
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
       fotismos compare cornell-box --noise 0.5 --spp 2048
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
+      fotismos compare plastic-spheres --cost
     """  # noqa: D301 click reads the \b as: keep these lines
-    batch.run(scenes, output, rendering)
+    batch.run(scenes, output, rendering, with_cost)

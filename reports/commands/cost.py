@@ -31,8 +31,8 @@ def cost(scene, output, rounds, as_json, **rendering):
     from comparisons.cost.run import cost as run
     from reference.scene import set_variant
     from reports import cost as results
+    from reports import cost_tables, progress
     from reports import output as folders
-    from reports import progress
 
     folder = folders.prepare(output)
     source, chosen = jobs.job(scene, rendering)
@@ -46,6 +46,6 @@ def cost(scene, output, rounds, as_json, **rendering):
     if as_json:
         click.echo(json.dumps(study.data, indent=2, ensure_ascii=False))
         return
-    for line in results.lines(study.data):
+    for line in cost_tables.lines(study.data):
         click.echo(line)
     click.echo(f"\n{place / 'cost.svg'}")

@@ -12,14 +12,24 @@ VERIFIED_AT = (128, 128)
 @jobs.output_option("out/report")
 @jobs.rendering_options
 def report(output, **rendering):
-    """Compare all built-in scenes, verify their plans, and write one report."""
+    """Compare all built-in scenes, price their effects, and write one report."""
     from comparisons.scenes import SCENES
     from heuristic import equations
 
     names = tuple(SCENES)
-    jobs.check_installation()
-    verifications = [] if rendering["everything"] else _verify(names, rendering)
-    batch.run(names, output, rendering, equations.index(), verifications, with_hard_cases=True)
+    run = batch.start()
+    with run.timing("verification"):
+        verifications = [] if rendering["everything"] else _verify(names, rendering)
+    batch.finish(
+        run,
+        names,
+        output,
+        rendering,
+        with_cost=True,
+        with_hard_cases=True,
+        equations=equations.index(),
+        verifications=verifications,
+    )
 
 
 def _verify(names, rendering):

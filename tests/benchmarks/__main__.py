@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import kernel, lights, scaling, stability, study, terms
+from tests.benchmarks import cost, kernel, lights, scaling, stability, study, terms
 
 BENCHMARKS = {
+    "cost": cost.run,
     "kernel": kernel.run,
     "lights": lights.run,
     "scaling": scaling.run,

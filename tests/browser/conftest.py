@@ -10,11 +10,13 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from comparisons import regions
+from comparisons.cost.run import Study
 from comparisons.histograms import histogram
 from comparisons.metrics import METRICS, log2_luminance_ratio
 from comparisons.record import Comparison, Images
-from reports import histograms, output, vega
-from tests import records
+from reports import output
+from reports.run import Run
+from tests import cost_records, records
 
 WIDTH, HEIGHT = 48, 32
 
@@ -25,11 +27,12 @@ NOISY_ID = "noisy----b-"
 
 @dataclass
 class Report:
-    """Where the report is, and its records and EXR channels by scene."""
+    """Where the report is, its records and EXR channels by scene, and the study of one."""
 
     url: str
     records: dict = field(default_factory=dict)
     channels: dict = field(default_factory=dict)
+    study: Study | None = None
 
 
 @pytest.fixture(scope="session")
@@ -37,18 +40,19 @@ def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     found = Report((folder / "index.html").as_uri())
     views = []
-    for name, comparison in ((NOISY, noisy()), (EXACT, exact())):
+    study = cost_records.study(NOISY)
+    for name, comparison, priced in ((NOISY, noisy(), study), (EXACT, exact(), None)):
         place = output.folder_name(name, ())
-        views.append(output.write_scene(folder, place, comparison))
+        views.append(output.write_scene(folder, place, comparison, priced))
         found.records[name] = comparison.data
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
             found.channels[name] = {key: c.pixels.copy() for key, c in file.channels().items()}
-    data = found.records[NOISY]
-    spec = histograms.spec(
-        "dE2000", data["histograms"]["dE2000"], data["metrics"]["dE2000"], WIDTH * HEIGHT
+    found.study = study
+    run = Run("fotismos compare")
+    run.begin_page()
+    output.write_page(
+        folder, views, failures=[(FAILED, "lost.xml: there is no such file")], run=run
     )
-    views[0]["charts"] = [vega.figure("Error against time", spec, "A chart of another kind.")]
-    output.write_page(folder, views, failures=[(FAILED, "lost.xml: there is no such file")])
     return found
 
 
@@ -76,6 +80,8 @@ def exact():
     for name in METRICS:
         found.data["metrics"][name] = records.metric(0.0)
     found.data["metrics"]["significant"]["fraction"] = 0.0
+    box = {"x": 8, "y": 4, "width": 10, "height": 8, "share": 0.5, "mean_dE2000": 1.0}
+    found.data["regions"] = [box | {"effect": "extended lights"}]
     found.data["warnings"] = found.data["unrepresentable"] = []
     return found
 

@@ -6,7 +6,13 @@ from axe_playwright_python.sync_playwright import Axe
 from tests.browser.conftest import NOISY_ID
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-VIEWS = ["", "#list=table", f"#scene={NOISY_ID}", f"#scene={NOISY_ID}&mode=side&tone=false"]
+VIEWS = [
+    "",
+    "#list=table",
+    f"#scene={NOISY_ID}",
+    f"#scene={NOISY_ID}&mode=side&tone=false",
+    f"#scene={NOISY_ID}&mode=error&map=effects",
+]
 
 
 def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
@@ -90,7 +96,7 @@ def test_without_scripts_all_scenes_have_pictures_numbers_and_charts(visitor):
     page.goto(visitor.report.url)
     assert page.locator(".scene:visible").count() == 2
     assert page.locator(".scene .pictures img:visible").count() == 14
-    assert page.locator(".scene .chart svg:visible").count() == 7
+    assert page.locator(".scene .chart svg:visible").count() == 8
     assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0
 

@@ -51,13 +51,13 @@ def check_inspector(shown, channels, x, y):
 
 
 def test_the_inspector_follows_the_pointer_and_names_a_regions_effect(visitor, report):
-    page = visitor.open(SCENE)
-    region = report.records[NOISY]["regions"][0]
+    page = visitor.open(f"#scene={EXACT}")
+    region = report.records[EXACT]["regions"][0]
     left, top = visitor.place_of(region["x"], region["y"])
     visitor.canvas().hover(position={"x": left, "y": top})
     shown = visitor.inspected()
     assert shown["position"] == f"{region['x']}, {region['y']}"
-    assert shown["effect"] == "interreflection"
+    assert shown["effect"] == "extended lights"
     left, top = visitor.place_of(0, 31)
     visitor.canvas().hover(position={"x": left, "y": top})
     assert visitor.inspected()["position"] == "0, 31"
@@ -313,11 +313,3 @@ def test_regions_are_boxed_in_the_image(visitor, report):
     zoom = visitor.canvas().bounding_box()["height"] / HEIGHT
     column = [visitor.colour_at(left, top - zoom / 2 + dy) for dy in (-1, 0, 1)]
     assert any(np.abs(np.subtract(colour, (94, 240, 255))).max() < 30 for colour in column)
-
-
-def test_charts_come_alive(visitor):
-    page = visitor.open(f"#scene={NOISY_ID}")
-    page.wait_for_function(
-        "() => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === 4"
-    )
-    assert page.locator(".scene.open .chart svg").count() == 4

@@ -21,7 +21,7 @@ function inspect(painter, scene, [x, y]) {
     log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
     standard_error: shown("standard_error"),
     significant: flags & COUNTED ? (flags & SIGNIFICANT ? "yes" : "no") : "not counted",
-    effect: effectAt(scene.regions, x, y),
+    effect: effectAt(scene, x, y),
   };
 }
 
@@ -31,10 +31,14 @@ function valueText(images, name, place) {
   return significant(decimal(images.codes[name][place], plane.digits), plane.digits);
 }
 
-/** The effect that dominates a region, where that is known. @param {any[]} regions @param {number} x @param {number} y */
-function effectAt(regions, x, y) {
-  const inside = regions.find(
-    (region) => x >= region.x && y >= region.y && x < region.x + region.width && y < region.y + region.height,
+/** The effect that dominates at a pixel, or else in its region, where that is known. @param {any} scene @param {number} x @param {number} y */
+function effectAt(scene, x, y) {
+  if (scene.effects) {
+    return effectName(scene.effects, letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height));
+  }
+  const inside = scene.regions.find(
+    (/** @type {any} */ region) =>
+      x >= region.x && y >= region.y && x < region.x + region.width && y < region.y + region.height,
   );
   return inside?.effect ?? "";
 }

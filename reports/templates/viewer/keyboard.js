@@ -3,7 +3,7 @@
 /** @param {Viewer} viewer @param {(step: number) => void} turn to another scene @param {() => void} leave to the overview */
 function listenToKeys(viewer, turn, leave) {
   const next = (/** @type {"map" | "tone"} */ control) => {
-    const options = [.../** @type {HTMLSelectElement} */ (viewer.element.querySelector(`[data-control=${control}]`)).options];
+    const options = [.../** @type {HTMLSelectElement} */ (viewer.element.querySelector(`[data-control=${control}]`)).options].filter((option) => !option.disabled);
     const place = options.findIndex((option) => option.value === viewer.view[control]);
     viewer.change({ [control]: options[(place + 1) % options.length].value });
   };

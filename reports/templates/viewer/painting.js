@@ -21,11 +21,13 @@ class Painter {
    * @param {Images} images
    * @param {number} exposure the factor that the comparison was viewed at
    * @param {any} page what the page says about its maps: colours, ranges, luminance
+   * @param {Effects | null} effects what dominates where, if that is known
    */
-  constructor(images, exposure, page) {
+  constructor(images, exposure, page, effects) {
     this.images = images;
     this.exposure = exposure;
     this.page = page;
+    this.effects = effects;
     this.tables = Object.fromEntries(
       Object.entries(page.colours).map(([name, colours]) => [name, colourTable(colours)]),
     );
@@ -46,6 +48,7 @@ class Painter {
     return this.picture("map", name, (pixels) => {
       if (name === "log2_luminance") this.paintRatio(pixels);
       else if (name === "significant") this.paintFlags(pixels);
+      else if (name === "effects") this.paintEffects(pixels);
       else this.paintError(pixels, name);
     });
   }
@@ -111,6 +114,16 @@ class Painter {
     const [marked, unmarked, uncounted] = this.page.mask.map((/** @type {number[]} */ c) => rgba(c[0], c[1], c[2]));
     for (let i = 0; i < pixels.length; i++) {
       pixels[i] = flags[i] & COUNTED ? (flags[i] & SIGNIFICANT ? marked : unmarked) : uncounted;
+    }
+  }
+
+  /** @param {Uint32Array} pixels */
+  paintEffects(pixels) {
+    const { width, height } = this.images;
+    const colours = effectColours(this.effects, this.page);
+    for (let i = 0; i < pixels.length; i++) {
+      const letter = letterAt(this.effects, ((i % width) + 0.5) / width, (Math.floor(i / width) + 0.5) / height);
+      pixels[i] = colours[letter];
     }
   }
 

@@ -39,16 +39,26 @@ class Viewer {
     section.querySelector(".side")?.prepend(this.panel);
     this.element.hidden = this.panel.hidden = false;
     this.element.dataset.ready = "";
+    this.offerEffects();
     const images = await imagesOf(scene.id, scene.images);
     if (this.scene !== scene) return; // another one was opened meanwhile
-    this.painter = new Painter(images, scene.exposure, this.page);
+    this.painter = new Painter(images, scene.exposure, this.page, scene.effects);
     this.element.dataset.ready = scene.id;
     this.redraw();
   }
 
+  /** The map of effects is there for scenes whose effects were priced. */
+  offerEffects() {
+    const option = /** @type {HTMLOptionElement} */ (this.element.querySelector("option[value=effects]"));
+    option.hidden = option.disabled = !this.scene.effects;
+    const legend = /** @type {HTMLElement} */ (this.element.querySelector("[data-legend=effects]"));
+    if (this.scene.effects) listEffects(legend, this.scene.effects, this.page);
+  }
+
   /** @param {View} view */
   show(view) {
-    this.view = view;
+    const known = this.page.titles[view.map] && (view.map !== "effects" || this.scene.effects);
+    this.view = known ? view : { ...view, map: DEFAULT_VIEW.map };
     this.element.dataset.mode = view.mode;
     this.showControls();
     this.showLegend();

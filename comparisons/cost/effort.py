@@ -1,0 +1,98 @@
+"""How much is rendered for a study of cost."""
+
+from dataclasses import dataclass
+from itertools import count as count_from
+from itertools import takewhile
+
+from comparisons.cost import shapley
+from comparisons.cost.ladder import DEPTHS
+from heuristic.errors import InputError
+from reference.halves import FILM, SENSOR
+
+DETERMINISTIC_SPP = 16
+"""Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
+
+WIDTH = 128
+"""Pixels: the default width of an image; costs are in proportion to the pixels."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is rendered for a study.
+
+    Parameters
+    ----------
+    rounds
+        Timed repeats of each rung, at least 2. From 6 on the median has a 95 % interval.
+    largest
+        Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
+        those the sampler is fastest.
+    depths
+        Depths of ``path`` that are rungs.
+    reference_spp
+        Samples a pixel of each pass of the reference that errors are told against.
+    replicates, replicate_spp
+        Replicates of each image for prices and parts, at least 3, and samples a pixel of each.
+    exact_effects, orders
+        Effects up to which every subset is rendered, and orders drawn where there are more
+        (:func:`comparisons.cost.shapley.shares`).
+
+    Raises
+    ------
+    InputError
+        For fewer than 2 rounds.
+    """
+
+    rounds: int = 7
+    largest: int = 64
+    depths: tuple[int, ...] = DEPTHS
+    reference_spp: int = 64
+    replicates: int = 5
+    replicate_spp: int = 64
+    exact_effects: int = shapley.EXACT_PLAYERS
+    orders: int = shapley.ORDERS
+
+    def __post_init__(self):
+        if self.rounds < 2:
+            raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
+
+    @property
+    def counts(self):
+        """The sample counts of the Monte Carlo rungs."""
+        powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
+        return tuple(powers) or (self.largest,)
+
+
+QUICK = Effort(
+    rounds=3,
+    largest=16,
+    depths=(3,),
+    replicates=4,
+    replicate_spp=16,
+    exact_effects=4,
+    orders=8,
+)
+"""For many scenes in one report, at :data:`QUICK_WIDTH`: there, tracing takes most of the time, so
+that renderings are few and samples are not spared."""
+
+QUICK_WIDTH = 48
+
+
+def reduced(source, options, width):
+    """Return the resolution asked for, else the film's own, reduced to a width.
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or has no sensor.
+    """
+    given = options.resolution or _film_size(source.parse())
+    if given[0] <= width:
+        return given
+    return width, max(1, round(given[1] * width / given[0]))
+
+
+def _film_size(graph):
+    films = [film for sensor in graph.nodes(SENSOR) for _, film in graph.children(sensor, FILM)]
+    props = graph.props(films[0]) if films else {}
+    return int(props.get("width", 768)), int(props.get("height", 576))

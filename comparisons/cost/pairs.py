@@ -1,0 +1,54 @@
+"""The pairs of one scene, each derived once: in several variants, and with several kernels."""
+
+import mitsuba as mi
+
+from heuristic.interpolation import Interpolation
+from reference import halves
+
+
+class Pairs:
+    """Derives pairs as they are asked for, in the variant that is current then.
+
+    Parameters
+    ----------
+    source, options
+        As of :func:`comparisons.compare.compare`.
+    ready : comparisons.compare.Prepared
+        Whose pair is the first.
+    """
+
+    def __init__(self, source, options, ready):
+        self._source, self._options = source, options
+        key = ready.reference.variant, options.interpolation, options.tessellation
+        self._known = {key: ready.pair}
+
+    def as_asked(self):
+        """Return the pair as the options ask for it."""
+        return self.interpolated(self._options.interpolation)
+
+    def interpolated(self, interpolation):
+        """Return the pair with another interpolation, and meshes as fine as asked for.
+
+        Raises
+        ------
+        InputError
+            Where a shape makes no mesh.
+        """
+        return self._of(interpolation, self._options.tessellation)
+
+    def plain(self):
+        """Return the pair with the scene's own geometry."""
+        return self._of(Interpolation.PHONG, None)
+
+    def _of(self, interpolation, tessellation):
+        key = mi.variant(), interpolation, tessellation
+        if key not in self._known:
+            self._known[key] = halves.pair(
+                self._source,
+                self._options.convention,
+                self._options.resolution,
+                interpolation,
+                tessellation,
+                prune=not self._options.everything,
+            )
+        return self._known[key]

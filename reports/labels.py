@@ -1,0 +1,61 @@
+"""What charts say beside their plots: texts that stand apart, and lines that lead to them."""
+
+LABEL_GAP = 15
+"""Pixels from one name to the next, at least."""
+
+
+def spread(wanted, gap, length):
+    """Move places on a line apart: at least ``gap`` between neighbours, in the same order.
+
+    ``wanted`` are pixels in ascending order. Neighbours that would touch become a block about the
+    mean of what they want; blocks stay within ``[0, length]`` where they fit.
+    """
+    blocks = []
+    for place in wanted:
+        blocks.append([place])
+        while len(blocks) > 1 and _top(blocks[-1], gap) < _top(blocks[-2], gap) + gap * len(
+            blocks[-2]
+        ):
+            block = blocks.pop()
+            blocks[-1] += block
+    places = [_top(block, gap) + gap * i for block in blocks for i in range(len(block))]
+    for i in reversed(range(len(places))):  # pushed up from the lower end, then down from the upper
+        limit = places[i + 1] - gap if i + 1 < len(places) else length
+        places[i] = min(places[i], limit)
+    for i in range(len(places)):
+        places[i] = max(places[i], places[i - 1] + gap if i else 0)
+    return places
+
+
+def _top(block, gap):
+    return sum(block) / len(block) - gap * (len(block) - 1) / 2
+
+
+def rule(start, end, **style):
+    """Return a line between two places in pixels, as a layer."""
+    return {
+        "data": {"values": [{}]},
+        "mark": {"type": "rule", "clip": False, **style},
+        "encoding": {
+            "x": {"value": start[0]},
+            "y": {"value": start[1]},
+            "x2": {"value": end[0]},
+            "y2": {"value": end[1]},
+        },
+    }
+
+
+def label(text, x, y):
+    """Return a text to the right of a place in pixels, as a layer."""
+    return {
+        "data": {"values": [{}]},
+        "mark": {
+            "type": "text",
+            "text": text,
+            "align": "left",
+            "baseline": "middle",
+            "fontSize": 12,
+            "clip": False,
+        },
+        "encoding": {"x": {"value": x}, "y": {"value": y}},
+    }

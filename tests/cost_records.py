@@ -1,0 +1,154 @@
+"""A study of cost with made-up numbers, each of them different."""
+
+import numpy as np
+
+from comparisons.cost.run import Study
+from tests import records
+
+WIDTH, HEIGHT = 12, 8
+EFFECTS = ("occlusion", "microfacets and Fresnel", "interreflection")
+PARTS = ("implementation", "visibility", "BSDF form", "transport")
+
+
+def study(scene="fig-8-9"):
+    """A study whose left half is darkened by occlusion, and whose right half by interreflection."""
+    rng = np.random.default_rng(4)
+    image = rng.random((HEIGHT, WIDTH, 3))
+    left = np.arange(WIDTH)[None, :] < WIDTH // 2
+    effects = {
+        "occlusion": np.where(left, 6.0, 0.25) * np.ones((HEIGHT, 1)),
+        "microfacets and Fresnel": np.full((HEIGHT, WIDTH), 0.5),
+        "interreflection": np.where(left, 1.5, 4.0) * np.ones((HEIGHT, 1)),
+    }
+    effects["interreflection"][-1] = effects["occlusion"][-1] = 0.5
+    counted = np.ones((HEIGHT, WIDTH), bool)
+    counted[0] = False
+    parts = {name: (place - 1.5) * 0.1 * image for place, name in enumerate(PARTS)}
+    return Study(
+        data=data(scene),
+        rungs={rung["name"]: image for rung in data(scene)["rungs"]},
+        parts=parts,
+        difference=sum(parts.values()),
+        effects=effects,
+        error=sum(effects.values()),
+        reference=image,
+        counted=counted,
+    )
+
+
+def data(scene="fig-8-9"):
+    """The record of the study."""
+    return {
+        "scene": scene,
+        "variant": "llvm_ad_rgb",
+        "heuristic_variant": "llvm_ad_rgb",
+        "interpolation": "phong",
+        "seed": 7,
+        "resolution": [WIDTH, HEIGHT],
+        "rounds": 3,
+        "reference": {
+            "integrator": "path",
+            "max_depth": -1,
+            "spp": 1024,
+            "passes": 16,
+            "noise_floor": 0.1234,
+            "mean_variance": 3.21e-6,
+        },
+        "rungs": [
+            {"name": "Phong kernel", "names": ["Phong kernel"], "monte_carlo": False},
+            {"name": "full plan", "names": ["direct", "full plan"], "monte_carlo": True},
+        ],
+        "points": [
+            point("Phong kernel", 16, 0.00123, 8.765, True),
+            point("full plan", 4, 0.0234, 2.345, True),
+            point("full plan", 16, 0.0567, 1.234, False),
+        ],
+        "equal_time": [
+            {"seconds": 0.0011, "best": None},
+            {
+                "seconds": 0.1,
+                "best": {"method": "full plan", "spp": 16, "seconds": 0.0567, "error": 1.234},
+            },
+        ],
+        "equal_error": [
+            reached("Phong kernel", 5.0, None),
+            reached("Phong kernel", 2.0, None),
+            reached("full plan", 5.0, 0.0235, True),
+            reached("full plan", 2.0, 0.0321),
+        ],
+        "prices": {
+            "effects": [
+                price("occlusion", 3.141, 0.0111),
+                price("microfacets and Fresnel", -0.271, -0.0022),
+                price("interreflection", 5.895, 0.0456),
+            ],
+            "departure": 8.765,
+            "floor": 0.432,
+            "kernel_s": 0.0012,
+            "reference_s": 0.0557,
+            "spp": 16,
+            "replicates": 4,
+            "orders": 0,
+        },
+        "split": {
+            "parts": [part(name, 0.0123 * (place + 1)) for place, name in enumerate(PARTS)],
+            "departure": part("departure", 0.0987),
+        },
+        "viewing": records.record()["viewing"],
+        "pixels": {"counted": WIDTH * (HEIGHT - 1), "total": WIDTH * HEIGHT},
+        "machine": {"processor": "a processor <b>", "cores": 2, "system": "Linux x86_64"},
+        "versions": {"mitsuba": "3.9.1"},
+        "command": "fotismos cost fig-8-9 --seed 7",
+    }
+
+
+def point(rung, spp, time, error, pareto):
+    """A rung at one sample count."""
+    return {
+        "rung": rung,
+        "spp": spp,
+        "first_s": 11.1 * time,
+        "compile_s": 7.7 * time,
+        "seconds": {
+            "median": time,
+            "p25": 0.97 * time,
+            "p75": 1.03 * time,
+            "low": 0.93 * time,
+            "high": 1.09 * time,
+            "level": 0.75,
+            "repeats": 3,
+        },
+        "error": error,
+        "error_stderr": 0.013 * error,
+        "mse": 0.0021 * error,
+        "mse_stderr": 0.0002 * error,
+        "pareto": pareto,
+    }
+
+
+def reached(method, error, seconds, at_most=False):
+    """When a method reaches an error."""
+    return {"method": method, "error": error, "seconds": seconds, "at_most": at_most}
+
+
+def price(effect, removes, adds):
+    """The price of an effect."""
+    return {
+        "effect": effect,
+        "removes": {"value": removes, "low": removes - 0.17, "high": removes + 0.19},
+        "alone": 0.83 * removes,
+        "last": 1.21 * removes,
+        "adds_s": {"value": adds, "low": adds - 0.0013, "high": adds + 0.0017},
+        "sampling_error": 0.0,
+    }
+
+
+def part(name, mean):
+    """A part of the departure."""
+    return {
+        "name": name,
+        "mean": mean,
+        "mean_stderr": 0.011 * mean,
+        "rms": 2.3 * mean,
+        "dE2000": 31 * mean,
+    }

@@ -1,0 +1,131 @@
+"""What a page and its files show of a study of cost: the record's figures, and what dominates."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from reports import cost, cost_overview, output, page
+from reports.run import Run
+from tests import cost_records, records
+from tests.browser.conftest import noisy
+from tests.test_page import HOSTILE, Page
+
+SCHEMA = json.loads((Path(cost.__file__).parent / "cost.schema.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def study():
+    return cost_records.study()
+
+
+def shown(study, record=None, **more):
+    """The page of one scene with its study."""
+    made = cost.files(study)
+    view = {
+        "record": record or records.record(),
+        "images": {},
+        "charts": cost.figures(study.data),
+        "cost": cost.view(study, made),
+    }
+    return page.render([view], **more)
+
+
+def test_the_made_up_record_holds_to_the_schema(study):
+    made = json.loads(cost.files(study)["cost.json"])
+    jsonschema.Draft202012Validator(SCHEMA).validate(made)
+
+
+def test_the_figures_on_the_page_are_those_of_the_json(study):
+    values = {value for value, _ in Page(shown(study)).values}
+    data = study.data
+    wanted = [data["reference"]["noise_floor"], data["prices"]["departure"]]
+    for point in data["points"]:
+        seconds = point["seconds"]
+        wanted += [point["error"], point["error_stderr"], point["first_s"], point["spp"]]
+        wanted += [seconds["median"], seconds["low"], seconds["high"]]
+    wanted += [row["seconds"] for row in data["equal_error"] if row["seconds"] is not None]
+    wanted += [row["best"]["error"] for row in data["equal_time"] if row["best"]]
+    for price in data["prices"]["effects"]:
+        wanted += [*price["removes"].values(), *price["adds_s"].values()]
+        wanted += [price["alone"], price["last"]]
+    for part in (*data["split"]["parts"], data["split"]["departure"]):
+        wanted += [part["mean"], part["mean_stderr"], part["rms"], part["dE2000"]]
+    assert not [number for number in wanted if number not in values]
+
+
+def test_a_page_without_a_study_says_nothing_of_cost():
+    html = page.render([{"record": records.record(), "images": {}}])
+    for text in ("What accuracy costs", "Cost of accuracy", "Price of an effect", "Ladder"):
+        assert text not in html
+
+
+def test_names_from_files_stay_text(study):
+    study.data["machine"]["processor"] = HOSTILE
+    html = shown(study, records.record() | {"scene": HOSTILE})
+    assert HOSTILE not in html
+    assert HOSTILE in Page(html).text
+    study.data["machine"]["processor"] = "a processor"
+
+
+def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
+    found = cost.view(study, cost.files(study))["effects"]
+    assert found["names"] == list(cost_records.EFFECTS)
+    assert len(set(found["colours"])) == 3
+    rows = [found["map"][start : start + 12] for start in range(0, 96, 12)]
+    assert rows[0] == "-" * 12
+    assert set(rows[1:-1]) == {"000000222222"}
+    assert rows[-1] == "." * 12
+
+
+def test_every_effect_with_a_price_has_a_colour_of_its_own():
+    from comparisons.cost import between
+    from reference.effects import Effect
+    from reports.effects import COLOURS
+
+    heuristic_only = {Effect.EMISSION, Effect.AMBIENT, Effect.DIFFUSE, Effect.SPECULAR}
+    assert set(COLOURS) == set(Effect) - heuristic_only
+    assert set(between.OF_LIGHT.values()) <= set(COLOURS)
+    assert len(set(COLOURS.values())) == len(COLOURS)
+
+
+def test_the_overview_takes_the_most_samples_and_marks_what_is_merged():
+    (row,) = cost_overview.rows([cost_records.data()])
+    cells = dict(zip(cost_overview.METHODS, row["cells"], strict=True))
+    assert cells["Phong kernel"]["error"] == 8.765
+    assert cells["full plan"]["spp"] == 16
+    assert (cells["direct"]["merged"], cells["full plan"]["merged"]) == (False, True)
+    assert cells["flat kernel"] is None
+    assert row["best"]["effect"] == "interreflection"
+
+
+def test_comparing_again_keeps_a_study_and_replaces_it_by_a_new_one(tmp_path, study):
+    comparison = noisy()
+    output.write_scene(tmp_path, "scene", comparison, study)
+    files = {path.name for path in (tmp_path / "scene").glob("cost*")}
+    assert {"cost.json", "cost.svg", "cost-part-transport.png"} <= files
+    before = (tmp_path / "scene" / "cost.json").read_bytes()
+    output.write_scene(tmp_path, "scene", comparison)
+    assert {path.name for path in (tmp_path / "scene").glob("cost*")} == files
+    assert (tmp_path / "scene" / "cost.json").read_bytes() == before
+    other = cost_records.study()
+    other.data["seed"] = 8
+    del other.parts["transport"]
+    output.write_scene(tmp_path, "scene", comparison, other)
+    assert json.loads((tmp_path / "scene" / "cost.json").read_text("utf-8"))["seed"] == 8
+    assert not (tmp_path / "scene" / "cost-part-transport.png").exists()
+
+
+def test_the_stages_of_a_run_add_up_and_stand_on_the_page(study):
+    run = Run("fotismos report")
+    with run.timing("cost"):
+        pass
+    run.compared(records.record(), 100.0)
+    run.begin_page()
+    html = shown(study, run=run)
+    stages = run.data()["stages"]
+    assert stages["rendering"] + stages["metrics"] == pytest.approx(100.0)
+    assert stages["rendering"] == pytest.approx(0.375 + 2.79)
+    values = {value for value, _ in Page(html).values}
+    assert set(stages.values()) <= values
