@@ -6,21 +6,22 @@ and the command ends with that error's exit code.
 
 from time import perf_counter
 
-import click
-
 from heuristic.errors import FotismosError
-from reports import jobs
+from reports import jobs, terminal
 
 START = perf_counter()
 
 
-def run(names, folder, rendering, equations=(), verifications=(), with_hard_cases=False):
-    """Compare scenes and write the results of each, then the page of all."""
+def run(
+    names, folder, rendering, equations=(), verifications=(), with_hard_cases=False, figures=False
+):
+    """Compare scenes and write the results of each, then the page and the tables of all."""
     jobs.check_installation()
     from comparisons.compare import compare
     from comparisons.hard import record
     from reference.scene import set_variant
-    from reports import hard_cases, output, passes, progress
+    from reports import figures as prints
+    from reports import hard_cases, output, passes, progress, tables
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
@@ -43,6 +44,9 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
                 continue
             begin = perf_counter()
             views[name] = output.write_scene(folder, name, result)
+            if figures:
+                prints.write_scene(folder / output.FIGURES, name, result)
+            terminal.remark(progress.details(result.data))
             kept.remove()
             stages = result.data["time"]["stages"]
             stages |= {"start-up": start_up, "files": perf_counter() - begin}
@@ -61,9 +65,12 @@ def run(names, folder, rendering, equations=(), verifications=(), with_hard_case
         view["record"]["time"]["stages"]["page"] = share
         output.rewrite_record(folder, name, view["record"])
     if views:
-        for line in progress.summary(view["record"] for view in views.values()):
-            click.echo(line)
-    click.echo(f"\n{folder / 'index.html'}")
+        records = [view["record"] for view in views.values()]
+        tables.write(folder / output.TABLES, records)
+        if figures:
+            prints.write_run(folder / output.FIGURES, records)
+        terminal.tell(progress.summary(records))
+    terminal.tell_where(folder / "index.html")
     if failures:
         name, error = next(iter(failures.items()))
         count = f"{len(failures)} of {len(wanted)} scenes failed, "

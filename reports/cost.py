@@ -5,7 +5,7 @@ import os
 from functools import partial
 
 from reports import charts, images
-from reports.planning import printed, ruled
+from reports.tables import printed, ruled
 
 
 def lines(data):

@@ -13,6 +13,9 @@ from reports import embedding, exr, images, page
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
 
+TABLES, FIGURES = "tables", "figures"
+"""Folders of a run beside those of its scenes, which take no such name."""
+
 
 def prepare(folder):
     """Make the output folder, and see that it can be written to.
@@ -91,7 +94,7 @@ def folder_name(name, taken):
     """Return a name for a scene's folder: plain characters, and not taken yet."""
     plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name).strip(".") or "scene"
     chosen, number = plain, 1
-    while chosen in taken:
+    while chosen in taken or chosen in (TABLES, FIGURES):
         number += 1
         chosen = f"{plain}-{number}"
     return chosen

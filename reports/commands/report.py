@@ -2,7 +2,7 @@
 
 import click
 
-from reports import batch, jobs
+from reports import batch, jobs, terminal
 
 VERIFIED_AT = (128, 128)
 """Resolution at which a report verifies its plans."""
@@ -10,16 +10,35 @@ VERIFIED_AT = (128, 128)
 
 @click.command()
 @jobs.output_option("out/report")
+@jobs.figures_option
 @jobs.rendering_options
-def report(output, **rendering):
-    """Compare all built-in scenes, verify their plans, and write one report."""
+@terminal.quiet_option
+@terminal.verbose_option
+def report(output, figures, **rendering):
+    """Compare all built-in scenes, verify their plans, and write one report.
+
+    Writes what `compare` does, and in the page the hard cases and the index of equations.
+
+    \b
+    Examples:
+      fotismos report
+      fotismos report --resolution 128x128 -o small --figures
+    """  # noqa: D301 click reads the \b as: keep these lines
     from comparisons.scenes import SCENES
     from heuristic import equations
 
     names = tuple(SCENES)
     jobs.check_installation()
     verifications = [] if rendering["everything"] else _verify(names, rendering)
-    batch.run(names, output, rendering, equations.index(), verifications, with_hard_cases=True)
+    batch.run(
+        names,
+        output,
+        rendering,
+        equations.index(),
+        verifications,
+        with_hard_cases=True,
+        figures=figures,
+    )
 
 
 def _verify(names, rendering):
