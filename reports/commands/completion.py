@@ -28,9 +28,9 @@ def completion(context, shell):
 
 
 def scene(context, parameter, beginning):
-    """Complete a SCENE: the built-in ones that begin so, then files."""
+    """Complete a SCENE: the built-in ones that begin so, or else files."""
     from comparisons.scenes import SCENES
 
-    found = [CompletionItem(name, help=s.title) for name, s in SCENES.items()]
-    files = CompletionItem(beginning, type="file")
-    return [*(item for item in found if item.value.startswith(beginning)), files]
+    named = [name for name in SCENES if name.startswith(beginning)]
+    found = [CompletionItem(name, help=SCENES[name].title) for name in named]
+    return found or [CompletionItem(beginning, type="file")]
