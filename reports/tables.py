@@ -35,10 +35,12 @@ def printed(table: Table) -> Iterator[str]:
     return (line.rstrip() for line in capture.get().splitlines())
 
 
-def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Yield the lines of a table in Markdown: first column to the left, the others to the right."""
+def markdown(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], right: bool = True
+) -> Iterator[str]:
+    """Yield the lines of a table in Markdown, all columns but the first set to the right."""
     yield _row(headings)
-    yield _row(["---"] + ["---:"] * (len(headings) - 1))
+    yield _row(["---"] + ["---:" if right else "---"] * (len(headings) - 1))
     for row in rows:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
