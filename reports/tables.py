@@ -53,28 +53,76 @@ def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     files.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
 
 
+def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+    """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
+    folder.mkdir(exist_ok=True)
+    for part, (headings, rows) in {"cost": methods(data), "prices": prices(data)}.items():
+        files.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
+        shown = [[_shown(cell) for cell in row] for row in rows]
+        files.write(folder / f"{name}-{part}.md", "\n".join(markdown(headings, shown)) + "\n")
+
+
+def methods(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+    """Return headings and rows of a study's methods: seconds for one image, and mean ΔE2000."""
+    headings = ("method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front")
+    rows = [
+        [
+            point["rung"],
+            point["spp"],
+            *(point["seconds"][key] for key in ("median", "low", "high")),
+            point["error"],
+            point["error_stderr"],
+            "yes" if point["pareto"] else "no",
+        ]
+        for point in data["points"]
+    ]
+    return headings, rows
+
+
+def prices(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+    """Return headings and rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
+    headings = ("effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s")
+    rows = [
+        [
+            price["effect"],
+            *(price["removes"][key] for key in ("value", "low", "high")),
+            price["alone"],
+            price["last"],
+            price["adds_s"]["value"],
+        ]
+        for price in data["prices"]["effects"]
+    ]
+    return headings, rows
+
+
 def metrics_csv(records: Iterable[Mapping[str, Any]]) -> str:
     """Return a line for each scene and metric, with every number of the record in full.
 
     Columns are named as in ``comparison.json``; ``after_exposure.`` begins those of the shape.
     The root mean square error in linear light has ``value`` as its mean and no percentiles.
     """
-    text = StringIO()
     columns = ("mean", "p50", "p95", "max", "noise_floor")
     after = ("exposure", "mean", "p50", "p95", "max")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(
-        ["scene", "metric", *columns, *(f"after_exposure.{name}" for name in after), "significant"]
-    )
+    headings = (*columns, *(f"after_exposure.{name}" for name in after), "significant")
+    rows = []
     for record in records:
         significant = record["metrics"]["significant"]["fraction"]
         for name in (*METRICS, "rmse"):
             metric = record["metrics"][name]
             exposed = metric["after_exposure"]
-            means = {"mean": metric.get("value")}, {"mean": exposed.get("value")}
-            whole, shape = means[0] | metric, means[1] | exposed
+            whole = {"mean": metric.get("value")} | metric
+            shape = {"mean": exposed.get("value")} | exposed
             cells = [whole.get(key, "") for key in columns] + [shape.get(key, "") for key in after]
-            table.writerow([record["scene"], name, *cells, significant])
+            rows.append([record["scene"], name, *cells, significant])
+    return comma_separated(("scene", "metric", *headings), rows)
+
+
+def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full."""
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(headings)
+    table.writerows(rows)
     return text.getvalue()
 
 
@@ -106,3 +154,7 @@ def metrics_markdown(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 
 def _row(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
+
+
+def _shown(cell: Any) -> str:
+    return number(cell) if isinstance(cell, float) else str(cell)

@@ -50,6 +50,23 @@ def test_a_scene_takes_no_name_of_a_folder_of_the_run():
     assert output.folder_name("figures", {"figures-2"}) == "figures-3"
 
 
+def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
+    amount = {"value": 1.5, "low": 1.25, "high": 1.75}
+    price = {"effect": "occlusion", "removes": amount, "adds_s": amount, "alone": -0.5, "last": 3.0}
+    seconds = {"median": 0.25, "low": 0.125, "high": 0.5}
+    point = {"rung": "direct", "spp": 4, "seconds": seconds, "pareto": True}
+    data = {
+        "points": [point | {"error": 12.75, "error_stderr": 0.03125}],
+        "prices": {"effects": [price]},
+    }
+    tables.write_cost(tmp_path / "tables", "box", data)
+    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").iterdir()}
+    assert sorted(read) == ["box-cost.csv", "box-cost.md", "box-prices.csv", "box-prices.md"]
+    assert "\ndirect,4,0.25,0.125,0.5,12.75,0.03125,yes\n" in read["box-cost.csv"]
+    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-prices.csv"]
+    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 | 1.50 |" in read["box-prices.md"]
+
+
 @pytest.mark.parametrize("colour", ["", "1"])
 def test_printed_tables_hold_no_codes_and_fold_long_cells(monkeypatch, colour):
     monkeypatch.setenv("FORCE_COLOR", colour)

@@ -21,8 +21,8 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
     prices each effect in which textbook shading differs. Writes OUTPUT/SCENE/cost.json, cost.svg
-    and pictures. Without --resolution the film is reduced to 128 pixels of width; --spp gives the
-    samples a pixel of the largest count, 64 where it is not given.
+    and pictures, and OUTPUT/tables. Without --resolution the film is reduced to 128 pixels of
+    width; --spp gives the samples a pixel of the largest count, 64 where it is not given.
 
     \b
     Examples:
@@ -36,7 +36,7 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     from reports import cost as results
     from reports import figures as prints
     from reports import output as folders
-    from reports import progress
+    from reports import progress, tables
 
     folder = folders.prepare(output)
     source, chosen = jobs.job(scene, rendering)
@@ -47,6 +47,7 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
         study = run(source, jobs.options(chosen), effort, bar.of(source.name), words)
     place = folder / folders.folder_name(source.name, ())
     results.write(place, study)
+    tables.write_cost(folder / folders.TABLES, place.name, study.data)
     if figures:
         prints.write_cost(folder / folders.FIGURES, place.name, study.data)
     if as_json:
