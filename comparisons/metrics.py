@@ -125,6 +125,11 @@ def delta_e_2000(
 
     Source: CIE 142-2001; Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005.
     Raises `NonFiniteError`, and `InputError` for different shapes.
+
+    White against black, and two colours that a display shows as white:
+
+    >>> delta_e_2000([[[1, 1, 1], [2, 2, 2]]], [[[0, 0, 0], [1, 1, 1]]]).round(6).tolist()
+    [[100.0, 0.0]]
     """
     return METRICS["dE2000"](test, reference, viewing)
 
@@ -137,6 +142,11 @@ def delta_e_itp(test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAUL
     T = Ct/2 and P = Cp. A value of 1 is just noticeable in the most critical adaptation.
 
     Source: ITU-R BT.2124-0. Raises as `delta_e_2000`.
+
+    One stop above white, which a high dynamic range display shows:
+
+    >>> delta_e_itp([[[2, 2, 2]]], [[[1, 1, 1]]]).round(1).tolist()
+    [[52.9]]
     """
     return METRICS["dE_ITP"](test, reference, viewing)
 
@@ -150,6 +160,9 @@ def delta_e_cam16ucs(
     D65 white) → J'a'b' → √(ΔJ'² + Δa'² + Δb'²). Black to white is 100.
 
     Source: Li et al., Color Res. Appl. 42(6), 2017. Raises as `delta_e_2000`.
+
+    >>> delta_e_cam16ucs([[[1, 1, 1]]], [[[0, 0, 0]]]).round(1).tolist()
+    [[100.0]]
     """
     return METRICS["dE_CAM16UCS"](test, reference, viewing)
 
@@ -159,6 +172,12 @@ def rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike | None = None) -
 
     ``√(mean (test − reference)²)`` over pixels and channels, in units of display white, neither
     exposed nor clipped. 0 for an empty mask. Raises as `delta_e_2000`.
+
+    One channel of four pixels is off by 1, hence √(1/12):
+
+    >>> reference = [[[0, 0, 0]] * 4]
+    >>> round(rmse([[[1, 0, 0]] + [[0, 0, 0]] * 3], reference), 3)
+    0.289
     """
     test, reference = checked_pair(test, reference)
     square = (test - reference) ** 2
@@ -172,6 +191,10 @@ def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
     ``log2((max(Y_t, 0) + ε) / (max(Y_r, 0) + ε))`` with ε = 1e-4 of display white: positive
     where the test image is brighter, one stop is a factor of 2, and black against black is 0.
     Raises as `delta_e_2000`.
+
+    >>> test, reference = [[[0.5, 0.5, 0.5]]], [[[0.25, 0.25, 0.25]]]
+    >>> log2_luminance_ratio(test, reference).round(2).tolist()
+    [[1.0]]
     """
     test, reference = checked_pair(test, reference)
     lift = [np.maximum(luminance(image), 0.0) + LOG2_EPSILON for image in (test, reference)]

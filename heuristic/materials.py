@@ -42,6 +42,15 @@ class Material:
     ------
     InputError
         For negative, infinite or NaN values, or an unknown form.
+
+    Examples
+    --------
+    >>> Material(k_d=(0.5, 0.4, 0.3), k_s=0.7, n=9).k_d
+    (0.5, 0.4, 0.3)
+    >>> Material(k_d=-0.5)
+    Traceback (most recent call last):
+        ...
+    heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values of 0 or more.
     """
 
     k_i: colours.Coefficient = 0

@@ -40,6 +40,17 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
     ------
     InputError
         For a negative or non-finite ``ambient``, or mixed numbers of wavelengths.
+
+    Examples
+    --------
+    Two points under a light from straight above, the second of them tilted:
+
+    >>> from heuristic import DirectionalLight, Material, shade
+    >>> from drjit.auto import Array3f
+    >>> sun = DirectionalLight(direction=(0, 0, -1), intensity=1.0)
+    >>> normals = Array3f([0, 0.6], [0, 0], [1, 0.8])
+    >>> shade(Array3f(0), normals, Array3f(0, 0, 1), Material(k_d=0.5), [sun])
+    [0.5, 0.4]
     """
     ambient = colours.checked("ambient", ambient)
     _check_wavelengths(material, lights, ambient)

@@ -30,6 +30,13 @@ def diffuse(intensity, k_d, cos_incidence):
 
     8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
     Lambert's law (8.3, 8.4) is why no view angle appears.
+
+    A surface that faces the light at 60 degrees, and one that is turned away:
+
+    >>> diffuse(intensity=1.0, k_d=0.5, cos_incidence=0.5)
+    0.25
+    >>> diffuse(intensity=1.0, k_d=0.5, cos_incidence=-0.5)
+    0.0
     """
     return intensity * k_d * numerics.at_least(cos_incidence, 0)
 
@@ -41,6 +48,9 @@ def specular(intensity, k_s, cos_reflection, n):
     the perfect mirror of 8.7. ``cos_reflection`` is a float or, for large ``n``, a
     :class:`heuristic.numerics.Cosine`. The caller sees to the horizon (``N.L > 0``); the lobe
     itself ends where ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
+
+    >>> specular(intensity=1.0, k_s=0.5, cos_reflection=0.5, n=2)
+    0.125
     """
     return intensity * k_s * power(cos_reflection, n)
 
@@ -53,6 +63,9 @@ def normalisation(form, n):
     - ``phong``: ``2 k_s int cos^(n+1) sin = 2 k_s / (n + 2)``, hence the factor ``(n + 2) / 2``;
     - ``blinn``: ``2 k_s int cos(t/2)^n cos(t) sin(t) dt``, which is
       ``8 k_s (n + 2^(-n/2)) / ((n + 2) (n + 4))``, hence its inverse over ``k_s``.
+
+    >>> normalisation("phong", 10)
+    6.0
     """
     if form == "blinn":
         halves = 2 ** (-n / 2) if isinstance(n, Real) else dr.exp2(-n / 2)
@@ -71,6 +84,9 @@ def attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
     Neither ``d^2`` nor ``f_att`` need lie in the type's range, if only the result does: see
     :func:`attenuation_root`. A result beyond the range is the largest float, since an infinite one
     would become NaN at the horizon.
+
+    >>> attenuation(distance=2.0, k0=0, k1=0, k2=1)
+    0.25
     """
     root = _representable(attenuation_root(distance, k0, k1, k2, inverse))
     return _representable(intensity * root * root)
@@ -96,7 +112,11 @@ def tame_attenuation(distance, k0, k1, k2, intensity, inverse=None):
 
 
 def clamped_attenuation(distance, c1, c2, c3, intensity=1, inverse=None):
-    """Text at 8.6: ``f_att = min(1 / (c1 + c2 d + c3 d^2), 1)``, so that ``0 <= f_att <= 1``."""
+    """Text at 8.6: ``f_att = min(1 / (c1 + c2 d + c3 d^2), 1)``, so that ``0 <= f_att <= 1``.
+
+    >>> [clamped_attenuation(distance, 0, 0, 1) for distance in (0.5, 2.0)]
+    [1, 0.25]
+    """
     root = numerics.at_most(attenuation_root(distance, c1, c2, c3, inverse, at_zero=1), 1)
     return intensity * root * root
 
@@ -159,6 +179,9 @@ def spot_falloff(cos_axis, m):
     """Equation 6.4: ``(v_L.v_P)^m``, the factor by which the cone of 6.3 fades from its axis.
 
     0 from 90 degrees on, but for ``m = 0``, which does not fade at all: the even cone of 6.3.
+
+    >>> spot_falloff(cos_axis=0.5, m=2)
+    0.25
     """
     if isinstance(m, Real):
         return power(cos_axis, m) if m else 1.0

@@ -102,12 +102,21 @@ def alpha_of(n, form="phong"):
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
     the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
     1))``. Both forms are 1 at ``n = 0``.
+
+    >>> alpha_of(12)
+    0.2
+    >>> alpha_of(48, form="blinn")
+    0.2
     """
     return sqrt(2 / (n + 2)) if form == "blinn" else sqrt(1 / (2 * n + 1))
 
 
 def exponent_of(alpha, form="phong"):
-    """Return the inverse of :func:`alpha_of`; 0 from ``alpha = 1`` upwards."""
+    """Return the inverse of :func:`alpha_of`; 0 from ``alpha = 1`` upwards.
+
+    >>> round(exponent_of(0.2), 9)
+    12.0
+    """
     return max(2 / alpha**2 - 2 if form == "blinn" else (1 / alpha**2 - 1) / 2, 0.0)
 
 
@@ -117,13 +126,27 @@ def specular_albedo(phong):
     ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
     irradiance, hence ``(k_s / pi) 2 pi int cos^n cos sin d(theta)``. In general it is ``k_s`` over
     :func:`heuristic.terms.normalisation`, and ``k_s`` itself where the lobe is normalised.
+
+    >>> specular_albedo(Phong(k_d=(0.5, 0.5, 0.5), k_s=(0.6, 0.6, 0.6), n=4)).round(9).tolist()
+    [0.2, 0.2, 0.2]
     """
     scale = 1.0 if phong.normalised else 1 / normalisation(phong.form, phong.n)
     return np.asarray(phong.k_s) * scale
 
 
 def to_roughplastic(phong, convention):
-    """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses."""
+    """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses.
+
+    In the current variant of Mitsuba, since its own plugin tells the albedo:
+
+    >>> grey = (0.5, 0.5, 0.5)
+    >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
+    >>> misses, round(plastic.alpha, 9)
+    ([], 0.2)
+    >>> _, misses = to_roughplastic(Phong(grey, (0.7, 0.7, 0.7), 3), Convention.MATCHED)
+    >>> [miss.what for miss in misses]
+    ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
+    """
     if convention is Convention.LITERAL:
         rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
         return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
@@ -144,7 +167,15 @@ def to_roughplastic(phong, convention):
 
 
 def to_phong(plastic, convention):
-    """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses."""
+    """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses.
+
+    By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
+
+    >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
+    >>> phong, misses = to_phong(plastic, Convention.LITERAL)
+    >>> phong.k_d, phong.n
+    ((0.5, 0.4, 0.3), 6.0)
+    """
     if convention is Convention.LITERAL:
         n = exponent_of(plastic.alpha, "blinn")
         return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n), []

@@ -8,10 +8,8 @@ import shlex
 import sys
 from time import perf_counter
 
-import click
-
 from heuristic.errors import FotismosError
-from reports import jobs
+from reports import jobs, terminal
 from reports.run import Run
 
 
@@ -29,14 +27,17 @@ def start():
     return Run(shlex.join(["fotismos", *sys.argv[1:]]))
 
 
-def run(names, folder, rendering, with_cost=False):
-    """Compare scenes and write the results of each, then the page of all."""
-    finish(start(), names, folder, rendering, with_cost)
+def run(names, folder, rendering, figures=False, with_cost=False):
+    """Compare scenes and write the results of each, then the page and the tables of all."""
+    finish(start(), names, folder, rendering, figures, with_cost)
 
 
-def finish(run, names, folder, rendering, with_cost=False, with_hard_cases=False, **shown):
+def finish(
+    run, names, folder, rendering, figures=False, with_cost=False, with_hard_cases=False, **shown
+):
     """Do the same for a run that has begun; ``shown`` is what else the page shows."""
-    from reports import hard_cases, output, progress
+    from reports import figures as prints
+    from reports import hard_cases, output, progress, tables
 
     folder = output.prepare(folder)
     wanted = [jobs.job(name, rendering) for name in names]
@@ -45,7 +46,7 @@ def finish(run, names, folder, rendering, with_cost=False, with_hard_cases=False
         for source, chosen in wanted:
             name = output.folder_name(source.name, views)
             try:
-                views[name] = _scene(run, folder, name, source, chosen, with_cost, bar)
+                views[name] = _scene(run, folder, name, source, chosen, figures, with_cost, bar)
             except FotismosError as error:
                 if len(wanted) == 1:
                     raise
@@ -65,33 +66,40 @@ def finish(run, names, folder, rendering, with_cost=False, with_hard_cases=False
     )
     output.write_run(folder, run.data())
     if views:
-        for line in progress.summary(view["record"] for view in views.values()):
-            click.echo(line)
-    click.echo(f"\n{folder / 'index.html'}")
+        records = [view["record"] for view in views.values()]
+        tables.write(folder / output.TABLES, records)
+        if figures:
+            prints.write_run(folder / output.FIGURES, records)
+        terminal.tell(progress.summary(records))
+    terminal.tell_where(folder / "index.html")
     if failures:
         name, error = next(iter(failures.items()))
         count = f"{len(failures)} of {len(wanted)} scenes failed, "
         raise type(error)(f"{count}the first of them {name}: {error}") from error
 
 
-def _scene(run, folder, name, source, chosen, with_cost, bar):
+def _scene(run, folder, name, source, chosen, figures, with_cost, bar):
     """Compare one scene, write its files, and return what the page needs of it."""
     from comparisons.compare import compare
     from reference.scene import set_variant
-    from reports import output, passes
+    from reports import figures as prints
+    from reports import output, passes, progress
 
     set_variant(chosen["variant"])
-    options, progress = jobs.options(chosen), bar.of(source.name)
+    options, advance = jobs.options(chosen), bar.of(source.name)
     kept = passes.of_scene(folder, name, source, options, chosen["variant"])
     begin = perf_counter()
-    result = compare(source, options, progress, jobs.command(source, chosen), kept)
+    result = compare(source, options, advance, jobs.command(source, chosen), kept)
     run.compared(result.data, perf_counter() - begin)
     study = None
     if with_cost:
         with run.timing("cost"):
-            study = _cost(source, chosen, options, progress, result.data)
+            study = _cost(source, chosen, options, advance, result.data)
     with run.timing("files"):
         view = output.write_scene(folder, name, result, study)
+        if figures:
+            prints.write_scene(folder / output.FIGURES, name, result)
+    terminal.remark(progress.details(result.data))
     kept.remove()
     return view
 

@@ -10,13 +10,36 @@ import click
 
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import check, compare, cost, doctor, fit, plan, report, scenes, study
+from reports.commands import (
+    check,
+    compare,
+    completion,
+    cost,
+    doctor,
+    fit,
+    plan,
+    report,
+    scenes,
+    study,
+)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="fotismos")
 def cli():
-    """Textbook shading against physically based rendering, scene by scene."""
+    """Textbook shading against physically based rendering, scene by scene.
+
+    \b
+    Examples:
+      fotismos compare fig-8-9              how far, where, and is it more than noise?
+      fotismos compare my_scene.xml         the same of a Mitsuba scene of yours
+      fotismos plan cornell-box             which effects does it call for?
+      fotismos cost cornell-box             what does accuracy cost in time?
+      fotismos fit fig-8-9                  the model's fault, or its parameters'?
+      fotismos report                       all built-in scenes in one page
+
+    Colours and bars are for terminals alone, and NO_COLOR=1 switches colours off.
+    """  # noqa: D301 click reads the \b as: keep these lines
 
 
 for command in (
@@ -29,6 +52,7 @@ for command in (
     study.study,
     scenes.scenes,
     doctor.doctor,
+    completion.completion,
 ):
     cli.add_command(command)
 

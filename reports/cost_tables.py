@@ -1,6 +1,6 @@
 """The tables of ``fotismos cost`` on a terminal."""
 
-from reports.planning import printed, ruled
+from reports.tables import printed, ruled
 
 
 def lines(data):

@@ -1,17 +1,15 @@
 """Fits as tables for a terminal and in Markdown, and the files of one fit."""
 
 import json
-import os
 from io import BytesIO
 from pathlib import Path
 
 import matplotlib
 from PIL import Image, ImageDraw, ImageFont
-from rich.console import Console
-from rich.table import Table
 
 from comparisons.metrics import METRICS
-from reports import images
+from reports import files, images
+from reports.tables import printed, ruled
 
 SHOWN = "dE2000"
 """The metric of the residual map in the picture."""
@@ -27,21 +25,9 @@ FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
 def write(folder, fit):
     """Write ``fit.json`` and ``fit.png`` to a folder."""
     folder.mkdir(exist_ok=True)
-    write_bytes(folder / "fit.png", picture(fit))
+    files.write(folder / "fit.png", picture(fit))
     text = json.dumps(fit.data, indent=2, ensure_ascii=False, allow_nan=False)
-    write_text(folder / "fit.json", text + "\n")
-
-
-def write_text(path, text):
-    """Write a file whole or not at all."""
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path, content):
-    """Write a file whole or not at all."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_bytes(content)
-    partial.replace(path)
+    files.write(folder / "fit.json", text + "\n")
 
 
 def picture(fit):
@@ -78,9 +64,9 @@ def lines(data):
     best = _best(data)
     yield f"{data['scene']}: {data['loss']['name']} loss, {_form(best)} comes nearest"
     yield ""
-    yield from _printed(_departures(data))
+    yield from printed(_departures(data))
     yield ""
-    yield from _printed(_parameters(best))
+    yield from printed(_parameters(best))
     for material in best["materials"]:
         if material["reference"]:
             yield f"reference of {material['name']}: {_described(material['reference'])}"
@@ -141,7 +127,7 @@ def _form(fit):
 
 
 def _departures(data):
-    table = _table("mean of", *(metric.label for metric in METRICS.values()), "loss")
+    table = ruled("mean of", *(metric.label for metric in METRICS.values()), "loss")
     first = data["fits"][0]["departure"]
     table.add_row("paired", *(f"{first[name]['before']:.3f}" for name in METRICS), "")
     for fit in data["fits"]:
@@ -156,7 +142,7 @@ def _departures(data):
 
 
 def _parameters(fit):
-    table = _table("material or light", "parameter", "paired", "fitted", "95 %, by noise", "")
+    table = ruled("material or light", "parameter", "paired", "fitted", "95 %, by noise", "")
     for owner in fit["materials"]:
         for parameter in owner["parameters"]:
             _add_parameter(table, owner["name"], parameter)
@@ -205,17 +191,3 @@ def _number(value):
     if isinstance(value, list):
         return "(" + ", ".join(f"{component:.3g}" for component in value) + ")"
     return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def _table(*headings):
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
-    return table
-
-
-def _printed(table):
-    console = Console(width=120)
-    with console.capture() as capture:
-        console.print(table)
-    return (line.rstrip() for line in capture.get().splitlines())

@@ -37,6 +37,15 @@ def output_option(default):
     )
 
 
+def figures_option(command):
+    """Add the option that writes figures for print."""
+    return click.option(
+        "--figures",
+        is_flag=True,
+        help="Write figures for print, as SVG and PDF, to OUTPUT/figures.",
+    )(command)
+
+
 def rendering_options(command):
     """Add the options that all commands which render have in common."""
     options = (

@@ -15,6 +15,8 @@ LONGEST_IN_PAGE = 1024
 
 COST_FILES = "cost*"
 """What `fotismos cost` writes."""
+TABLES, FIGURES = "tables", "figures"
+"""Folders of a run beside those of its scenes, which take no such name."""
 
 
 def prepare(folder):
@@ -102,7 +104,7 @@ def folder_name(name, taken):
     """Return a name for a scene's folder: plain characters, and not taken yet."""
     plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name).strip(".") or "scene"
     chosen, number = plain, 1
-    while chosen in taken:
+    while chosen in taken or chosen in (TABLES, FIGURES):
         number += 1
         chosen = f"{plain}-{number}"
     return chosen

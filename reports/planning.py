@@ -1,7 +1,6 @@
 """Plans and their verification, as lines for a terminal."""
 
-from rich.console import Console
-from rich.table import Table
+from reports.tables import printed, ruled
 
 
 def data(scene, ready, variant):
@@ -74,19 +73,3 @@ def verification_lines(results):
     yield "significant: pixels that differ by more than both sides' noise"
     yield "kernel: largest difference that the terms left out of the kernel make"
     yield "faster: how many times sooner the plan reaches the same noise"
-
-
-def ruled(*headings):
-    """Return an empty table with these headings, without lines."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
-    return table
-
-
-def printed(table):
-    """Yield the lines of a table as a terminal shows them."""
-    console = Console(width=120)
-    with console.capture() as capture:
-        console.print(table)
-    return (line.rstrip() for line in capture.get().splitlines())

@@ -5,6 +5,10 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from reports import terminal
+from reports.printing import seconds
+from reports.tables import printed, ruled
+
 
 class Bar:
     """A progress bar on standard error, one task a scene; silent where no person is watching."""
@@ -34,7 +38,10 @@ def shown(unit="passes"):
         TimeRemainingColumn(),
     )
     with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
+        *columns,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal or terminal.level() < 0,
     ) as progress:
         yield Bar(progress)
 
@@ -42,22 +49,45 @@ def shown(unit="passes"):
 def summary(records):
     """Yield a line for each scene: departure, noise, shape, and times."""
     records = list(records)
-    width = max(5, *(len(record["scene"]) for record in records))
-    yield (
-        f"{'scene':<{width}}  {'mean ΔE2000':>11}  {'noise':>6}  {'shape':>6}  {'significant':>11}"
-        f"  {'heuristic':>9}  {'reference':>9}"
-    )
+    headings = ("mean ΔE2000", "noise", "shape", "significant", "heuristic", "reference")
+    table = ruled("scene", *headings)
+    for column in table.columns[1:]:
+        column.justify = "right"
     for record in records:
         metric, time = record["metrics"]["dE2000"], record["time"]
-        yield (
-            f"{record['scene']:<{width}}  {metric['mean']:>11.3f}  {metric['noise_floor']:>6.3f}"
-            f"  {metric['after_exposure']['mean']:>6.3f}"
-            f"  {record['metrics']['significant']['fraction']:>11.1%}"
-            f"  {time['heuristic']['total_s']:>7.2f} s  {time['reference']['total_s']:>7.2f} s"
+        table.add_row(
+            record["scene"],
+            f"{metric['mean']:.3f}",
+            f"{metric['noise_floor']:.3f}",
+            f"{metric['after_exposure']['mean']:.3f}",
+            f"{record['metrics']['significant']['fraction']:.1%}",
+            f"{time['heuristic']['total_s']:.2f} s",
+            f"{time['reference']['total_s']:.2f} s",
         )
+    yield from printed(table)
     for record in records:
         if "noise_target" in record:
             yield _noise(record)
+
+
+def details(record):
+    """Yield what a verbose command says of a scene: simulation, pairing, warnings, times."""
+    plan, pairing = record["plan"], record["pairing"]
+    shadows = "" if plan["shadows"] else ", no shadow rays"
+    yield (
+        f"{record['scene']}: {plan['integrator']}{shadows}, {plan['spp']} samples a pixel in"
+        f" {plan['passes']} passes, {plan['sampler']}"
+    )
+    for light in pairing["emitters"]:
+        note = f" ({light['note']})" if light["note"] else ""
+        yield f"  {light['name']}: {light['given']} as {light['derived']}{note}"
+    for miss in pairing["misses"]:
+        wanted, reached = (f"{miss[key]:.3g} {key}" for key in ("wanted", "reached"))
+        yield f"  missed: {miss['what']}, {wanted}, {reached}"
+    for warning in record["warnings"]:
+        yield f"  warning: {warning}"
+    stages = record["time"]["stages"]
+    yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
 
 
 def _noise(record):

@@ -2,13 +2,19 @@
 
 import click
 
-from reports import batch, jobs
+from reports import batch, jobs, terminal
+from reports.commands import completion
 
 
 @click.command()
-@click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
+@click.argument(
+    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=completion.scene
+)
 @jobs.output_option("out")
+@jobs.figures_option
 @jobs.rendering_options
+@terminal.quiet_option
+@terminal.verbose_option
 @click.option(
     "--noise",
     type=float,
@@ -20,11 +26,12 @@ from reports import batch, jobs
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, with_cost, **rendering):
+def compare(scenes, output, figures, with_cost, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`) or a Mitsuba file (.xml). Writes OUTPUT/index.html
-    and, for each scene, comparison.json, comparison.exr and pictures. An interrupted run keeps its
+    and tables of all scenes, and for each scene comparison.json, comparison.exr and pictures. An
+    interrupted run keeps its
     passes: the same command goes on where it stopped, to the same image.
 
     \b
@@ -32,7 +39,8 @@ def compare(scenes, output, with_cost, **rendering):
       fotismos compare fig-8-9
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
       fotismos compare cornell-box --noise 0.5 --spp 2048
+      fotismos compare fig-8-8a fig-8-9 --figures -q
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
       fotismos compare plastic-spheres --cost
     """  # noqa: D301 click reads the \b as: keep these lines
-    batch.run(scenes, output, rendering, with_cost)
+    batch.run(scenes, output, rendering, figures, with_cost)

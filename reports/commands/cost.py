@@ -4,34 +4,38 @@ import json
 
 import click
 
-from reports import jobs
+from reports import jobs, terminal
+from reports.commands import completion
 
 
 @click.command()
-@click.argument("scene", metavar="SCENE")
+@click.argument("scene", metavar="SCENE", shell_complete=completion.scene)
 @jobs.output_option("out")
+@jobs.figures_option
 @jobs.rendering_options
+@terminal.quiet_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of tables.")
-def cost(scene, output, rounds, as_json, **rendering):
+def cost(scene, output, figures, rounds, as_json, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
     prices each effect in which textbook shading differs. Writes OUTPUT/SCENE/cost.json, cost.svg
-    and pictures. Without --resolution the film is reduced to 128 pixels of width; --spp gives the
-    samples a pixel of the largest count, 64 where it is not given.
+    and pictures, and OUTPUT/tables. Without --resolution the film is reduced to 128 pixels of
+    width; --spp gives the samples a pixel of the largest count, 64 where it is not given.
 
     \b
     Examples:
       fotismos cost cornell-box
-      fotismos cost my_scene.xml --resolution 256x256 --rounds 11
+      fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
     from comparisons.cost.run import Effort
     from comparisons.cost.run import cost as run
     from reference.scene import set_variant
     from reports import cost as results
-    from reports import cost_tables, progress
+    from reports import cost_tables, progress, tables
+    from reports import figures as prints
     from reports import output as folders
 
     folder = folders.prepare(output)
@@ -43,9 +47,11 @@ def cost(scene, output, rounds, as_json, **rendering):
         study = run(source, jobs.options(chosen), effort, bar.of(source.name), words)
     place = folder / folders.folder_name(source.name, ())
     results.write(place, study)
+    tables.write_cost(folder / folders.TABLES, place.name, study.data)
+    if figures:
+        prints.write_cost(folder / folders.FIGURES, place.name, study.data)
     if as_json:
         click.echo(json.dumps(study.data, indent=2, ensure_ascii=False))
         return
-    for line in cost_tables.lines(study.data):
-        click.echo(line)
-    click.echo(f"\n{place / 'cost.svg'}")
+    terminal.tell(cost_tables.lines(study.data))
+    terminal.tell_where(place / "cost.svg")

@@ -5,11 +5,14 @@ from pathlib import Path
 
 import click
 
-from reports import jobs
+from reports import jobs, terminal
+from reports.commands import completion
 
 
 @click.command()
-@click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
+@click.argument(
+    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=completion.scene
+)
 @jobs.output_option("out/fit")
 @click.option(
     "--loss",
@@ -40,6 +43,7 @@ from reports import jobs
     help="Write the departures of all scenes as a table in Markdown, too.",
 )
 @jobs.rendering_options
+@terminal.quiet_option
 def fit(scenes, output, form, as_json, markdown, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
@@ -57,27 +61,26 @@ def fit(scenes, output, form, as_json, markdown, **words):
     from comparisons.fit.fit import fit as run
     from heuristic.materials import FORMS
     from reference.scene import set_variant
-    from reports import fitting, progress
-    from reports import output as files
+    from reports import files, fitting, progress
+    from reports import output as folders
 
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
-    folder = files.prepare(output)
+    folder = folders.prepare(output)
     records, names = [], []
     with progress.shown() as bar:
         for source, rendering in [jobs.job(name, words) for name in scenes]:
             set_variant(rendering["variant"])
             command = jobs.command(source, rendering | fitting_words | {"form": form}, "fit")
             result = run(source, jobs.options(rendering), chosen, bar.of(source.name), command)
-            names.append(files.folder_name(source.name, names))
+            names.append(folders.folder_name(source.name, names))
             fitting.write(folder / names[-1], result)
             records.append(result.data)
     if markdown:
-        fitting.write_text(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
+        files.write(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
     if as_json:
-        lines = [json.dumps(records, indent=2, ensure_ascii=False)]
-    else:
-        lines = [line for record in records for line in fitting.lines(record)]
-        lines.append(str(folder))
-    for line in lines:
-        click.echo(line)
+        click.echo(json.dumps(records, indent=2, ensure_ascii=False))
+        return
+    for record in records:
+        terminal.tell(fitting.lines(record))
+    terminal.tell_where(folder)

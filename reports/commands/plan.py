@@ -5,10 +5,11 @@ import json
 import click
 
 from reports import jobs
+from reports.commands import completion
 
 
 @click.command()
-@click.argument("scene", metavar="SCENE")
+@click.argument("scene", metavar="SCENE", shell_complete=completion.scene)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
 @jobs.rendering_options

@@ -2,7 +2,7 @@
 
 import click
 
-from reports import batch, jobs
+from reports import batch, jobs, terminal
 
 VERIFIED_AT = (128, 128)
 """Resolution at which a report verifies its plans."""
@@ -10,9 +10,21 @@ VERIFIED_AT = (128, 128)
 
 @click.command()
 @jobs.output_option("out/report")
+@jobs.figures_option
 @jobs.rendering_options
-def report(output, **rendering):
-    """Compare all built-in scenes, price their effects, and write one report."""
+@terminal.quiet_option
+@terminal.verbose_option
+def report(output, figures, **rendering):
+    """Compare all built-in scenes, price their effects, and write one report.
+
+    Writes what `compare --cost` does, and in the page the plans verified, the hard cases and the
+    index of equations.
+
+    \b
+    Examples:
+      fotismos report
+      fotismos report --resolution 128x128 -o small --figures
+    """  # noqa: D301 click reads the \b as: keep these lines
     from comparisons.scenes import SCENES
     from heuristic import equations
 
@@ -25,6 +37,7 @@ def report(output, **rendering):
         names,
         output,
         rendering,
+        figures,
         with_cost=True,
         with_hard_cases=True,
         equations=equations.index(),

@@ -5,7 +5,13 @@ import click
 
 @click.command()
 def scenes():
-    """List the built-in scenes."""
+    """List the built-in scenes, by name and with a sentence each.
+
+    \b
+    Examples:
+      fotismos scenes
+      fotismos scenes | grep sphere
+    """  # noqa: D301 click reads the \b as: keep these lines
     from comparisons.scenes import SCENES
 
     width = max(map(len, SCENES))

@@ -1,0 +1,143 @@
+"""Makes what the documentation takes from the code: ``./run docs``.
+
+Pictures and tables come from renderings with fixed seeds; the index of equations comes from the
+docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced, the rest is
+written by hand.
+"""
+
+import re
+from itertools import groupby
+from pathlib import Path
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import nbformat
+from matplotlib.figure import Figure
+from nbclient import NotebookClient
+
+from comparisons.compare import Options, compare
+from comparisons.scenes import builtin
+from heuristic import equations
+from heuristic.interpolation import Interpolation
+from reference.scene import set_variant
+from reports import figures, files, images, tables
+
+DOCS = Path(__file__).parent
+SIDE, SAMPLES = 192, 64
+
+SHEETS = {
+    "ambient": ("fig-8-5a", "fig-8-5b", "fig-8-5c"),
+    "diffuse": ("fig-8-6a", "fig-8-6b", "fig-8-6c"),
+    "specular": ("fig-8-7a", "fig-8-7b", "fig-8-7c"),
+    "sum": ("fig-8-8a", "fig-8-8c", "fig-8-9", "fig-8-11-n9"),
+    "spots": ("fig-6-5-m1", "fig-6-5-m40"),
+}
+"""Pictures of docs/models.md: heuristic above, reference below."""
+
+POLYGONS = (
+    ("fig-6-10", Interpolation.FLAT),
+    ("fig-6-10", Interpolation.GOURAUD),
+    ("fig-6-10", Interpolation.PHONG),
+    ("fig-6-14", Interpolation.GOURAUD),
+    ("fig-6-14", Interpolation.PHONG),
+)
+
+
+def main():
+    """Make everything."""
+    set_variant("llvm_ad_rgb")
+    replace("models.md", "equations", equation_table())
+    for name, scenes in SHEETS.items():
+        pairs = [_images(scene) for scene in scenes]
+        _sheet(f"models-{name}.png", scenes, [[p.heuristic for p in pairs],
+                                              [p.reference for p in pairs]])  # fmt: skip
+    shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
+    _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
+    _example()
+    _notebook()
+
+
+def replace(page, part, lines):
+    """Replace what stands between a page's marks for a part."""
+    path = DOCS / page
+    text = path.read_text(encoding="utf-8")
+    begin, end = marks(part)
+    head, rest = text.split(begin)
+    _, tail = rest.split(end)
+    files.write(path, "\n".join([head + begin, "", *lines, "", end + tail]))
+
+
+def marks(part):
+    """Return what a part of a page begins and ends with."""
+    return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
+
+
+def equation_table():
+    """Yield the index of equations in Markdown; neighbours that say the same share a row."""
+    rows = []
+    for (home, meaning), entries in groupby(equations.index(), lambda e: (e.home, e.meaning)):
+        numbers = [entry.number for entry in entries]
+        rows.append((_span(numbers), _link(home), re.sub(r"``(.*?)``", r"`\1`", meaning)))
+    return tables.markdown(("Equation", "Home", "What it says"), rows, right=False)
+
+
+def _span(numbers):
+    return numbers[0] if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+
+
+def _link(home):
+    if home is None:
+        return "none"
+    room, module, name = home.split(".", 2)
+    return f"[`{module}.{name}`](../{room}/{module}.py)"
+
+
+def _images(name, interpolation=None):
+    scene = builtin(name)
+    options = Options(
+        spp=SAMPLES,
+        resolution=(SIDE, SIDE),
+        interpolation=interpolation or Interpolation(scene.interpolation),
+        tessellation=scene.tessellation,
+    )
+    return compare(scene.source(), options).images
+
+
+def _sheet(name, titles, rows):
+    """Write rows of pictures with a title above each column."""
+    columns, inch = len(titles), SIDE / 100
+    figure = Figure(figsize=(columns * inch, len(rows) * inch + 0.25))
+    axes = figure.subplots(len(rows), columns, squeeze=False)
+    top = 1 - 0.25 / figure.get_figheight()
+    figure.subplots_adjust(0, 0, 1, top, wspace=0.03, hspace=0.03)
+    for line, pictures in zip(axes, rows, strict=True):
+        for place, picture in zip(line, pictures, strict=True):
+            place.imshow(images.tonemap(picture), interpolation="none")
+            place.axis("off")
+    for place, title in zip(axes[0], titles, strict=True):
+        place.set_title(title, fontsize=8, pad=3)
+    files.write(DOCS / name, figures.drawn(figure, "png", 100))
+
+
+def _example():
+    """Write the worked example of docs/reading.md: one scene with few samples and with many."""
+    results = []
+    for samples in (16, 256):
+        options = Options(spp=samples, resolution=(256, 256))
+        results.append(compare(builtin("cornell-box").source(), options))
+    files.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
+    replace("reading.md", "example", tables.metrics_markdown(r.data for r in results))
+
+
+def _notebook():
+    """Execute the tutorial, and keep what its cells show but not when they ran."""
+    path = DOCS / "tutorial.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)
+    files.write(path, nbformat.writes(notebook) + "\n")
+
+
+if __name__ == "__main__":
+    main()

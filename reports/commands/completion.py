@@ -1,0 +1,36 @@
+"""``fotismos completion``: what makes a shell complete commands, options and scenes."""
+
+import click
+from click.shell_completion import CompletionItem, get_completion_class
+
+SHELLS = ("bash", "zsh", "fish")
+
+
+@click.command()
+@click.argument("shell", type=click.Choice(SHELLS))
+@click.pass_context
+def completion(context, shell):
+    """Print what makes a shell complete commands, options and names of scenes.
+
+    \b
+    Examples, for this session or a shell's start file:
+      source <(fotismos completion bash)
+      source <(fotismos completion zsh)
+      fotismos completion fish | source
+    In bash, for the run script of a copy of the project, from its folder:
+      source <(./run completion bash); complete -o nosort -F _fotismos_completion ./run
+    """  # noqa: D301 click reads the \b as: keep these lines
+    program = get_completion_class(shell)(
+        context.find_root().command, {}, "fotismos", "_FOTISMOS_COMPLETE"
+    )
+    # Not .source(), which starts a bash to look at its version.
+    click.echo(program.source_template % program.source_vars())
+
+
+def scene(context, parameter, beginning):
+    """Complete a SCENE: the built-in ones that begin so, or else files."""
+    from comparisons.scenes import SCENES
+
+    named = [name for name in SCENES if name.startswith(beginning)]
+    found = [CompletionItem(name, help=SCENES[name].title) for name in named]
+    return found or [CompletionItem(beginning, type="file")]

@@ -1,0 +1,54 @@
+"""How much a command says: results on standard output, everything else on standard error."""
+
+import click
+
+LEVEL = "fotismos.verbosity"
+"""Key of the number in click's context: -1 quiet, 0 as usual, 1 verbose."""
+
+
+def _remember(context, parameter, given):
+    if given:
+        context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
+
+
+quiet_option = click.option(
+    "-q",
+    "--quiet",
+    is_flag=True,
+    expose_value=False,
+    callback=_remember,
+    help="No progress and no tables: only where the results are.",
+)
+verbose_option = click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    expose_value=False,
+    callback=_remember,
+    help="Say more: what is simulated, how lights are paired, what is missed, where time goes.",
+)
+
+
+def level():
+    """Return -1 for a quiet command, 1 for a verbose one, else 0."""
+    context = click.get_current_context(silent=True)
+    return context.meta.get(LEVEL, 0) if context else 0
+
+
+def tell(lines):
+    """Print lines of a result, unless the command is quiet."""
+    if level() >= 0:
+        for line in lines:
+            click.echo(line)
+
+
+def tell_where(path):
+    """Print where the results are; of a quiet command it is all that is printed."""
+    click.echo(path if level() < 0 else f"\n{path}")
+
+
+def remark(lines):
+    """Print lines on standard error, if the command is verbose."""
+    if level() > 0:
+        for line in lines:
+            click.echo(line, err=True)

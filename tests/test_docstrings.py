@@ -1,0 +1,49 @@
+"""The examples in docstrings run as they are printed, with the results that they print."""
+
+import doctest
+import importlib
+import inspect
+from pathlib import Path
+
+import pytest
+
+import heuristic
+from comparisons import metrics
+from heuristic import terms
+from reference import pairing
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("heuristic", "reference", "comparisons", "reports")
+
+
+def with_examples():
+    """The names of all modules that hold an example."""
+    for room in ROOMS:
+        for path in sorted((ROOT / room).rglob("*.py")):
+            if ">>>" in path.read_text(encoding="utf-8"):
+                yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
+
+
+@pytest.mark.parametrize("name", list(with_examples()))
+@pytest.mark.usefixtures("rgb")
+def test_examples_run_as_printed(name):
+    failed, tried = doctest.testmod(importlib.import_module(name))
+    assert tried
+    assert not failed
+
+
+SHOWN_BY_EXAMPLE = (
+    heuristic.Material,
+    heuristic.shade,
+    *(terms.diffuse, terms.specular, terms.attenuation, terms.clamped_attenuation),
+    *(terms.normalisation, terms.spot_falloff),
+    *(pairing.alpha_of, pairing.exponent_of, pairing.specular_albedo),
+    *(pairing.to_roughplastic, pairing.to_phong),
+    *(metrics.delta_e_2000, metrics.delta_e_itp, metrics.delta_e_cam16ucs),
+    *(metrics.rmse, metrics.log2_luminance_ratio),
+)
+
+
+@pytest.mark.parametrize("public", SHOWN_BY_EXAMPLE, ids=lambda public: public.__name__)
+def test_what_users_call_has_an_example(public):
+    assert ">>>" in inspect.getdoc(public)

@@ -1,0 +1,78 @@
+"""A run's tables hold the records' numbers."""
+
+import csv
+import json
+from io import StringIO
+
+import pytest
+from markdown_it import MarkdownIt
+
+from reports import output, tables
+from tests import records
+
+
+def two_records():
+    other = records.record()
+    other["scene"] = 'a "b", c | d'
+    other["metrics"]["dE2000"]["mean"] = 99.5
+    return [records.record(), other]
+
+
+def test_csv_holds_every_number_in_full():
+    made = two_records()
+    rows = list(csv.DictReader(StringIO(tables.metrics_csv(made))))
+    assert len(rows) == 8
+    for row in rows:
+        (record,) = [each for each in made if each["scene"] == row["scene"]]
+        metric = record["metrics"][row["metric"]]
+        if row["metric"] == "rmse":
+            assert float(row["mean"]) == metric["value"]
+            assert float(row["after_exposure.mean"]) == metric["after_exposure"]["value"]
+            assert row["p95"] == ""
+        else:
+            for name in ("mean", "p50", "p95", "max", "noise_floor"):
+                assert float(row[name]) == metric[name]
+            for name, value in metric["after_exposure"].items():
+                assert float(row[f"after_exposure.{name}"]) == value
+        assert float(row["significant"]) == record["metrics"]["significant"]["fraction"]
+
+
+def test_markdown_is_a_table_with_a_row_a_scene():
+    text = "\n".join(tables.metrics_markdown(two_records()))
+    page = MarkdownIt().enable("table").render(text)
+    assert page.count("<tr>") == 3
+    assert "a &quot;b&quot;, c | d" in page
+    assert "4.33 (3.07; 0.0532)" in page
+
+
+def test_a_scene_takes_no_name_of_a_folder_of_the_run():
+    assert output.folder_name("tables", {}) == "tables-2"
+    assert output.folder_name("figures", {"figures-2"}) == "figures-3"
+
+
+def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
+    amount = {"value": 1.5, "low": 1.25, "high": 1.75}
+    price = {"effect": "occlusion", "removes": amount, "adds_s": amount, "alone": -0.5, "last": 3.0}
+    seconds = {"median": 0.25, "low": 0.125, "high": 0.5}
+    point = {"rung": "direct", "spp": 4, "seconds": seconds, "pareto": True}
+    data = {
+        "points": [point | {"error": 12.75, "error_stderr": 0.03125}],
+        "prices": {"effects": [price]},
+    }
+    tables.write_cost(tmp_path / "tables", "box", data)
+    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").iterdir()}
+    assert sorted(read) == ["box-cost.csv", "box-cost.md", "box-prices.csv", "box-prices.md"]
+    assert "\ndirect,4,0.25,0.125,0.5,12.75,0.03125,yes\n" in read["box-cost.csv"]
+    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-prices.csv"]
+    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 | 1.50 |" in read["box-prices.md"]
+
+
+@pytest.mark.parametrize("colour", ["", "1"])
+def test_printed_tables_hold_no_codes_and_fold_long_cells(monkeypatch, colour):
+    monkeypatch.setenv("FORCE_COLOR", colour)
+    table = tables.ruled("scene", "rule")
+    table.add_row("x", "word " * 60)
+    lines = list(tables.printed(table))
+    assert len(lines) > 2
+    assert max(map(len, lines)) <= tables.WIDTH
+    assert "\x1b" not in json.dumps(lines)
