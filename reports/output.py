@@ -8,7 +8,7 @@ from pathlib import Path
 
 from comparisons.metrics import METRICS
 from heuristic.errors import InputError
-from reports import cost, embedding, exr, images, page
+from reports import cost, embedding, exr, files, images, page
 
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
@@ -66,10 +66,10 @@ def write_scene(folder, name, comparison, study=None):
         )
 
     layers = _layers(shown)
-    files = pictures()
+    pictured = pictures()
     priced = cost.files(study) if study else {}
     with _replacing(folder / name) as place:
-        for key, png in files.items():
+        for key, png in pictured.items():
             (place / f"{key}.png").write_bytes(png)
         exr.write(place / "comparison.exr", layers, _header(data))
         (place / "comparison.json").write_text(_json(data), encoding="utf-8")
@@ -79,7 +79,7 @@ def write_scene(folder, name, comparison, study=None):
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
     return {
         "record": data,
-        "images": files if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
+        "images": pictured if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
         "thumbnails": images.thumbnails(
             shown.heuristic, shown.reference, shown.maps["dE2000"], exposure
         ),
@@ -92,12 +92,12 @@ def write_scene(folder, name, comparison, study=None):
 
 def write_page(folder, views, **shown):
     """Write ``index.html`` for the scenes of a run, and what else `reports.page.render` shows."""
-    _write(folder / "index.html", page.render(views, **shown))
+    files.write(folder / "index.html", page.render(views, **shown))
 
 
 def write_run(folder, data):
     """Write ``run.json``: the command, where its time went, machine and versions."""
-    _write(folder / "run.json", _json(data))
+    files.write(folder / "run.json", _json(data))
 
 
 def folder_name(name, taken):
@@ -143,12 +143,6 @@ def _header(data):
     }
     header |= {f"version {name}": version for name, version in data["versions"].items()}
     return {key: str(value) for key, value in header.items()}
-
-
-def _write(path, text):
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
 
 
 @contextmanager
