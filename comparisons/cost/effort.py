@@ -7,7 +7,7 @@ from itertools import takewhile
 from comparisons.cost import shapley
 from comparisons.cost.ladder import DEPTHS
 from heuristic.errors import InputError
-from reference.halves import FILM, SENSOR
+from reference.preparation import FILM, SENSOR
 
 DETERMINISTIC_SPP = 16
 """Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
