@@ -351,14 +351,15 @@ def test_two_sided_phongs_become_two_sided_surfaces(rgb, k_s):
 # --- Refusals --------------------------------------------------------------------------------
 
 
-def test_a_bsdf_that_cannot_be_paired_is_named(rgb):
-    with pytest.raises(InputError, match=r"a test: mirror: the BSDF 'conductor'.*roughplastic"):
-        pair_of({"type": "conductor", "id": "mirror"})
-
-
-def test_an_emitter_that_cannot_be_paired_is_named(rgb):
-    with pytest.raises(InputError, match=r"a test: beam: the emitter 'projector'.*directional"):
-        pair_of({"type": "diffuse"}, {"type": "projector", "id": "beam", "irradiance": 1.0})
+def test_what_has_no_pair_is_named_with_what_is_lost(rgb):
+    beam = {"type": "projector", "id": "beam", "irradiance": 1.0}
+    pair = pair_of({"type": "conductor", "id": "mirror"}, beam)
+    (mirror,) = pair.bsdfs
+    assert (mirror.name, mirror.given, mirror.derived) == ("mirror", "conductor", "phong")
+    assert "mirror image" in dict(mirror.lost)
+    (light,) = (record for record in pair.emitters if record.name == "beam")
+    assert light.given == "projector"
+    assert light.lost
 
 
 @pytest.mark.parametrize("name", ["k_a", "k_d", "k_s"])
