@@ -46,6 +46,15 @@ def figures_option(command):
     )(command)
 
 
+def fresh_option(command):
+    """Add the option that renders what is finished already."""
+    return click.option(
+        "--fresh",
+        is_flag=True,
+        help="Render all scenes; without it, finished ones are found again in OUTPUT.",
+    )(command)
+
+
 def rendering_options(command):
     """Add the options that all commands which render have in common."""
     options = (
@@ -119,22 +128,38 @@ def check_installation():
     backend.check()
 
 
-def job(name, rendering):
-    """Find a scene, and complete the options with what it asks for.
+def find(name):
+    """Return the name that a scene goes by, without reading it.
 
     All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
     """
+    from comparisons.scenes import builtin
+
+    path = _file(name)
+    return builtin(name).name if path is None else path.stem
+
+
+def _file(name):
+    """Return the path of a scene that is a file, None for a built-in one."""
+    path = Path(name)
+    if path.suffix not in (".xml", ".py") and not path.exists():
+        return None
+    if not path.is_file():
+        raise InputError(
+            f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
+            " built-in scene; `fotismos scenes` lists them."
+        )
+    return path
+
+
+def job(name, rendering):
+    """Find a scene, and complete the options with what it asks for."""
     from comparisons.scenes import Scene, builtin
     from reference.plan import wants_spectra
     from reference.scene import Source
 
-    path = Path(name)
-    if path.suffix == ".xml" or path.exists():
-        if not path.is_file():
-            raise InputError(
-                f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
-                " built-in scene; `fotismos scenes` lists them."
-            )
+    path = _file(name)
+    if path is not None:
         source = Source(path.stem, path, dict(rendering.get("define") or ()))
         spectral = rendering["variant"] is None and wants_spectra(source.parse())
         scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
