@@ -56,7 +56,7 @@ def _places(names):
     from reports import output
 
     places = {}
-    for name in names:
+    for name in jobs.expand(names):
         places[output.folder_name(jobs.find(name), places)] = name
     return places
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from heuristic.errors import InputError
+from reports.scripts import Script, scenes_in
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
@@ -128,6 +129,15 @@ def check_installation():
     backend.check()
 
 
+def expand(names):
+    """Return the names of scenes, with the scenes in it in place of each folder."""
+    return [
+        scene
+        for name in names
+        for scene in (map(str, scenes_in(Path(name))) if Path(name).is_dir() else [name])
+    ]
+
+
 def find(name):
     """Return the name that a scene goes by, without reading it.
 
@@ -146,8 +156,9 @@ def _file(name):
         return None
     if not path.is_file():
         raise InputError(
-            f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
-            " built-in scene; `fotismos scenes` lists them."
+            f"{name}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
+            " that makes one (.py), a folder of such, or the name of a built-in scene;"
+            " `fotismos scenes` lists them."
         )
     return path
 
@@ -160,7 +171,8 @@ def job(name, rendering):
 
     path = _file(name)
     if path is not None:
-        source = Source(path.stem, path, dict(rendering.get("define") or ()))
+        content = Script(path) if path.suffix == ".py" else path
+        source = Source(path.stem, content, dict(rendering.get("define") or ()))
         spectral = rendering["variant"] is None and wants_spectra(source.parse())
         scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
     else:
@@ -198,9 +210,16 @@ def options(rendering):
     )
 
 
+def _word(source):
+    """Return the word that names a scene in a command."""
+    if isinstance(source.content, Script):
+        return str(source.content.path)
+    return source.name if callable(source.content) else str(source.content)
+
+
 def command(source, rendering, verb="compare"):
     """Return the command that repeats what was done with one scene."""
-    scene = source.name if callable(source.content) else str(source.content)
+    scene = _word(source)
     words = ["fotismos", verb, scene]
     for name, value in source.parameters.items():
         words += ["-D", f"{name}={value}"]

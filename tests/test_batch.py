@@ -2,18 +2,13 @@
 
 import json
 import os
-import signal
-import subprocess
+import re
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
 from reports import cli
 from tests.test_cli import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 ABORTS = """
 import os, signal
@@ -114,3 +109,92 @@ def test_what_a_killed_run_left_is_cleared_away_and_restored(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
     assert (tmp_path / "a/comparison.json").read_text() == ".a.old"
     assert (tmp_path / "b/comparison.json").read_text() == "b"
+
+
+def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_path):
+    (folder / "aa.py").write_text(ABORTS)
+    (folder / "c.py").write_text(GOOD)
+    (folder / "notes.py").write_text("raise SystemExit('this is no scene')")
+    (folder / "part.xml").write_text('<scene version="3.0.0"/>')
+    (folder / "b.xml").write_text(
+        SCENE.replace("</scene>", '<include filename="part.xml"/></scene>')
+    )
+    out = tmp_path / "out"
+    words = ("compare", folder, "-o", out, "--spp", 2, "--resolution", "16x16")
+    code, _, messages = run(*words)
+    assert code == 1
+    assert "1 of 4 scenes failed" in messages
+    assert "SIGABRT" in messages
+    assert all((out / name / "comparison.json").is_file() for name in "abc")
+    assert not (out / "aa").exists()
+    failures = json.loads((out / "run.json").read_text(encoding="utf-8"))["failures"]
+    assert [failure["scene"] for failure in failures] == ["aa"]
+    assert "SIGABRT" in (out / "index.html").read_text(encoding="utf-8")
+    record = json.loads((out / "c/comparison.json").read_text(encoding="utf-8"))
+    assert str(folder / "c.py") in record["command"]
+    before = {path: path.stat().st_mtime_ns for path in out.glob("?/*")}
+    (folder / "aa.py").write_text(GOOD)
+    assert run(*words)[0] == 0
+    assert {path: path.stat().st_mtime_ns for path in out.glob("?/*")} == before
+    assert (out / "aa/comparison.json").is_file()
+
+
+def _nested(depth):
+    return SCENE.replace("</scene>", "<shape type='sphere'>" * depth + "</scene>")
+
+
+ENTITIES = (
+    f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True)
+)
+BOMB = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{"".join(ENTITIES)}]>'
+
+HOSTILE = {
+    "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "&j;|j"),
+    "nesting": (_nested(100_000), "deep in each other"),
+    "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "includes itself"),
+    "NUL": (SCENE[:200] + "\0" + SCENE[200:], "NUL"),
+    "film": (
+        SCENE.replace('value="24"', 'value="1000000"').replace('value="16"', 'value="1000000"'),
+        "1000000x1000000 pixels is too large",
+    ),
+    "number": (SCENE.replace('value="24"', f'value="{"9" * 400}"'), "9999"),
+    "texture": (
+        SCENE.replace(
+            '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>',
+            '<texture type="bitmap" name="diffuse_reflectance">'
+            '<string name="filename" value="x.xml"/></texture>',
+        ),
+        "x.xml|[Bb]itmap|format",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_scene_is_refused_in_one_message(name, run, tmp_path):
+    content, expected = HOSTILE[name]
+    path = tmp_path / "x.xml"
+    path.write_text(content, encoding="utf-8")
+    code, printed, messages = run("compare", path, "-o", tmp_path / "out", "--spp", 2)
+    assert (code, printed) == (2, "")
+    assert messages.startswith("fotismos: error: ")
+    assert re.search(expected, messages)
+    assert "Traceback" not in messages
+    assert sorted(place.name for place in tmp_path.iterdir()) == ["out", "x.xml"]
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_pipe_and_an_empty_folder_are_no_scenes(run, tmp_path):
+    os.mkfifo(tmp_path / "pipe.xml")
+    for path in (tmp_path / "pipe.xml", tmp_path):
+        code, _, messages = run("compare", path, "-o", tmp_path / "out")
+        assert code == 2
+        assert "there is no" in messages
+
+
+def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
+    path = tmp_path / "..<img src=x onerror=alert(1)>.xml"
+    path.write_text(SCENE, encoding="utf-8")
+    out = tmp_path / "out"
+    assert run("compare", path, "-o", out, "--spp", 2)[0] == 0
+    assert "<img src=x" not in (out / "index.html").read_text(encoding="utf-8")
+    assert sorted(place.name for place in tmp_path.iterdir()) == [path.name, "out"]
