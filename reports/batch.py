@@ -38,7 +38,13 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
     places = _places(names)
     folder = output.prepare(folder)
     output.recover(folder)
-    views, failures = _compare(run, places, folder, wanted)
+    views, failures = {}, {}
+    try:
+        _compare(run, places, folder, wanted, views, failures)
+    except KeyboardInterrupt:
+        if views or failures:
+            _write(run, folder, views, failures, wanted.figures, shown)
+        raise
     if with_hard_cases:
         from comparisons.hard import record
 
@@ -61,11 +67,10 @@ def _places(names):
     return places
 
 
-def _compare(run, places, folder, wanted):
-    """Return the views of the scenes that were compared, and the errors of the others."""
+def _compare(run, places, folder, wanted, views, failures):
+    """Collect the views of the scenes that are compared, and the errors of the others."""
     from reports import progress
 
-    views, failures = {}, {}
     alone = len(places) == 1
     with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
         for place, name in places.items():
@@ -79,7 +84,6 @@ def _compare(run, places, folder, wanted):
             views[place] = done.view
             run.did(done)
             terminal.remark(progress.details(done.view["record"]))
-    return views, failures
 
 
 def _write(run, folder, views, failures, with_figures, shown):

@@ -3,12 +3,20 @@
 import json
 import os
 import re
+import shutil
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
+from random import Random
 
 import pytest
 
 from reports import cli
 from tests.test_cli import SCENE
+
+ROOT = Path(__file__).parents[1]
 
 ABORTS = """
 import os, signal
@@ -198,3 +206,94 @@ def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
     assert run("compare", path, "-o", out, "--spp", 2)[0] == 0
     assert "<img src=x" not in (out / "index.html").read_text(encoding="utf-8")
     assert sorted(place.name for place in tmp_path.iterdir()) == [path.name, "out"]
+
+
+def _start(folder, out):
+    words = [sys.executable, "-m", "reports", "compare", folder, "-o", out]
+    words += ["--spp", "8", "--resolution", "16x16"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def _results(out):
+    """Return all that a batch wrote of its scenes but times and what is derived from them."""
+    found = {}
+    for path in sorted(out.glob("?/*")):
+        if path.suffix == ".json":
+            record = json.loads(path.read_text(encoding="utf-8"))
+            record = record.get("record", record)
+            found[path.relative_to(out)] = {
+                key: value for key, value in record.items() if key != "time"
+            }
+        else:
+            found[path.relative_to(out)] = path.read_bytes()
+    return found
+
+
+def _kill_at_random_moments(folder, tmp_path, kills):
+    """Kill a batch so many times, each time somewhere within what a whole one takes."""
+    begin = time.perf_counter()
+    whole = _start(folder, tmp_path / "whole")
+    messages = whole.communicate(timeout=300)[1]
+    seconds = time.perf_counter() - begin
+    assert (whole.returncode, messages) == (0, "")
+    out, random, kept = tmp_path / "killed", Random(kills), {}
+    for number in range(kills):
+        if len(kept) == len(list(folder.iterdir())):
+            shutil.rmtree(out)
+            kept = {}
+        batch = _start(folder, out)
+        try:
+            batch.communicate(timeout=seconds * (0.2 + random.random()))
+        except subprocess.TimeoutExpired:
+            batch.kill()
+            batch.communicate()
+        finished = {path: path.read_bytes() for path in out.glob("?/view.json")}
+        for path, content in finished.items():
+            json.loads(content)
+            assert (path.parent / "comparison.exr").is_file()
+        assert kept.items() <= finished.items(), f"a result was lost by kill {number}"
+        kept = finished
+    last = _start(folder, out)
+    assert last.communicate(timeout=300)[1] == ""
+    assert last.returncode == 0
+    assert all(path.read_bytes() == content for path, content in kept.items())
+    assert _results(out) == _results(tmp_path / "whole")
+    wanted, found = (sorted(p.name for p in (tmp_path / n).iterdir()) for n in ("whole", "killed"))
+    assert found == wanted
+
+
+@pytest.fixture
+def box_filtered(folder):
+    """The folder with scenes of which every rendering is the same bit for bit."""
+    for path in folder.iterdir():
+        scene = SCENE.replace("</film>", '<rfilter type="box"/></film>')
+        path.write_text(scene, encoding="utf-8")
+    return folder
+
+
+def test_killed_batches_go_on_to_the_results_of_a_whole_one(box_filtered, tmp_path):
+    _kill_at_random_moments(box_filtered, tmp_path, 3)
+
+
+@pytest.mark.slow
+def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
+    _kill_at_random_moments(box_filtered, tmp_path, 50)
+
+
+def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):
+    (folder / "c.py").write_text("import time\n\ndef scene():\n    time.sleep(1000)\n")
+    out = tmp_path / "out"
+    batch = _start(folder, out)
+    while not (out / "b/view.json").exists():
+        assert batch.poll() is None
+        time.sleep(0.05)
+    batch.send_signal(signal.SIGINT)
+    _, messages = batch.communicate(timeout=60)
+    assert batch.returncode == 130
+    assert "same command" in messages
+    assert "Traceback" not in messages
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "b/comparison.json" in page
