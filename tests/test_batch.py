@@ -83,6 +83,24 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
     assert rendered == ["a"] * 5
 
 
+def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
+    from comparisons.options import Options
+    from reference.scene import Source
+    from reports.passes import key_of
+
+    texture = (
+        '<texture type="bitmap" name="diffuse_reflectance">'
+        '<string name="filename" value="t.png"/></texture>'
+    )
+    colour = '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>'
+    (tmp_path / "s.xml").write_text(SCENE.replace(colour, texture), encoding="utf-8")
+    keys = set()
+    for content in (b"one", b"two"):
+        (tmp_path / "t.png").write_bytes(content)
+        keys.add(key_of(Source("s", tmp_path / "s.xml"), Options(), "llvm_ad_rgb", {}))
+    assert len(keys) == 2
+
+
 def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypatch):
     from reports import finished, output
 
