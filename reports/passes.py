@@ -89,6 +89,8 @@ def key_of(source, options, variant, versions):
         props = graph.props(index)
         digest.update(str(props).encode())
         for name, value in props.items():
+            if hasattr(value, "__array__") or hasattr(value, "__array_interface__"):
+                digest.update(np.array(value).tobytes())  # printed, large arrays are shortened
             if not isinstance(value, str) or name != "filename":
                 continue
             path = (graph.folder or Path()) / value
