@@ -14,6 +14,7 @@ from comparisons.metrics import METRICS
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.significance import significance
+from heuristic.errors import InputError
 from reference import halves
 from reference.gbuffer import gbuffer
 from reference.halves import Pair
@@ -22,6 +23,9 @@ from reference.rendering import Renderer, physical_integrator, variant
 
 LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
+
+LARGEST = 2**26
+"""Pixels of an image: sums, images and maps of a comparison take some 300 bytes each."""
 
 ROWS = 256
 """Of an image, tested for significance at a time."""
@@ -53,11 +57,16 @@ def prepare(source, options=None):
     options = options or Options()
     pair = _pair(source, options)
     physical = halves.with_sampler(pair.physical, sampler(options.everything)).instantiate()
+    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
+    if width * height > LARGEST:
+        raise InputError(
+            f"{source.name}: an image of {width}x{height} pixels is too large: {LARGEST} pixels are"
+            " allowed. Give a smaller one with --resolution."
+        )
     begin = perf_counter()
     chosen = plan(pair, physical, options.interpolation, options.everything)
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
     planning = perf_counter() - begin
-    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
     # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
     gc.collect()
     planned = passes.schedule(chosen, width * height, options.spp, options.noise)

@@ -14,6 +14,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from heuristic.plugins import lights, mapped
+from reference import scene_files
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -80,11 +81,7 @@ class Source:
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                if not path.is_file():
-                    raise InputError(
-                        f"{path}: there is no such file. Give a Mitsuba scene (.xml) or the name of"
-                        " a built-in scene; `fotismos scenes` lists them."
-                    )
+                scene_files.check(path)
                 state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)

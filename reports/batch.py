@@ -1,16 +1,19 @@
 """Comparing scenes one after another, and writing their results and the page.
 
 A scene that cannot be compared does not keep the others from it: the page names it with its error,
-and the command ends with that error's exit code.
+and the command ends with that error's exit code. Several scenes are compared in a process apart,
+which one of them may kill; a single one is compared in this process.
 """
 
 import shlex
 import sys
-from time import perf_counter
+from contextlib import nullcontext
 
 from heuristic.errors import FotismosError
-from reports import jobs, terminal
+from reports import jobs, single, terminal
 from reports.run import Run
+from reports.single import Wanted
+from reports.worker import Worker
 
 
 def start():
@@ -21,46 +24,78 @@ def start():
     InstallationError
         When LLVM cannot be used.
     """
-    jobs.check_installation()
-    import comparisons.compare  # noqa: F401  part of start-up
-
+    single.load()
     return Run(shlex.join(["fotismos", *sys.argv[1:]]))
 
 
-def run(names, folder, rendering, figures=False, with_cost=False):
-    """Compare scenes and write the results of each, then the page and the tables of all."""
-    finish(start(), names, folder, rendering, figures, with_cost)
+def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
+    """Compare the scenes of a run, and write the results of each, then page and tables of all.
 
+    ``shown`` is what else the page shows.
+    """
+    from reports import hard_cases, output
 
-def finish(
-    run, names, folder, rendering, figures=False, with_cost=False, with_hard_cases=False, **shown
-):
-    """Do the same for a run that has begun; ``shown`` is what else the page shows."""
-    from reports import figures as prints
-    from reports import hard_cases, output, progress, tables
-
+    places = _places(names)
     folder = output.prepare(folder)
-    wanted = [jobs.job(name, rendering) for name in names]
+    output.recover(folder)
     views, failures = {}, {}
-    with progress.shown() as bar:
-        for source, chosen in wanted:
-            name = output.folder_name(source.name, views)
-            try:
-                views[name] = _scene(run, folder, name, source, chosen, figures, with_cost, bar)
-            except FotismosError as error:
-                if len(wanted) == 1:
-                    raise
-                failures[source.name] = error
+    try:
+        _compare(run, places, folder, wanted, views, failures)
+    except KeyboardInterrupt:
+        if views or failures:
+            _write(run, folder, views, failures, wanted.figures, shown)
+        raise
     if with_hard_cases:
         from comparisons.hard import record
 
         with run.timing("hard cases"):
             shown["hard_cases"] = hard_cases.view(record.collect())
+    _write(run, folder, views, failures, wanted.figures, shown)
+    if failures:
+        place, error = max(failures.items(), key=lambda failure: failure[1].exit_code)
+        count = f"{len(failures)} of {len(places)} scenes failed, "
+        raise type(error)(f"{count}among them {place}: {error}") from error
+
+
+def _places(names):
+    """Return the names of the scenes' folders, with the words that name the scenes."""
+    from reports import output
+
+    places = {}
+    for name in jobs.expand(names):
+        places[output.folder_name(jobs.find(name), places)] = name
+    return places
+
+
+def _compare(run, places, folder, wanted, views, failures):
+    """Collect the views of the scenes that are compared, and the errors of the others."""
+    from reports import progress
+
+    alone = len(places) == 1
+    with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
+        for place, name in places.items():
+            try:
+                done = worker.compare(name, folder, place, wanted, bar.of(jobs.find(name)))
+            except FotismosError as error:
+                if alone:
+                    raise
+                failures[place] = error
+                continue
+            views[place] = done.view
+            run.did(done)
+            terminal.remark(progress.details(done.view["record"]))
+
+
+def _write(run, folder, views, failures, with_figures, shown):
+    """Write what is about all scenes, and say what came of them."""
+    from reports import figures, output, progress, tables
+
+    run.failures = [{"scene": name, "error": str(error)} for name, error in failures.items()]
     run.begin_page()
     output.write_page(
         folder,
         list(views.values()),
-        failures=[(name, str(error)) for name, error in failures.items()],
+        failures=[(failure["scene"], failure["error"]) for failure in run.failures],
         run=run,
         **shown,
     )
@@ -68,50 +103,7 @@ def finish(
     if views:
         records = [view["record"] for view in views.values()]
         tables.write(folder / output.TABLES, records)
-        if figures:
-            prints.write_run(folder / output.FIGURES, records)
+        if with_figures:
+            figures.write_run(folder / output.FIGURES, records)
         terminal.tell(progress.summary(records))
     terminal.tell_where(folder / "index.html")
-    if failures:
-        name, error = next(iter(failures.items()))
-        count = f"{len(failures)} of {len(wanted)} scenes failed, "
-        raise type(error)(f"{count}the first of them {name}: {error}") from error
-
-
-def _scene(run, folder, name, source, chosen, figures, with_cost, bar):
-    """Compare one scene, write its files, and return what the page needs of it."""
-    from comparisons.compare import compare
-    from reference.scene import set_variant
-    from reports import figures as prints
-    from reports import output, passes, progress
-
-    set_variant(chosen["variant"])
-    options, advance = jobs.options(chosen), bar.of(source.name)
-    kept = passes.of_scene(folder, name, source, options, chosen["variant"])
-    begin = perf_counter()
-    result = compare(source, options, advance, jobs.command(source, chosen), kept)
-    run.compared(result.data, perf_counter() - begin)
-    study = None
-    if with_cost:
-        with run.timing("cost"):
-            study = _cost(source, chosen, options, advance, result.data)
-    with run.timing("files"):
-        view = output.write_scene(folder, name, result, study)
-        if figures:
-            prints.write_scene(folder / output.FIGURES, name, result)
-    terminal.remark(progress.details(result.data))
-    kept.remove()
-    return view
-
-
-def _cost(source, chosen, options, progress, data):
-    """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
-    from comparisons.cost.dominance import in_region
-    from comparisons.cost.run import quick
-
-    study = quick(source, options, progress, jobs.command(source, chosen) + " --cost")
-    for region in data["regions"]:
-        effect = in_region(region, data["resolution"], study.effects)
-        if effect is not None:
-            region["effect"] = effect
-    return study

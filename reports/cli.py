@@ -61,8 +61,11 @@ def main():
     """Run the command line; the exit code says how it went."""
     try:
         code = cli(prog_name="fotismos", standalone_mode=False)
-    except click.exceptions.Abort:
-        click.echo("fotismos: interrupted; finished scenes are kept.", err=True)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        click.echo(
+            "fotismos: interrupted; finished scenes are kept, and the same command goes on.",
+            err=True,
+        )
         sys.exit(130)
     except click.ClickException as error:
         error.show()

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from heuristic.errors import InputError
+from reports.scripts import Script, scenes_in
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
@@ -43,6 +44,15 @@ def figures_option(command):
         "--figures",
         is_flag=True,
         help="Write figures for print, as SVG and PDF, to OUTPUT/figures.",
+    )(command)
+
+
+def fresh_option(command):
+    """Add the option that renders what is finished already."""
+    return click.option(
+        "--fresh",
+        is_flag=True,
+        help="Render all scenes; without it, finished ones are found again in OUTPUT.",
     )(command)
 
 
@@ -119,23 +129,50 @@ def check_installation():
     backend.check()
 
 
-def job(name, rendering):
-    """Find a scene, and complete the options with what it asks for.
+def expand(names):
+    """Return the names of scenes, with the scenes in it in place of each folder."""
+    return [
+        scene
+        for name in names
+        for scene in (map(str, scenes_in(Path(name))) if Path(name).is_dir() else [name])
+    ]
+
+
+def find(name):
+    """Return the name that a scene goes by, without reading it.
 
     All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
     """
+    from comparisons.scenes import builtin
+
+    path = _file(name)
+    return builtin(name).name if path is None else path.stem
+
+
+def _file(name):
+    """Return the path of a scene that is a file, None for a built-in one."""
+    path = Path(name)
+    if path.suffix not in (".xml", ".py") and not path.exists():
+        return None
+    if not path.is_file():
+        raise InputError(
+            f"{name}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
+            " that makes one (.py), a folder of such, or the name of a built-in scene;"
+            " `fotismos scenes` lists them."
+        )
+    return path
+
+
+def job(name, rendering):
+    """Find a scene, and complete the options with what it asks for."""
     from comparisons.scenes import Scene, builtin
     from reference.plan import wants_spectra
     from reference.scene import Source
 
-    path = Path(name)
-    if path.suffix == ".xml" or path.exists():
-        if not path.is_file():
-            raise InputError(
-                f"{name}: there is no such file. Give a Mitsuba scene (.xml) or the name of a"
-                " built-in scene; `fotismos scenes` lists them."
-            )
-        source = Source(path.stem, path, dict(rendering.get("define") or ()))
+    path = _file(name)
+    if path is not None:
+        content = Script(path) if path.suffix == ".py" else path
+        source = Source(path.stem, content, dict(rendering.get("define") or ()))
         spectral = rendering["variant"] is None and wants_spectra(source.parse())
         scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
     else:
@@ -173,9 +210,16 @@ def options(rendering):
     )
 
 
+def _word(source):
+    """Return the word that names a scene in a command."""
+    if isinstance(source.content, Script):
+        return str(source.content.path)
+    return source.name if callable(source.content) else str(source.content)
+
+
 def command(source, rendering, verb="compare"):
     """Return the command that repeats what was done with one scene."""
-    scene = source.name if callable(source.content) else str(source.content)
+    scene = _word(source)
     words = ["fotismos", verb, scene]
     for name, value in source.parameters.items():
         words += ["-D", f"{name}={value}"]

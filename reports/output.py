@@ -8,7 +8,7 @@ from pathlib import Path
 
 from comparisons.metrics import METRICS
 from heuristic.errors import InputError
-from reports import cost, embedding, exr, files, images, page
+from reports import cost, embedding, exr, files, finished, images, page
 
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
@@ -40,10 +40,26 @@ def prepare(folder):
     return folder
 
 
-def write_scene(folder, name, comparison, study=None):
+def recover(folder):
+    """Clear away what a killed run left half written, and restore what it was about to replace."""
+    for partial in folder.glob(".*.partial"):
+        if partial.is_dir():
+            shutil.rmtree(partial)
+        else:
+            partial.unlink()
+    for old in folder.glob(".*.old"):
+        place = folder / old.name.removeprefix(".").removesuffix(".old")
+        if place.exists():
+            shutil.rmtree(old)
+        else:
+            old.rename(place)
+
+
+def write_scene(folder, name, comparison, study=None, key=None):
     """Write the files of one comparison to ``folder/name``, in place of an earlier result.
 
     With a study of cost its files are written as well; without one, those of an earlier study stay.
+    With a key, `reports.finished.load` finds the result again by it.
 
     Returns
     -------
@@ -68,16 +84,9 @@ def write_scene(folder, name, comparison, study=None):
     layers = _layers(shown)
     pictured = pictures()
     priced = cost.files(study) if study else {}
-    with _replacing(folder / name) as place:
-        for key, png in pictured.items():
-            (place / f"{key}.png").write_bytes(png)
-        exr.write(place / "comparison.exr", layers, _header(data))
-        (place / "comparison.json").write_text(_json(data), encoding="utf-8")
-        for key, content in priced.items() if study else _kept(folder / name, COST_FILES):
-            (place / key).write_bytes(content)
     largest = max(data["resolution"])
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
-    return {
+    view = {
         "record": data,
         "images": pictured if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
         "thumbnails": images.thumbnails(
@@ -88,6 +97,16 @@ def write_scene(folder, name, comparison, study=None):
         "charts": cost.figures(study.data) if study else (),
         "cost": cost.view(study, priced) if study else None,
     }
+    with _replacing(folder / name) as place:
+        for png_name, png in pictured.items():
+            (place / f"{png_name}.png").write_bytes(png)
+        exr.write(place / "comparison.exr", layers, _header(data))
+        (place / "comparison.json").write_text(_json(data), encoding="utf-8")
+        for file, content in priced.items() if study else _kept(folder / name, COST_FILES):
+            (place / file).write_bytes(content)
+        if key is not None:
+            (place / finished.FILE).write_text(finished.text(view, key), encoding="utf-8")
+    return view
 
 
 def write_page(folder, views, **shown):

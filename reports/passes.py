@@ -89,8 +89,12 @@ def key_of(source, options, variant, versions):
         props = graph.props(index)
         digest.update(str(props).encode())
         for name, value in props.items():
-            path = Path(value) if isinstance(value, str) and name == "filename" else None
-            if path is not None and path.is_file():
+            if hasattr(value, "__array__") or hasattr(value, "__array_interface__"):
+                digest.update(np.array(value).tobytes())  # printed, large arrays are shortened
+            if not isinstance(value, str) or name != "filename":
+                continue
+            path = (graph.folder or Path()) / value
+            if path.is_file():
                 digest.update(hashlib.sha256(path.read_bytes()).digest())
     told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}

@@ -5,13 +5,16 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import Any
 
+from reports.single import Done
+
 START = perf_counter()
 
 
 class Run:
     """Wall time of one run by stage, in seconds, from the start of the program.
 
-    To be made when start-up is over.
+    To be made when start-up is over. `failures` are the scenes that could not be compared:
+    ``scene`` and ``error``.
     """
 
     def __init__(self, command: str) -> None:
@@ -20,6 +23,7 @@ class Run:
         self.command = command
         self.machine, self.versions = record.machine(), record.versions()
         self._seconds = {"start-up": perf_counter() - START}
+        self.failures: list[dict[str, str]] = []
         self._page: float | None = None
 
     @contextmanager
@@ -27,7 +31,7 @@ class Run:
         """Count the time of a block towards a stage."""
         begin = perf_counter()
         yield
-        self._add(stage, perf_counter() - begin)
+        self.add(stage, perf_counter() - begin)
 
     def compared(self, record: Mapping[str, Any], seconds: float) -> None:
         """Count a comparison that took so long, by what its record says of it.
@@ -41,9 +45,16 @@ class Run:
         )
         passes = time["heuristic"]["total_s"] + time["reference"]["total_s"]
         rendering = min(passes, seconds - preparing)
-        self._add("scenes and plans", preparing)
-        self._add("rendering", rendering)
-        self._add("metrics", seconds - preparing - rendering)
+        self.add("scenes and plans", preparing)
+        self.add("rendering", rendering)
+        self.add("metrics", seconds - preparing - rendering)
+
+    def did(self, done: Done) -> None:
+        """Count what a scene took."""
+        for stage, seconds in done.seconds.items():
+            self.add(stage, seconds)
+        if done.compared is not None:
+            self.compared(done.view["record"], done.compared)
 
     def begin_page(self) -> None:
         """Say that from now on the page is written, which ends the run."""
@@ -53,9 +64,9 @@ class Run:
         """The seconds of each stage; the page's, from its beginning to the first call of this."""
         if self._page is not None:
             now = perf_counter()
-            self._add("page", now - self._page)
+            self.add("page", now - self._page)
             self._page = None
-            self._add("other", max(0.0, now - START - sum(self._seconds.values())))
+            self.add("other", max(0.0, now - START - sum(self._seconds.values())))
         return dict(self._seconds)
 
     def data(self) -> dict[str, Any]:
@@ -63,9 +74,11 @@ class Run:
         return {
             "command": self.command,
             "stages": self.stages(),
+            "failures": self.failures,
             "machine": self.machine,
             "versions": self.versions,
         }
 
-    def _add(self, stage: str, seconds: float) -> None:
+    def add(self, stage: str, seconds: float) -> None:
+        """Count seconds towards a stage."""
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds

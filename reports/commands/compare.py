@@ -12,6 +12,7 @@ from reports.commands import completion
 )
 @jobs.output_option("out")
 @jobs.figures_option
+@jobs.fresh_option
 @jobs.rendering_options
 @terminal.quiet_option
 @terminal.verbose_option
@@ -26,13 +27,16 @@ from reports.commands import completion
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, figures, with_cost, **rendering):
+def compare(scenes, output, figures, fresh, with_cost, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
-    SCENE is a built-in name (`fotismos scenes`) or a Mitsuba file (.xml). Writes OUTPUT/index.html
-    and tables of all scenes, and for each scene comparison.json, comparison.exr and pictures. An
-    interrupted run keeps its
-    passes: the same command goes on where it stopped, to the same image.
+    SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
+    which `scene` is a dictionary or returns one, or a folder: all such files in it that others do
+    not include. Writes OUTPUT/index.html and tables of all scenes, and for each scene
+    comparison.json, comparison.exr and pictures. Of several scenes, one that fails keeps no other
+    from being compared. An
+    interrupted run keeps its finished scenes and its passes: the same command goes on where it
+    stopped, to the same image.
 
     \b
     Examples:
@@ -42,5 +46,7 @@ def compare(scenes, output, figures, with_cost, **rendering):
       fotismos compare fig-8-8a fig-8-9 --figures -q
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
       fotismos compare plastic-spheres --cost
+      fotismos compare my_scenes/
     """  # noqa: D301 click reads the \b as: keep these lines
-    batch.run(scenes, output, rendering, figures, with_cost)
+    wanted = batch.Wanted(rendering, figures, with_cost, fresh)
+    batch.finish(batch.start(), scenes, output, wanted)

@@ -11,10 +11,11 @@ VERIFIED_AT = (128, 128)
 @click.command()
 @jobs.output_option("out/report")
 @jobs.figures_option
+@jobs.fresh_option
 @jobs.rendering_options
 @terminal.quiet_option
 @terminal.verbose_option
-def report(output, figures, **rendering):
+def report(output, figures, fresh, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
 
     Writes what `compare --cost` does, and in the page the plans verified, the hard cases and the
@@ -40,9 +41,7 @@ def report(output, figures, **rendering):
         run,
         names,
         output,
-        rendering,
-        figures,
-        with_cost=True,
+        batch.Wanted(rendering, figures, with_cost=True, fresh=fresh),
         with_hard_cases=True,
         equations=equations.index(),
         verifications=verifications,

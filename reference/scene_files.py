@@ -1,0 +1,62 @@
+"""Scene files, looked at before Mitsuba's parser reads them: it recurses, and can be made to crash.
+
+No more is checked than what would end the process or never end; all else is Mitsuba's to refuse.
+"""
+
+import re
+from pathlib import Path
+
+from heuristic.errors import InputError
+
+DEEPEST = 100
+"""Elements within elements. Scenes need about ten; the parser's stack is full at some thousands."""
+
+TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'>])*?(/?)>""")
+INCLUDE = re.compile(r"""<include\b[^>]*?\bfilename\s*=\s*["']([^"']*)["']""")
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+
+
+def check(path):
+    """See that a scene file and those that it includes can be read to an end.
+
+    Raises
+    ------
+    InputError
+        When one is no file or cannot be read, has a NUL, includes itself, or is too deep.
+    """
+    _check(Path(path), ())
+
+
+def _check(path, outer):
+    if path.resolve() in outer:
+        raise InputError(f"{path}: it includes itself. Take the <include> out that leads back.")
+    if len(outer) >= DEEPEST:
+        raise InputError(f"{path}: more than {DEEPEST} files include each other.")
+    text = _text(path)
+    depth = 0
+    for end, empty in TAG.findall(text):
+        depth += -1 if end else 0 if empty else 1
+        if depth > DEEPEST:
+            raise InputError(
+                f"{path}: elements lie more than {DEEPEST} deep in each other. Write it flatter."
+            )
+    for name in INCLUDE.findall(text):
+        inner = path.parent / name
+        if inner.is_file():  # else Mitsuba looks elsewhere, or says what is missing
+            _check(inner, (*outer, path.resolve()))
+
+
+def _text(path):
+    """Return a file's text without its comments."""
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such file. Give a Mitsuba scene (.xml) or the name of"
+            " a built-in scene; `fotismos scenes` lists them."
+        )
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}. See that it can be read.") from error
+    if b"\0" in content:
+        raise InputError(f"{path}: it holds a NUL byte, which no XML file in UTF-8 has.")
+    return COMMENT.sub("", content.decode("utf-8", errors="replace"))

@@ -1,0 +1,317 @@
+"""Batches: scenes apart from each other, finished scenes, folders, and what is no scene."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from reports import cli
+from tests.test_cli import SCENE
+
+ROOT = Path(__file__).parents[1]
+
+ABORTS = """
+import os, signal
+
+def scene():
+    os.kill(os.getpid(), signal.SIGABRT)
+"""
+
+GOOD = """
+import mitsuba as mi
+
+def scene():
+    return mi.cornell_box()
+"""
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process; returns exit code, output and messages."""
+
+    def command(*words):
+        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as leaving:
+            code = leaving.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with two scenes."""
+    place = tmp_path / "scenes"
+    place.mkdir()
+    for name in ("a", "b"):
+        (place / f"{name}.xml").write_text(SCENE, encoding="utf-8")
+    return place
+
+
+def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypatch):
+    words = ("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)
+    assert run(*words)[0] == 0
+    page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    files = {p: p.read_bytes() for p in (tmp_path / "out/a").iterdir()}
+    rendered = []
+
+    def instead(source, *_):
+        rendered.append(source.name)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("comparisons.compare.compare", instead)
+    assert run(*words)[0] == 0
+    assert not rendered
+    assert {p: p.read_bytes() for p in (tmp_path / "out/a").iterdir()} == files
+    again = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") == again.count("data:image/png") > 4
+    for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",)):
+        assert run(*words, *other)[0] == 130
+    (folder / "a.xml").write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"))
+    assert run(*words)[0] == 130
+    assert rendered == ["a"] * 5
+
+
+def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
+    from comparisons.options import Options
+    from reference.scene import Source
+    from reports.passes import key_of
+
+    texture = (
+        '<texture type="bitmap" name="diffuse_reflectance">'
+        '<string name="filename" value="t.png"/></texture>'
+    )
+    colour = '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>'
+    (tmp_path / "s.xml").write_text(SCENE.replace(colour, texture), encoding="utf-8")
+    keys = set()
+    for content in (b"one", b"two"):
+        (tmp_path / "t.png").write_bytes(content)
+        keys.add(key_of(Source("s", tmp_path / "s.xml"), Options(), "llvm_ad_rgb", {}))
+    assert len(keys) == 2
+
+
+def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypatch):
+    from reports import finished, output
+
+    written = []
+    keep = output.write_scene
+
+    def spy(*words):
+        written.append((words[-1], keep(*words)))
+        return written[-1][1]
+
+    monkeypatch.setattr(output, "write_scene", spy)
+    run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)
+    (key, view), place = written[0], tmp_path / "out/a"
+    found = finished.load(place, key)
+    assert found == view | {"charts": [], "record": json.loads(json.dumps(view["record"]))}
+    assert finished.load(place, key + "x") is None
+    text = (place / "view.json").read_text(encoding="utf-8")
+    for broken in ("", "[]", "{}", text[:-20], text.replace('"planes"', '"plains"')):
+        (place / "view.json").write_text(broken, encoding="utf-8")
+        assert finished.load(place, key) is None
+
+
+def test_what_a_killed_run_left_is_cleared_away_and_restored(tmp_path):
+    from reports import output
+
+    (tmp_path / ".a.12.partial").mkdir()
+    (tmp_path / ".index.html.12.partial").touch()
+    for name in (".a.old", "b", ".b.old"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "comparison.json").write_text(name)
+    output.recover(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+    assert (tmp_path / "a/comparison.json").read_text() == ".a.old"
+    assert (tmp_path / "b/comparison.json").read_text() == "b"
+
+
+def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_path):
+    (folder / "aa.py").write_text(ABORTS)
+    (folder / "c.py").write_text(GOOD)
+    (folder / "notes.py").write_text("raise SystemExit('this is no scene')")
+    (folder / "part.xml").write_text('<scene version="3.0.0"/>')
+    (folder / "b.xml").write_text(
+        SCENE.replace("</scene>", '<include filename="part.xml"/></scene>')
+    )
+    out = tmp_path / "out"
+    words = ("compare", folder, "-o", out, "--spp", 2, "--resolution", "16x16")
+    code, _, messages = run(*words)
+    assert code == 1
+    assert "1 of 4 scenes failed" in messages
+    assert "SIGABRT" in messages
+    assert all((out / name / "comparison.json").is_file() for name in "abc")
+    assert not (out / "aa").exists()
+    failures = json.loads((out / "run.json").read_text(encoding="utf-8"))["failures"]
+    assert [failure["scene"] for failure in failures] == ["aa"]
+    assert "SIGABRT" in (out / "index.html").read_text(encoding="utf-8")
+    record = json.loads((out / "c/comparison.json").read_text(encoding="utf-8"))
+    assert str(folder / "c.py") in record["command"]
+    before = {path: path.stat().st_mtime_ns for path in out.glob("?/*")}
+    (folder / "aa.py").write_text(GOOD)
+    assert run(*words)[0] == 0
+    assert {path: path.stat().st_mtime_ns for path in out.glob("?/*")} == before
+    assert (out / "aa/comparison.json").is_file()
+
+
+def _nested(depth):
+    return SCENE.replace("</scene>", "<shape type='sphere'>" * depth + "</scene>")
+
+
+ENTITIES = (
+    f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True)
+)
+BOMB = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{"".join(ENTITIES)}]>'
+
+HOSTILE = {
+    "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "&j;|j"),
+    "nesting": (_nested(100_000), "deep in each other"),
+    "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "includes itself"),
+    "NUL": (SCENE[:200] + "\0" + SCENE[200:], "NUL"),
+    "film": (
+        SCENE.replace('value="24"', 'value="1000000"').replace('value="16"', 'value="1000000"'),
+        "1000000x1000000 pixels is too large",
+    ),
+    "number": (SCENE.replace('value="24"', f'value="{"9" * 400}"'), "9999"),
+    "texture": (
+        SCENE.replace(
+            '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>',
+            '<texture type="bitmap" name="diffuse_reflectance">'
+            '<string name="filename" value="x.xml"/></texture>',
+        ),
+        "x.xml|[Bb]itmap|format",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_scene_is_refused_in_one_message(name, run, tmp_path):
+    content, expected = HOSTILE[name]
+    path = tmp_path / "x.xml"
+    path.write_text(content, encoding="utf-8")
+    code, printed, messages = run("compare", path, "-o", tmp_path / "out", "--spp", 2)
+    assert (code, printed) == (2, "")
+    assert messages.startswith("fotismos: error: ")
+    assert re.search(expected, messages)
+    assert "Traceback" not in messages
+    assert sorted(place.name for place in tmp_path.iterdir()) == ["out", "x.xml"]
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_pipe_and_an_empty_folder_are_no_scenes(run, tmp_path):
+    os.mkfifo(tmp_path / "pipe.xml")
+    for path in (tmp_path / "pipe.xml", tmp_path):
+        code, _, messages = run("compare", path, "-o", tmp_path / "out")
+        assert code == 2
+        assert "there is no" in messages
+
+
+def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
+    path = tmp_path / "..<img src=x onerror=alert(1)>.xml"
+    path.write_text(SCENE, encoding="utf-8")
+    out = tmp_path / "out"
+    assert run("compare", path, "-o", out, "--spp", 2)[0] == 0
+    assert "<img src=x" not in (out / "index.html").read_text(encoding="utf-8")
+    assert sorted(place.name for place in tmp_path.iterdir()) == [path.name, "out"]
+
+
+def _start(folder, out):
+    words = [sys.executable, "-m", "reports", "compare", folder, "-o", out]
+    words += ["--spp", "8", "--resolution", "16x16"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def _results(out):
+    """Return all that a batch wrote of its scenes but times and what is derived from them."""
+    found = {}
+    for path in sorted(out.glob("?/*")):
+        if path.suffix == ".json":
+            record = json.loads(path.read_text(encoding="utf-8"))
+            record = record.get("record", record)
+            found[path.relative_to(out)] = {
+                key: value for key, value in record.items() if key != "time"
+            }
+        else:
+            found[path.relative_to(out)] = path.read_bytes()
+    return found
+
+
+def _kill_at_random_moments(folder, tmp_path, kills):
+    """Kill a batch so many times, each time somewhere within what a whole one takes."""
+    begin = time.perf_counter()
+    whole = _start(folder, tmp_path / "whole")
+    messages = whole.communicate(timeout=300)[1]
+    seconds = time.perf_counter() - begin
+    assert (whole.returncode, messages) == (0, "")
+    out, random, kept = tmp_path / "killed", Random(kills), {}
+    for number in range(kills):
+        if len(kept) == len(list(folder.iterdir())):
+            shutil.rmtree(out)
+            kept = {}
+        batch = _start(folder, out)
+        try:
+            batch.communicate(timeout=seconds * (0.2 + random.random()))
+        except subprocess.TimeoutExpired:
+            batch.kill()
+            batch.communicate()
+        finished = {path: path.read_bytes() for path in out.glob("?/view.json")}
+        for path, content in finished.items():
+            json.loads(content)
+            assert (path.parent / "comparison.exr").is_file()
+        assert kept.items() <= finished.items(), f"a result was lost by kill {number}"
+        kept = finished
+    last = _start(folder, out)
+    assert last.communicate(timeout=300)[1] == ""
+    assert last.returncode == 0
+    assert all(path.read_bytes() == content for path, content in kept.items())
+    assert _results(out) == _results(tmp_path / "whole")
+    wanted, found = (sorted(p.name for p in (tmp_path / n).iterdir()) for n in ("whole", "killed"))
+    assert found == wanted
+
+
+@pytest.fixture
+def box_filtered(folder):
+    """The folder with scenes of which every rendering is the same bit for bit."""
+    for path in folder.iterdir():
+        scene = SCENE.replace("</film>", '<rfilter type="box"/></film>')
+        path.write_text(scene, encoding="utf-8")
+    return folder
+
+
+def test_killed_batches_go_on_to_the_results_of_a_whole_one(box_filtered, tmp_path):
+    _kill_at_random_moments(box_filtered, tmp_path, 3)
+
+
+@pytest.mark.slow
+def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
+    _kill_at_random_moments(box_filtered, tmp_path, 50)
+
+
+def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):
+    (folder / "c.py").write_text("import time\n\ndef scene():\n    time.sleep(1000)\n")
+    out = tmp_path / "out"
+    batch = _start(folder, out)
+    while not (out / "b/view.json").exists():
+        assert batch.poll() is None
+        time.sleep(0.05)
+    batch.send_signal(signal.SIGINT)
+    _, messages = batch.communicate(timeout=60)
+    assert batch.returncode == 130
+    assert "same command" in messages
+    assert "Traceback" not in messages
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "b/comparison.json" in page
