@@ -59,7 +59,7 @@ def prepare(graph, resolution, sensor=0):
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")
     overridden = []
-    kept = _keep_sensor(graph, sensor)
+    kept = keep_sensor(graph, sensor)
     _prepare_film(graph, kept, resolution, overridden)
     _note_sampler(graph, kept, overridden)
     return _take_integrator(graph, overridden)
@@ -79,8 +79,14 @@ def _open_merged(graph):
             graph.remove(index)
 
 
-def _keep_sensor(graph, number):
-    """Keep one sensor of the scene, and return its index."""
+def keep_sensor(graph, number):
+    """Keep one sensor of the scene, and return its index.
+
+    Raises
+    ------
+    InputError
+        When there is none of this number.
+    """
     places = []
     for key, value in graph.props(0).items():
         if isinstance(value, Reference):

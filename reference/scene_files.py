@@ -11,9 +11,9 @@ from heuristic.errors import InputError
 DEEPEST = 100
 """Elements within elements. Scenes need about ten; the parser's stack is full at some thousands."""
 
-TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'>])*?(/?)>""")
-INCLUDE = re.compile(r"""<include\b[^>]*?\bfilename\s*=\s*["']([^"']*)["']""")
-COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'<>])*?(/?)>""")
+INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
+COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 
 
 def check(path):
@@ -50,8 +50,7 @@ def _text(path):
     """Return a file's text without its comments."""
     if not path.is_file():
         raise InputError(
-            f"{path}: there is no such file. Give a Mitsuba scene (.xml) or the name of"
-            " a built-in scene; `fotismos scenes` lists them."
+            f"{path}: there is no such file, or it is no regular one. Give a Mitsuba scene (.xml)."
         )
     try:
         content = path.read_bytes()

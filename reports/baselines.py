@@ -45,7 +45,7 @@ class BaselineFile:
 
 @lru_cache(maxsize=1)
 def _at_rest():
-    command = click.command()(jobs.rendering_options(lambda **_: None))
+    command = click.command()(jobs.rendering_options(jobs.scene_options(lambda **_: None)))
     return command.make_context("check", []).params
 
 
@@ -57,6 +57,7 @@ def default_rendering():
 def recorded(chosen):
     """Return the options of a job as a baseline keeps them: plain, without those at rest."""
     plain = {k: list(v) if isinstance(v, tuple) else v for k, v in chosen.items()}
+    plain["define"] = jobs.defined(chosen) or None
     return {k: v for k, v in plain.items() if v is not None and v is not False}
 
 

@@ -137,7 +137,7 @@ def create(path, scene, job, images=False, progress=None):
     source, chosen = job
     set_variant(chosen["variant"])
     if chosen["resolution"] is None:
-        chosen = chosen | {"resolution": checking.small_resolution(source)}
+        chosen = chosen | {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
     measured = checking.measure_scene(source, jobs.options(chosen), progress=progress)
     options = baselines.recorded(chosen | {"spp": measured.spp})
     status = "updated" if path.exists() else "created"

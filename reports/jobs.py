@@ -163,6 +163,11 @@ def _file(name):
     return path
 
 
+def defined(rendering):
+    """Return the values for the placeholders of a scene file, by name, as text."""
+    return {name: str(value) for name, value in dict(rendering.get("define") or ()).items()}
+
+
 def job(name, rendering):
     """Find a scene, and complete the options with what it asks for."""
     from comparisons.scenes import Scene, builtin
@@ -172,7 +177,7 @@ def job(name, rendering):
     path = _file(name)
     if path is not None:
         content = Script(path) if path.suffix == ".py" else path
-        source = Source(path.stem, content, dict(rendering.get("define") or ()))
+        source = Source(path.stem, content, defined(rendering))
         spectral = rendering["variant"] is None and wants_spectra(source.parse())
         scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
     else:

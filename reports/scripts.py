@@ -1,6 +1,7 @@
 """Scenes written in Python, and folders of scenes."""
 
 import ast
+import os
 import re
 import runpy
 import sys
@@ -71,7 +72,7 @@ def scenes_in(folder):
     found = [
         path
         for path in files
-        if (path in written and path.resolve() not in parts and ROOT.search(_text(path)))
+        if (path in written and path.resolve() not in parts and _may_be_scene(path))
         or (path.suffix == ".py" and _defines_scene(path))
     ]
     if not found:
@@ -82,11 +83,16 @@ def scenes_in(folder):
     return found
 
 
+def _may_be_scene(path):
+    """Tell whether a file has a scene; one that cannot be read fails as a scene, by itself."""
+    return not os.access(path, os.R_OK) or ROOT.search(_text(path))
+
+
 def _text(path):
     try:
         return path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}. See that it can be read.") from error
+    except OSError:
+        return ""
 
 
 def _defines_scene(path):

@@ -47,13 +47,11 @@ def page(study, file, findings):
 
 
 def write(study, outcome, folder, page=None):
-    """Write dataset, figures, and the page of findings if there is one; yields lines to print."""
+    """Write dataset, figures, and the page of findings if there is one; yields where they are."""
     place = folder / f"{study.name}.parquet"
     dataset.write(place, outcome.table)
     figures = folder / "figures"
     write_figures(study, outcome.table, figures)
-    yield from summary(study, outcome)
-    yield ""
     yield str(place)
     yield str(figures)
     if page is not None:

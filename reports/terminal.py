@@ -35,16 +35,21 @@ def level():
     return context.meta.get(LEVEL, 0) if context else 0
 
 
+def is_quiet():
+    """Tell whether the command was asked to be quiet."""
+    return level() < 0
+
+
 def tell(lines):
     """Print lines of a result, unless the command is quiet."""
-    if level() >= 0:
+    if not is_quiet():
         for line in lines:
             click.echo(line)
 
 
 def tell_where(path):
     """Print where the results are; of a quiet command it is all that is printed."""
-    click.echo(path if level() < 0 else f"\n{path}")
+    click.echo(path if is_quiet() else f"\n{path}")
 
 
 def remark(lines):

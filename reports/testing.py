@@ -117,7 +117,7 @@ class Fotismos:
         source, chosen = self._job(self._found(scene), options, "scene")
         set_variant(chosen["variant"])
         if chosen["resolution"] is None:
-            chosen |= {"resolution": checking.small_resolution(source)}
+            chosen |= {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
         found = checking.measure_scene(source, jobs.options(chosen)).measurement
         if metric not in found.metrics:
             raise InputError(f"metric {metric!r}: choose one of {', '.join(found.metrics)}.")

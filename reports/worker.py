@@ -98,12 +98,11 @@ def _work(pipe):
     def progress(*told):
         pipe.send(("progress", told))
 
-    while True:
-        try:
-            asked = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(_answer(asked, progress))
+    try:
+        while True:
+            pipe.send(_answer(pipe.recv(), progress))
+    except (EOFError, ConnectionError):
+        os._exit(0)  # nobody is listening any more
 
 
 def _answer(asked, progress):
@@ -111,8 +110,8 @@ def _answer(asked, progress):
         return "done", single.compare(*asked, progress)
     except FotismosError as error:
         return "failed", error
-    except BrokenPipeError:
-        os._exit(1)  # nobody is listening any more
+    except ConnectionError:
+        raise
     except Exception as error:  # whatever a scene brings about is its own failure
         traceback.print_exc()
         return "failed", LostProcessError(f"{asked[2]}: {type(error).__name__}: {error}")

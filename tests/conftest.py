@@ -1,6 +1,7 @@
 """What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
 
 import gc
+import sys
 from importlib.metadata import entry_points
 
 import heuristic  # noqa: F401  isort: skip
@@ -11,6 +12,7 @@ import pytest
 
 from heuristic import plugins
 from reference import direct
+from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:
@@ -33,6 +35,32 @@ def rgb():
 def spectral():
     """The variant llvm_ad_spectral, with the project's plugins."""
     yield from in_variant("llvm_ad_spectral")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process; returns exit code, output and messages."""
+
+    from reports.cli import main
+
+    def command(*words):
+        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
+        code = 0
+        try:
+            main()
+        except SystemExit as leaving:
+            code = leaving.code
+        return code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    """The small scene, in a file whose name has a space."""
+    path = tmp_path / "my scene.xml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
 
 
 @pytest.fixture

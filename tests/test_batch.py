@@ -13,8 +13,7 @@ from random import Random
 
 import pytest
 
-from reports import cli
-from tests.test_cli import SCENE
+from tests.small_scene import SCENE
 
 ROOT = Path(__file__).parents[1]
 
@@ -25,28 +24,21 @@ def scene():
     os.kill(os.getpid(), signal.SIGABRT)
 """
 
+NEVER_ENDS = """
+import time
+from pathlib import Path
+
+def scene():
+    Path(__file__).with_suffix(".started").touch()
+    time.sleep(1000)
+"""
+
 GOOD = """
 import mitsuba as mi
 
 def scene():
     return mi.cornell_box()
 """
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process; returns exit code, output and messages."""
-
-    def command(*words):
-        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as leaving:
-            code = leaving.code
-        return code, *capsys.readouterr()
-
-    return command
 
 
 @pytest.fixture
@@ -302,10 +294,10 @@ def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
 
 
 def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):
-    (folder / "c.py").write_text("import time\n\ndef scene():\n    time.sleep(1000)\n")
+    (folder / "c.py").write_text(NEVER_ENDS)
     out = tmp_path / "out"
     batch = _start(folder, out)
-    while not (out / "b/view.json").exists():
+    while not (folder / "c.started").exists():
         assert batch.poll() is None
         time.sleep(0.05)
     batch.send_signal(signal.SIGINT)

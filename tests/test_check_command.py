@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from reports import annotations, cli, junit
-from tests.test_cli import ROOT, run, scene_file  # noqa: F401 fixtures
+from tests.test_cli import ROOT
 
 SCHEMA = json.loads((ROOT / "reports/baseline.schema.json").read_text(encoding="utf-8"))
 FAST = ("--spp", 32, "--resolution", "16x12")
@@ -55,7 +55,7 @@ def change(path, half="reference", factor=1.5):
 # --- Checking --------------------------------------------------------------------------------
 
 
-def test_what_did_not_move_passes(run, folder, tmp_path):  # noqa: F811
+def test_what_did_not_move_passes(run, folder, tmp_path):
     out = tmp_path / "out"
     for words in ((), ("--seed", 7)):
         code, printed, messages = run("check", folder, "-o", out, *words)
@@ -64,7 +64,7 @@ def test_what_did_not_move_passes(run, folder, tmp_path):  # noqa: F811
     assert list(out.iterdir()) == []
 
 
-def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):  # noqa: F811
+def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):
     change(folder / "fig-8-6b.json")
     out = tmp_path / "out"
     code, printed, messages = run("check", folder, "-o", out)
@@ -88,7 +88,7 @@ def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):  # n
     assert list(out.iterdir()) == []
 
 
-def test_json_says_what_moved(run, folder, tmp_path):  # noqa: F811
+def test_json_says_what_moved(run, folder, tmp_path):
     change(folder / "fig-8-6b.json")
     code, printed, _ = run("check", folder, "--json", "-o", tmp_path / "out")
     data = json.loads(printed)
@@ -103,7 +103,7 @@ def test_json_says_what_moved(run, folder, tmp_path):  # noqa: F811
     assert failed["tested"] == 5 + 2 * 3 * (1 + 4 * 4)  # metrics; halves, channels, blocks
 
 
-def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):  # noqa: F811
+def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):
     (folder / "broken.json").write_text("{", encoding="utf-8")
     code, printed, messages = run("check", folder, "-o", tmp_path / "out")
     assert code == 2
@@ -127,7 +127,7 @@ def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):  # no
         (("nix.json", "--significance", "0"), "range"),
     ],
 )
-def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):  # noqa: F811
+def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     code, _, messages = run("check", *words)
@@ -136,7 +136,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):  # 
     assert "Traceback" not in messages
 
 
-def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):  # noqa: F811
+def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):
     own = tmp_path / "out/fig-8-6b/mine.txt"
     own.parent.mkdir(parents=True)
     own.write_text("mine")
@@ -151,14 +151,14 @@ def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):  # no
 # --- Updating --------------------------------------------------------------------------------
 
 
-def test_a_baseline_is_made_by_its_name_alone(run, tmp_path):  # noqa: F811
+def test_a_baseline_is_made_by_its_name_alone(run, tmp_path):
     code, printed, messages = run("check", tmp_path / "new/fig-8-5a.json", "--update", *FAST)
     assert (code, messages) == (0, "")
     assert "1 of 1 baselines written" in printed
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["fig-8-5a.json"]
 
 
-def test_an_update_rewrites_what_moved_and_nothing_else(run, folder):  # noqa: F811
+def test_an_update_rewrites_what_moved_and_nothing_else(run, folder):
     whole = {path.name: path.read_bytes() for path in folder.iterdir()}
     change(folder / "fig-8-6b.json")
     code, printed, _ = run("check", folder, "--update", "--json")
@@ -168,7 +168,7 @@ def test_an_update_rewrites_what_moved_and_nothing_else(run, folder):  # noqa: F
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == whole
 
 
-def test_an_update_prints_what_changed(run, folder):  # noqa: F811
+def test_an_update_prints_what_changed(run, folder):
     change(folder / "fig-8-6b.json")
     _, printed, _ = run("check", folder / "fig-8-6b.json", "--update")
     assert "fig-8-6b: updated" in printed
@@ -176,7 +176,7 @@ def test_an_update_prints_what_changed(run, folder):  # noqa: F811
     assert "1 of 1 baselines written" in printed
 
 
-def test_other_options_write_a_baseline_anew(run, folder):  # noqa: F811
+def test_other_options_write_a_baseline_anew(run, folder):
     path = folder / "fig-8-6b.json"
     code, _, _ = run("check", path, "--update", "--pairing", "literal", "--seed", 4)
     options = json.loads(path.read_text(encoding="utf-8"))["options"]
@@ -185,7 +185,7 @@ def test_other_options_write_a_baseline_anew(run, folder):  # noqa: F811
     assert (options["spp"], options["resolution"]) == (32, [16, 12])
 
 
-def test_a_broken_baseline_is_written_anew_once_its_scene_is_named(run, folder):  # noqa: F811
+def test_a_broken_baseline_is_written_anew_once_its_scene_is_named(run, folder):
     path = folder / "fig-8-6a.json"
     path.write_text("{", encoding="utf-8")
     code, _, messages = run("check", path, "--update")
@@ -200,7 +200,7 @@ def test_a_baseline_follows_its_schema(folder):
         jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), SCHEMA)
 
 
-def test_a_scene_in_a_file_is_found_from_anywhere(run, scene_file, tmp_path, monkeypatch):  # noqa: F811
+def test_a_scene_in_a_file_is_found_from_anywhere(run, scene_file, tmp_path, monkeypatch):
     path = tmp_path / "some/where/baseline.json"
     code, _, messages = run("check", path, "--update", "--scene", scene_file, "--spp", 32)
     assert (code, messages) == (0, "")
@@ -231,7 +231,7 @@ def failure(name="a%b,c:d", message=""):
     )  # fmt: skip
 
 
-def test_junit_holds_failures_and_errors(run, folder, tmp_path):  # noqa: F811
+def test_junit_holds_failures_and_errors(run, folder, tmp_path):
     change(folder / "fig-8-6b.json")
     (folder / "broken.json").write_text("{", encoding="utf-8")
     file = tmp_path / "new/junit.xml"
@@ -304,7 +304,7 @@ def test_without_a_service_nothing_is_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_detected_service_is_told(run, folder, tmp_path, monkeypatch):  # noqa: F811
+def test_a_detected_service_is_told(run, folder, tmp_path, monkeypatch):
     change(folder / "fig-8-6b.json")
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)

@@ -2,7 +2,6 @@
 
 import json
 import shlex
-import sys
 from io import BytesIO
 from pathlib import Path
 
@@ -15,22 +14,6 @@ from reports import cli
 
 SCHEMA = json.loads((Path(cli.__file__).parent / "fit.schema.json").read_text(encoding="utf-8"))
 SMALL = ("--resolution", "16x12", "--spp", 4)
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process; returns exit code, output and messages."""
-
-    def command(*words):
-        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as leaving:
-            code = leaving.code
-        return code, *capsys.readouterr()
-
-    return command
 
 
 def test_fit_writes_a_record_that_its_schema_accepts_and_a_picture(run, tmp_path):

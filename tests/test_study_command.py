@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from comparisons.study import dataset
-from reports import cli
 
 ROOT = Path(__file__).parent.parent
 STUDY = """title = "A small study"
@@ -25,22 +24,6 @@ alpha = [0.2, 0.4]
 light_angle = [0, 60]
 """
 TEMPLATE = '{{ study.title }}: {{ "%.3f" | format(value("lobe", "albedo_reference")) }}\n'
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process; returns exit code, output and messages."""
-
-    def command(*words):
-        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as leaving:
-            code = leaving.code
-        return code, *capsys.readouterr()
-
-    return command
 
 
 @pytest.fixture

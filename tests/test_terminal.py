@@ -15,22 +15,6 @@ ROOT = Path(__file__).parent.parent
 COMMANDS = sorted(cli.cli.commands)
 
 
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line in this process; returns exit code, output and messages."""
-
-    def command(*words):
-        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as leaving:
-            code = leaving.code
-        return code, *capsys.readouterr()
-
-    return command
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_shows_examples_that_are_commands(name, run):
     code, printed, _ = run(name, "--help")

@@ -12,6 +12,7 @@ from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import prepare
 from heuristic.errors import InputError
+from reference.preparation import keep_sensor
 from reference.scene import properties
 
 LONGEST = 64
@@ -137,11 +138,11 @@ def new_baseline(scene, options, measured, images=None):
     return Baseline(scene, options, record.versions(), measured, images)
 
 
-def small_resolution(source):
-    """Return the film's ``(width, height)`` reduced to `LONGEST`, its proportions kept."""
+def small_resolution(source, sensor=0):
+    """Return ``(width, height)`` of a sensor's film reduced to `LONGEST`, in its proportions."""
     graph = source.parse()
-    films = graph.nodes(mi.ObjectType.Film)
-    props = graph.props(films[0]) if films else properties("hdrfilm")
+    films = graph.children(keep_sensor(graph, sensor), mi.ObjectType.Film)
+    props = graph.props(films[0][1]) if films else properties("hdrfilm")
     sides = [int(props.get(key, default)) for key, default in (("width", 768), ("height", 576))]
     scale = min(1.0, LONGEST / max(sides))
     return tuple(max(1, round(side * scale)) for side in sides)

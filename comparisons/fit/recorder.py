@@ -8,6 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.fit.samples import VECTORS, Samples, Surface, gathered
+from heuristic.errors import InputError
 from heuristic.materials import Material
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.shading import shade
@@ -24,6 +25,11 @@ class Recorder:
     ----------
     renderer : reference.rendering.Renderer
         Of the heuristic half, with Phong shading and a box filter.
+
+    Raises
+    ------
+    InputError
+        When something can be seen through.
     """
 
     def __init__(self, renderer):
@@ -32,11 +38,12 @@ class Recorder:
             shading = renderer.integrator
             self._eye = _eye(shading)
             self._materials = SceneMaterials(renderer.scene, prune=False)
+            self._names = _names(renderer.scene, self._materials.bsdfs)
+            _require_opaque(self._names, self._materials.bsdfs)
             point = dr.zeros(mi.SurfaceInteraction3f)
             self._lights = shading.lights(renderer.scene, point, True)
             self._ambient = shading.ambient_at(point, True)
         self._renderer = Renderer(renderer.scene, self._eye, renderer.spp, "heuristic samples")
-        self._names = _names(renderer.scene, self._materials.bsdfs)
         self._fixed = Accumulator()
         self._parts = [[] for _ in self._names]
         self._samples_a_pixel = 0
@@ -85,6 +92,16 @@ class Recorder:
             self._ambient,
             fixed,
             self._samples_a_pixel,
+        )
+
+
+def _require_opaque(names, bsdfs):
+    """Refuse what one sees through: a sample is of one surface."""
+    clear = [name for name, bsdf in zip(names, bsdfs, strict=True) if bsdf.is_clear]
+    if clear:
+        raise InputError(
+            f"{', '.join(clear)}: a fit needs materials that nothing is seen through; glass, masks"
+            " and `null` let light pass. Replace them by opaque ones."
         )
 
 

@@ -7,7 +7,7 @@ import click
 from click.core import ParameterSource
 
 from heuristic.errors import InputError
-from reports import jobs
+from reports import jobs, terminal
 
 
 @click.command()
@@ -42,6 +42,8 @@ from reports import jobs
 )
 @jobs.output_option("out/check")
 @jobs.rendering_options
+@jobs.scene_options
+@terminal.quiet_option
 @click.pass_context
 def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
           **rendering):  # fmt: skip
@@ -77,11 +79,12 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
         _write(junit, junit_xml.document(results))
     if as_json:
         data = check_record.summary(results, significance)
-        lines = [json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)]
-    else:
-        lines = checking.lines(results, significance)
-    for line in lines:
-        click.echo(line)
+        click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+    elif not terminal.is_quiet():
+        for line in checking.lines(results, significance):
+            click.echo(line)
+    elif any(result.exit_code for result in results):
+        click.echo(checking.verdict(results, significance))
     for line in notes:
         click.echo(line, err=as_json)
     context.exit(max(result.exit_code for result in results))

@@ -13,6 +13,7 @@ from reports.commands import completion
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.rendering_options
+@jobs.scene_options
 @terminal.quiet_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of tables.")

@@ -43,6 +43,7 @@ from reports.commands import completion
     help="Write the departures of all scenes as a table in Markdown, too.",
 )
 @jobs.rendering_options
+@jobs.scene_options
 @terminal.quiet_option
 def fit(scenes, output, form, as_json, markdown, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from reports import jobs
+from reports import jobs, terminal
 
 
 @click.command()
@@ -40,6 +40,7 @@ from reports import jobs
     help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
     " dataset beside FILE.",
 )
+@terminal.quiet_option
 def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
@@ -73,5 +74,7 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
         spreading = nullcontext(pool.over(processes or pool.cores()))
     with spreading as spread, progress.shown("points") as bar:
         outcome = run.run(wanted, folder, spread, bar.of(wanted.name))
-    for line in studying.write(wanted, outcome, folder, page):
-        click.echo(line)
+    places = list(studying.write(wanted, outcome, folder, page))
+    terminal.tell([*studying.summary(wanted, outcome), ""])
+    for place in places:
+        click.echo(place)

@@ -1,0 +1,78 @@
+"""What a command takes from a scene file: values for its placeholders, and one of its sensors."""
+
+import json
+
+import pytest
+
+from tests.small_scene import SCENE
+
+GREY = SCENE.replace('value="0.2, 0.3, 0.5"', 'value="$grey"')
+SECOND = SCENE[SCENE.index("<sensor") : SCENE.index("</sensor>") + len("</sensor>")]
+SMALL = ("--resolution", "16x16", "--spp", 4)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A file with a placeholder, and a second sensor whose film is 40 by 20 pixels."""
+    assert "$grey" in GREY
+    second = SECOND.replace('value="24"', 'value="40"').replace('value="16"', 'value="20"')
+    path = tmp_path / "grey.xml"
+    path.write_text(GREY.replace("</scene>", f"{second}</scene>"), encoding="utf-8")
+    return path
+
+
+def test_a_placeholder_without_a_value_is_refused_by_name(run, scene, tmp_path):
+    code, _, messages = run("compare", scene, "-o", tmp_path / "out", *SMALL)
+    assert code == 2
+    assert "grey" in messages.replace("grey.xml", "")
+
+
+def test_a_defined_value_is_used_and_recorded(run, scene, tmp_path):
+    albedos = {}
+    for value in ("0.2", "0.6"):
+        words = ("-D", f"grey={value}", "-o", tmp_path / value, *SMALL)
+        assert run("compare", scene, *words)[0] == 0
+        text = (tmp_path / value / "grey/comparison.json").read_text(encoding="utf-8")
+        record = json.loads(text)
+        assert f"-D grey={value}" in record["command"]
+        albedos[value] = record["metrics"]["dE2000"]["mean"]
+    assert albedos["0.2"] != albedos["0.6"]
+
+
+def test_a_second_sensor_brings_its_own_film(run, scene, tmp_path):
+    words = ("-D", "grey=0.5", "--sensor", 1, "--spp", 4, "-o", tmp_path)
+    assert run("compare", scene, *words)[0] == 0
+    record = json.loads((tmp_path / "grey/comparison.json").read_text(encoding="utf-8"))
+    assert record["resolution"] == [40, 20]
+
+
+@pytest.mark.parametrize("command", ["plan", "cost", "fit"])
+def test_other_commands_take_them_as_well(command, run, scene, tmp_path):
+    words = {"plan": (), "cost": ("--rounds", 2, "-o", tmp_path), "fit": ("-o", tmp_path)}[command]
+    code, printed, messages = run(
+        command, scene, "-D", "grey=0.5", "--sensor", 1, "--json", *words, *SMALL
+    )
+    assert (code, messages) == (0, "")
+    record = json.loads(printed)
+    record = record[0] if isinstance(record, list) else record
+    if command != "plan":
+        assert "-D grey=0.5" in record["command"]
+        assert "--sensor 1" in record["command"]
+
+
+def test_a_baseline_keeps_them(run, scene, tmp_path):
+    baseline = tmp_path / "grey.json"
+    words = ("--update", "--scene", scene, "-D", "grey=0.5", "--sensor", 1, "--spp", 64)
+    assert run("check", baseline, *words)[0] == 0
+    options = json.loads(baseline.read_text(encoding="utf-8"))["options"]
+    assert (options["define"], options["sensor"]) == ({"grey": "0.5"}, 1)
+    assert options["resolution"] == [40, 20]
+    assert run("check", baseline, "-q", "-o", tmp_path) == (0, "", "")
+    before = baseline.read_bytes()
+    assert run("check", baseline, *words)[0] == 0
+    assert baseline.read_bytes() == before
+    changed = baseline.read_text(encoding="utf-8").replace('"0.5"', '"0.6"')
+    baseline.write_text(changed, encoding="utf-8")
+    code, printed, _ = run("check", baseline, "-q", "-o", tmp_path)
+    assert code == 1
+    assert "1 of 1" in printed
