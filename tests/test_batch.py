@@ -170,6 +170,8 @@ HOSTILE = {
     "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "&j;|j"),
     "nesting": (_nested(100_000), "deep in each other"),
     "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "includes itself"),
+    "unclosed comments": ("<!--" * 300_000, "x.xml"),  # these two take hours if read badly
+    "unclosed elements": ("<a" * 300_000, "x.xml"),
     "NUL": (SCENE[:200] + "\0" + SCENE[200:], "NUL"),
     "film": (
         SCENE.replace('value="24"', 'value="1000000"').replace('value="16"', 'value="1000000"'),
