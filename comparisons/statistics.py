@@ -91,7 +91,7 @@ def summarise(
     reference: ArrayLike,
     mask: ArrayLike,
     viewing: Viewing = DEFAULT_VIEWING,
-    noise: ArrayLike | float = 0.0,
+    noise: ArrayLike | None = None,
 ) -> tuple[MetricSummary, Array]:
     """The numbers of `metric` over `mask`, and its map over the whole image.
 
@@ -100,29 +100,35 @@ def summarise(
     mask
         Boolean (H, W): the pixels that count. With none, every number is 0 and the factor 1.
     noise
-        A noise image (H, W, 3) as for `noise_floor`, or the floor itself, a number ≥ 0.
+        A noise image (H, W, 3) as for `noise_floor`; without it the floor is 0.
 
     The best exposure is used only if it lowers the mean over all counted pixels, so
     ``after_exposure.mean <= mean`` always. Raises as `comparisons.metrics.delta_e_2000`.
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    distance = _distance(metric, test, reference, viewing)
-    numbers = _numbers(distance[mask])
-
     factor = best_exposure(metric, test, reference, mask, viewing)
-    after = numbers
+    has_noise = noise is not None and np.any(noise)
+    distance, exposed, noisy = np.empty(test.shape[:-1]), [], []
+    for rows in _blocks(test):
+        fixed = metric.coordinates(reference[rows], viewing)
+        distance[rows] = metric.difference(fixed, metric.coordinates(test[rows], viewing))
+        here = mask[rows]
+        fixed = fixed[here]
+        if factor != 1.0:
+            shown = metric.coordinates(factor * test[rows][here], viewing)
+            exposed.append(metric.difference(fixed, shown))
+        if has_noise:
+            shown = metric.coordinates((reference[rows] + noise[rows])[here], viewing)
+            noisy.append(metric.difference(fixed, shown))
+    numbers = after = _numbers(distance[mask])
     if factor != 1.0:
-        exposed = _distance(metric, test, reference, viewing, factor)
-        after = _numbers(exposed[mask])
+        after = _numbers(np.concatenate(exposed))
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
-
-    floor = float(noise) if np.ndim(noise) == 0 else 0.0
-    if np.ndim(noise):
-        floor = _noise_floor(metric, reference, np.asarray(noise), mask, viewing)
-    exposed = ExposedSummary(exposure=factor, **after)
-    return MetricSummary(**numbers, noise_floor=floor, after_exposure=exposed), distance
+    floor = _numbers(np.concatenate(noisy))["mean"] if has_noise else 0.0
+    at_best = ExposedSummary(exposure=factor, **after)
+    return MetricSummary(**numbers, noise_floor=floor, after_exposure=at_best), distance
 
 
 def summarise_rmse(
@@ -169,7 +175,15 @@ def noise_floor(
     taken with alternating signs. A result near this value cannot be told from none.
     """
     reference, noise = checked_pair(reference, noise)
-    return _noise_floor(metric, reference, noise, np.asarray(mask, bool), viewing)
+    mask = np.asarray(mask, bool)
+    if not mask.any() or not noise.any():
+        return 0.0
+    values = []
+    for rows in _blocks(reference):
+        here = reference[rows][mask[rows]]
+        noisy = metric.coordinates(here + noise[rows][mask[rows]], viewing)
+        values.append(metric.difference(metric.coordinates(here, viewing), noisy))
+    return float(np.concatenate(values).mean())
 
 
 def _numbers(values: Array) -> dict[str, float]:
@@ -184,37 +198,7 @@ def _numbers(values: Array) -> dict[str, float]:
     }
 
 
-def _distance(
-    metric: Metric, test: Array, reference: Array, viewing: Viewing, factor: float = 1.0
-) -> Array:
-    """The map of `metric` after `factor` on the test image; a block of rows at a time."""
-    distance = np.empty(test.shape[:-1])
-    for rows in _blocks(test):
-        distance[rows] = metric.difference(
-            metric.coordinates(reference[rows], viewing),
-            metric.coordinates(factor * test[rows], viewing),
-        )
-    return distance
-
-
 def _blocks(image: Array) -> Iterator[slice]:
     """Slices of rows that hold about `_BLOCK_PIXELS` pixels."""
     step = max(1, _BLOCK_PIXELS * len(image) // max(image.size // 3, 1))
     return (slice(start, start + step) for start in range(0, len(image), step))
-
-
-def _noise_floor(
-    metric: Metric, reference: Array, noise: Array, mask: Array, viewing: Viewing
-) -> float:
-    if not mask.any() or not noise.any():
-        return 0.0
-    values = np.empty(np.count_nonzero(mask))
-    place = 0
-    for rows in _blocks(reference):
-        here = reference[rows][mask[rows]]
-        noisy = here + noise[rows][mask[rows]]
-        values[place : place + len(here)] = metric.difference(
-            metric.coordinates(here, viewing), metric.coordinates(noisy, viewing)
-        )
-        place += len(here)
-    return float(values.mean())

@@ -307,14 +307,15 @@ def test_summary_is_of_the_mask(metric, images):
     test, reference = images
     mask = np.zeros(test.shape[:2], bool)
     mask[10:30, 5:40] = True
-    summary, distance = summarise(metric, test, reference, mask, noise=0.25)
+    summary, distance = summarise(metric, test, reference, mask, noise=test - reference)
     values = metric(test, reference)
     np.testing.assert_array_equal(distance, values)
     assert summary.mean == pytest.approx(values[mask].mean())
     assert summary.p50 == pytest.approx(np.median(values[mask]))
     assert summary.p95 == pytest.approx(np.percentile(values[mask], 95))
     assert summary.max == pytest.approx(values[mask].max())
-    assert summary.noise_floor == 0.25
+    floor = noise_floor(metric, reference, test - reference, mask)
+    assert summary.noise_floor == pytest.approx(floor)
     assert summary.after_exposure.mean <= summary.mean
     empty = summarise(metric, test, reference, np.zeros_like(mask), noise=test - reference)[0]
     assert (empty.mean, empty.max, empty.noise_floor) == (0.0, 0.0, 0.0)

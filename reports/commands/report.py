@@ -4,7 +4,7 @@ import click
 
 from reports import batch, jobs, terminal
 
-VERIFIED_AT = (128, 128)
+VERIFIED_AT = (96, 96)
 """Resolution at which a report verifies its plans."""
 
 
