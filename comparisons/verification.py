@@ -28,6 +28,8 @@ class Verification:
     ----------
     scene, planned, everything
         Name, and a word on each reference.
+    resolution
+        Width and height in pixels.
     significant
         Pixels that differ by more than the noise of both sides and float32 rounding.
     pixels
@@ -53,6 +55,7 @@ class Verification:
     scene: str
     planned: str
     everything: str
+    resolution: tuple[int, int]
     significant: int
     pixels: int
     largest: float
@@ -70,7 +73,7 @@ class Verification:
         return asdict(self)
 
 
-def verify(source, options=None, progress=None):
+def verify(source, options=None, progress=None, level=LEVEL):
     """Render a scene as planned and with everything, and compare.
 
     Parameters
@@ -78,6 +81,8 @@ def verify(source, options=None, progress=None):
     source, options, progress
         As of :func:`comparisons.compare.compare`. Samples are those of the everything-on side where
         they are given; the plan's own otherwise.
+    level
+        Chance that any pixel is marked though nothing differs.
 
     Returns
     -------
@@ -97,7 +102,7 @@ def verify(source, options=None, progress=None):
             shift = 0 if side is sides[0] else 1_000_000
             total.add(side.reference.render(options.seed + shift + number))
     estimates = [total.estimate() for total in sums]
-    return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed))
+    return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed), level)
 
 
 def _kernel_difference(sides, seed):
@@ -110,7 +115,7 @@ def _kernel_difference(sides, seed):
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(name, sides, estimates, kernel_difference):
+def _summarise(name, sides, estimates, kernel_difference, level):
     scene = sides[0].scene
     width, height = (int(side) for side in scene.sensors()[0].film().crop_size())
     counted = gbuffer(scene, width, height).hit
@@ -121,7 +126,7 @@ def _summarise(name, sides, estimates, kernel_difference):
         error,
         estimates[0].passes,
         max(int(counted.sum()), 1),
-        LEVEL,
+        level,
         magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
     )
     times = [side.reference.pass_times().median for side in sides]
@@ -137,6 +142,7 @@ def _summarise(name, sides, estimates, kernel_difference):
         scene=name,
         planned=_word(sides[0].plan),
         everything=_word(sides[1].plan),
+        resolution=(width, height),
         significant=int((marked & counted).sum()),
         pixels=int(counted.sum()),
         largest=float(np.abs(difference).max()),

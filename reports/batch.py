@@ -52,9 +52,9 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
             shown["hard_cases"] = hard_cases.view(record.collect())
     _write(run, folder, views, failures, wanted.figures, shown)
     if failures:
-        place, error = max(failures.items(), key=lambda failure: failure[1].exit_code)
+        error = max(failures.values(), key=lambda error: error.exit_code)
         count = f"{len(failures)} of {len(places)} scenes failed, "
-        raise type(error)(f"{count}among them {place}: {error}") from error
+        raise type(error)(f"{count}among them: {error}") from error
 
 
 def _places(names):

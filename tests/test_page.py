@@ -251,12 +251,13 @@ def test_verifications_are_printed(record, pictures):
     numbers = {
         "significant": 3, "pixels": 1436, "gain": 91.5, "planned_s": 0.0032, "planned_noise": 0.5,
         "everything_s": 0.25, "everything_noise": 0.125, "planning_s": 0.002,
-        "heuristic_largest": 0.0,
+        "heuristic_largest": 0.0, "resolution": (96, 80),
     }  # fmt: skip
     verification = {"scene": HOSTILE, "planned": "direct_all", **numbers}
     view = {"record": record, "images": pictures}
     html = page.render([view], verifications=[verification])
     assert "3 of 1436" in html
     assert "91.5 ×" in html
+    assert "96 × 80 pixels" in html
     assert HOSTILE not in html
     assert "Pruning" not in page.render([view])

@@ -50,14 +50,17 @@ def report(output, figures, fresh, **rendering):
 
 def _verify(names, rendering):
     """Hold the plan of each scene against everything simulated, at a small size."""
+    from comparisons.check.moved import level_of_each
+    from comparisons.compare import LEVEL
     from comparisons.verification import verify
     from reference.scene import set_variant
     from reports import progress
 
+    level = level_of_each(LEVEL, len(names))
     with progress.shown() as bar:
         results = []
         for source, chosen in (jobs.job(name, rendering) for name in names):
             set_variant(chosen["variant"])
             options = jobs.options(chosen | {"resolution": VERIFIED_AT, "spp": None})
-            results.append(verify(source, options, bar.of(source.name)).data())
+            results.append(verify(source, options, bar.of(source.name), level).data())
     return results
