@@ -45,8 +45,8 @@ TEMPLATES = Path(__file__).parent / "templates"
 #: The parts of the page's style and of its script, in their order.
 STYLES = ("base", "overview", "scene", "viewer", "print")
 SCRIPTS = (
-    "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "viewport", "drawing",
-    "inspector", "pointer", "viewer", "keyboard", "overview", "charts", "main",
+    "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address", "viewport",
+    "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.

@@ -1,6 +1,7 @@
 // The page: which scene is seen, and how, is what the address's fragment says.
 
 const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
+const address = makeAddress();
 const overview = makeOverview(byId("overview-section"), page.scenes, change);
 const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);
 /** @type {View} */
@@ -9,17 +10,24 @@ let view = DEFAULT_VIEW;
 /** See something else, and say so in the address. @param {Partial<View>} changes */
 function change(changes) {
   view = { ...view, ...changes };
-  history.replaceState(null, "", fragmentOf(view));
+  address.replace(fragmentOf(view));
   show();
 }
 
 /** See what the address says. */
 function follow() {
   const before = view.scene;
-  view = parseFragment(location.hash);
+  view = parseFragment(address.read());
   if (!page.scenes.some((/** @type {any} */ scene) => scene.id === view.scene)) view.scene = "";
   show();
   if (view.scene !== before) arrive(view.scene || before);
+}
+
+/** A page of one scene begins with it. */
+function begin() {
+  const [only, ...others] = page.scenes;
+  if (!address.read() && only?.images && !others.length) address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
+  follow();
 }
 
 function show() {
@@ -62,9 +70,9 @@ function turn(step) {
   const place = seen.findIndex((/** @type {any} */ scene) => scene.id === view.scene);
   const { mode, map, tone } = view;
   const next = seen[(place + step + seen.length) % seen.length];
-  location.hash = fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, scene: next.id });
+  address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, scene: next.id }));
 }
 
-listenToKeys(viewer, turn, () => (location.hash = "#"));
-window.addEventListener("hashchange", follow);
-follow();
+listenToKeys(viewer, turn, () => address.go("#"));
+address.listen(follow);
+begin();

@@ -22,7 +22,7 @@ function makeOverview(element, scenes, change) {
     showSettings(element, view);
     const seen = entries.filter((entry) => isWanted(entry, view)).length;
     const count = /** @type {HTMLElement} */ (element.querySelector(".count"));
-    count.textContent = seen === entries.length ? `${seen} scenes` : `${seen} of ${entries.length} scenes`;
+    count.textContent = seen === entries.length ? counted(seen) : `${seen} of ${counted(entries.length)}`;
   }
 
   element.addEventListener("input", (event) => {
@@ -37,6 +37,11 @@ function makeOverview(element, scenes, change) {
   });
   element.querySelector("form")?.addEventListener("submit", (event) => event.preventDefault());
   return { show };
+}
+
+/** @param {number} scenes */
+function counted(scenes) {
+  return scenes === 1 ? "1 scene" : `${scenes} scenes`;
 }
 
 /**

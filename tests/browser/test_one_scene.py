@@ -1,0 +1,58 @@
+"""A page of one scene, from disk and in a notebook's frame."""
+
+import pytest
+
+from reports import output, page
+from reports.notebook import Shown
+from tests.browser.conftest import EXACT, exact
+
+SEEN = "document.documentElement.dataset.view"
+
+
+@pytest.fixture
+def alone(tmp_path):
+    """The page's text."""
+    return page.render([output.write_scene(tmp_path, EXACT, exact()) | {"files": {}}])
+
+
+@pytest.fixture
+def tab(chromium):
+    """A tab, and what is said in it."""
+    tab = chromium.new_page()
+    said = []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    yield tab
+    tab.close()
+    assert not said
+
+
+def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tmp_path):
+    place = tmp_path / "index.html"
+    place.write_text(alone, encoding="utf-8")
+    tab.goto(place.as_uri())
+    assert tab.evaluate(SEEN) == "scene"
+    tab.get_by_role("link", name="all scenes").click()
+    tab.wait_for_function(f"() => {SEEN} === 'overview'")
+    assert tab.locator(".count").text_content() == "1 scene"
+    tab.get_by_role("link", name=EXACT).first.click()
+    tab.wait_for_function(f"() => {SEEN} === 'scene'")
+
+
+def test_in_a_frame_all_works_and_the_address_of_the_notebook_stays(tab, alone, tmp_path):
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(Shown(None, alone)._repr_html_(), encoding="utf-8")
+    tab.goto(notebook.as_uri())
+    frame = tab.frames[1]
+    frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
+    assert frame.evaluate(SEEN) == "scene"
+    button = frame.get_by_role("button", name="Flicker")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "true"
+    frame.locator(".scene.open .regions a").first.click()
+    assert frame.get_by_role("button", name="Error").get_attribute("aria-pressed") == "true"
+    frame.get_by_role("link", name="all scenes").click()
+    assert frame.evaluate(SEEN) == "overview"
+    frame.get_by_role("link", name=EXACT).first.click()
+    assert frame.evaluate(SEEN) == "scene"
+    assert tab.url == notebook.as_uri()
