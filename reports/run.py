@@ -2,12 +2,30 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-from reports.single import Done
-
 START = perf_counter()
+
+
+@dataclass
+class Done:
+    """What the page needs of a scene, and where the time went.
+
+    ``compared`` is None where the scene was found finished.
+    """
+
+    view: Mapping[str, Any] = field(default_factory=dict)
+    compared: float | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def timing(self, stage: str) -> Iterator[None]:
+        """Keep the time of a block."""
+        begin = perf_counter()
+        yield
+        self.seconds[stage] = perf_counter() - begin
 
 
 class Run:

@@ -1,13 +1,13 @@
 """One scene of a command: compared, its files written, or found finished."""
 
 from collections.abc import Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from reports import jobs
+from reports.run import Done
 
 
 @dataclass(frozen=True)
@@ -22,25 +22,6 @@ class Wanted:
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
-
-
-@dataclass
-class Done:
-    """What the page needs of a scene, and where the time went.
-
-    ``compared`` is None where the scene was found finished.
-    """
-
-    view: Mapping[str, Any] = field(default_factory=dict)
-    compared: float | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def timing(self, stage):
-        """Keep the time of a block."""
-        begin = perf_counter()
-        yield
-        self.seconds[stage] = perf_counter() - begin
 
 
 def load():

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from random import Random
 
+import jsonschema
 import pytest
 
 from tests.small_scene import SCENE
@@ -145,7 +146,10 @@ def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_pa
     assert "SIGABRT" in messages
     assert all((out / name / "comparison.json").is_file() for name in "abc")
     assert not (out / "aa").exists()
-    failures = json.loads((out / "run.json").read_text(encoding="utf-8"))["failures"]
+    record = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    schema = (ROOT / "reports/run.schema.json").read_text(encoding="utf-8")
+    jsonschema.validate(record, json.loads(schema))
+    failures = record["failures"]
     assert [failure["scene"] for failure in failures] == ["aa"]
     assert "SIGABRT" in (out / "index.html").read_text(encoding="utf-8")
     record = json.loads((out / "c/comparison.json").read_text(encoding="utf-8"))

@@ -52,9 +52,14 @@ def elsewhere(monkeypatch, tmp_path):
 
 def chi2(values, wi, context=None):
     sample, pdf = mi.chi2.BSDFAdapter("phong", phong(**values), wi=wi, ctx=context)
+
+    def reflected(numbers):
+        wo, weight = sample(numbers)
+        return wo, dr.select(dr.norm(wo + mi.Vector3f(wi)) > 0, weight, 0)  # what passes has no pdf
+
     return mi.chi2.ChiSquareTest(
         domain=mi.chi2.SphericalDomain(),
-        sample_func=sample,
+        sample_func=reflected,
         pdf_func=pdf,
         sample_dim=3,
         sample_count=200_000,

@@ -13,8 +13,8 @@ Parameter           Type (default)    Meaning
 ``normalised``      boolean (false)   scale the lobe so that ``k_s`` is its albedo at normal
                                       incidence
 ``twosided``        boolean (false)   shade the side that faces the viewer, whichever it is
-``transmittance``   spectrum or       share of the light that passes straight through; read by the
-                    texture (0)       integrator ``heuristic`` alone
+``transmittance``   spectrum or       share of the light that passes straight through, beside what
+                    texture (0)       the other coefficients reflect: a null component
 ``tilt``            texture (none)    unit normal in the shading frame, such as ``heuristic_tilt``;
                                       read by the integrator ``heuristic`` alone
 ==================  ================  =============================================================
@@ -28,7 +28,9 @@ The reflected radiance for irradiance ``E`` at normal incidence is that of 8.10 
 has no cosine of its own; as the chapters have it, it neither conserves energy nor is reciprocal.
 """
 
+from functools import reduce
 from numbers import Real
+from operator import or_
 
 import drjit as dr
 import mitsuba as mi
@@ -63,12 +65,6 @@ def define():
             check_form(self.form)
             self.normalised = props.get("normalised", False)
             self.twosided = props.get("twosided", False)
-            sides = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.BackSide if self.twosided else 0)
-            self.m_components = [
-                mi.BSDFFlags.GlossyReflection | sides,
-                mi.BSDFFlags.DiffuseReflection | sides,
-            ]
-            self.m_flags = self.m_components[0] | self.m_components[1]
             self.parameters_changed()
 
         def material(self, si, active=True, prune=True):
@@ -109,11 +105,37 @@ def define():
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
+            reflected = 1 - self._through_probability(ctx, si, above)
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
             specular = self._lobe_pdf(wi, wo, self.exponent(si, above))
-            return dr.select(above, dr.lerp(diffuse, specular, probability), 0)
+            return dr.select(above, reflected * dr.lerp(diffuse, specular, probability), 0)
 
         def sample(self, ctx, si, sample1, sample2, active=True):
+            if not self.is_clear:
+                return self._reflected(ctx, si, sample1, sample2, active)
+            probability = self._through_probability(ctx, si, active)
+            passes = active & (sample1 < probability)
+            # What is left of the number is uniform again, and chooses between the other two.
+            sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
+            reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
+            straight = dr.zeros(mi.BSDFSample3f)
+            straight.wo, straight.eta, straight.pdf = -si.wi, 1.0, probability
+            straight.sampled_component = mi.UInt32(2)
+            straight.sampled_type = mi.UInt32(+mi.BSDFFlags.Null)
+            passed = self.transmittance.eval(si, passes) / probability
+            return dr.select(passes, straight, reflected), dr.select(passes, passed, weight)
+
+        def eval_null_transmission(self, si, active=True):
+            return self.transmittance.eval(si, active)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def eval_diffuse_reflectance(self, si, active=True):
+            return self.k_d.eval(si, active)
+
+        def _reflected(self, ctx, si, sample1, sample2, active):
+            """Draw ``wo`` among what the diffuse part and the lobe reflect."""
             (wi,) = self._facing(si.wi)
             active = active & (wi.z > 0)
             probability = self._specular_probability(ctx, si, active)
@@ -138,12 +160,6 @@ def define():
             active &= bs.pdf > 0
             return bs, dr.select(active, value / bs.pdf, 0)
 
-        def eval_pdf(self, ctx, si, wo, active=True):
-            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-        def eval_diffuse_reflectance(self, si, active=True):
-            return self.k_d.eval(si, active)
-
         def traverse(self, callback):
             for name in (*COEFFICIENTS, "n", "transmittance"):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
@@ -158,10 +174,23 @@ def define():
                 name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
             }
             self.is_clear = may_be_nonzero(self.transmittance)
+            self._set_components()
             self.n_is_moderate = False
             if not isinstance(self.n, mi.Texture):
                 dr.make_opaque(self.n)
                 self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
+
+        def _set_components(self):
+            """Tell Mitsuba of the lobe, the diffuse part and what passes, in this order."""
+            front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
+            sides = front | (back if self.twosided else 0)
+            self.m_components = [
+                mi.BSDFFlags.GlossyReflection | sides,
+                mi.BSDFFlags.DiffuseReflection | sides,
+            ]
+            if self.is_clear:
+                self.m_components.append(mi.BSDFFlags.Null | front | back)
+            self.m_flags = reduce(or_, self.m_components)
 
         def to_string(self):
             parts = ", ".join(
@@ -184,12 +213,24 @@ def define():
                 return mi.Float(1)
             if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
                 return mi.Float(0)
-            diffuse = dr.mean(self.k_d.eval(si, active))
-            n = self.exponent(si, active)
-            albedo = self._scale(n) / terms.normalisation(self.form, n)
-            specular = dr.mean(self.k_s.eval(si, active)) * albedo
+            diffuse, specular = self._albedos(si, active)
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
+
+        def _through_probability(self, ctx, si, active):
+            """Share of samples that go straight on: the transmittance's part of all that leaves."""
+            if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
+                return mi.Float(0)
+            clear = dr.mean(self.transmittance.eval(si, active))
+            total = clear + sum(self._albedos(si, active))
+            return dr.select(total > 0, clear / total, 0)
+
+        def _albedos(self, si, active):
+            """Return what the two parts reflect at normal incidence, the mean over channels."""
+            n = self.exponent(si, active)
+            albedo = self._scale(n) / terms.normalisation(self.form, n)
+            k_d, k_s = (dr.mean(k.eval(si, active)) for k in (self.k_d, self.k_s))
+            return k_d, k_s * albedo
 
         def _scale(self, n):
             return terms.normalisation(self.form, n) if self.normalised else 1
