@@ -6,7 +6,7 @@ async function enliven(section) {
   if (!embed) return;
   for (const chart of section.querySelectorAll(".chart:not(.live)")) {
     chart.classList.add("live");
-    const spec = JSON.parse(chart.nextElementSibling?.textContent ?? "{}");
+    const spec = JSON.parse(chart.closest("figure")?.querySelector("script")?.textContent ?? "{}");
     // Expressions are interpreted: the page's policy forbids code made of text.
     await embed(chart, spec, { ast: true, renderer: "svg", actions: false, mode: "vega-lite" });
     chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart's label says it
