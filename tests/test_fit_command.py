@@ -76,3 +76,10 @@ def test_bad_words_are_refused(words, expected, run, tmp_path):
     code, _, messages = run("fit", *words, "-o", tmp_path, *SMALL)
     assert code == 2
     assert expected in messages
+
+
+def test_what_can_be_seen_through_is_refused_by_name(run, tmp_path):
+    scene = Path(__file__).parent / "corpus/bsdf-mask.xml"
+    code, _, messages = run("fit", scene, "-o", tmp_path, *SMALL)
+    assert code == 2
+    assert "nothing is seen through" in messages
