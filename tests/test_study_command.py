@@ -8,11 +8,12 @@ import socket
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from comparisons.study import dataset
+from comparisons.study import cluster, dataset
 
 ROOT = Path(__file__).parent.parent
 STUDY = """title = "A small study"
@@ -80,7 +81,9 @@ def test_without_the_extra_it_says_how_to_install_it(run, file, tmp_path, monkey
     monkeypatch.setattr(builtins, "__import__", without)
     code, _, messages = run("study", file, "-o", tmp_path / "out", "--workers", 2)
     assert code == 2
-    assert "pip install 'fotismos[cluster]'" in messages
+    assert messages.endswith("-m pip install dask distributed\n")
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert list(cluster.NEEDED) == extras["optional-dependencies"]["cluster"]
 
 
 def start(*words):

@@ -6,6 +6,8 @@ run goes on where it ended.
 """
 
 import logging
+import shlex
+import sys
 from contextlib import contextmanager
 from itertools import count, islice
 from threading import Lock
@@ -14,7 +16,9 @@ from comparisons.study import point
 from comparisons.study.processes import cores
 from heuristic.errors import InstallationError, LostProcessError
 
-EXTRA = "cluster"
+NEEDED = ("dask", "distributed")
+"""The extra `cluster` of pyproject.toml."""
+
 ALLOWED_FAILURES = 30
 """Workers that may die with a point before the point itself is blamed, in a cluster of ours."""
 
@@ -155,6 +159,7 @@ def _distributed():
         import distributed
     except ImportError as error:
         raise InstallationError(
-            f"a cluster needs Dask, which is not installed. Do: pip install 'fotismos[{EXTRA}]'"
+            "a cluster needs Dask, which is not installed. Do:"
+            f" {shlex.join([sys.executable, '-m', 'pip', 'install', *NEEDED])}"
         ) from error
     return distributed
