@@ -59,10 +59,12 @@ def number(graph, index, key, default):
     Raises
     ------
     InputError
-        When it is not one.
+        When it is not one; with Mitsuba's own message, where Mitsuba refuses it too.
     """
     props = graph.props(index)
     value = props.get(key, default)
+    if not isinstance(value, Real):
+        graph.instantiate(index)
     if not isinstance(value, Real) or not np.isfinite(value):
         raise InputError(
             f"{graph.name}: {graph.label(index)}: {key} = {value!r} is not allowed: give a finite"
