@@ -82,9 +82,13 @@ def variant_of(path):
         return mi.variant()
 
 
+def render(scene):
+    return scene.integrator().render(scene, spp=1)  # mi.render hides what went wrong
+
+
 def mitsuba_renders(path):
     try:
-        image = mi.render(mi.load_file(str(path)), spp=1)
+        image = render(mi.load_file(str(path)))
     except RuntimeError:
         return False
     return bool(np.isfinite(np.array(image)).all())
@@ -93,8 +97,7 @@ def mitsuba_renders(path):
 def reason_of_mitsuba(path):
     """Return why Mitsuba does not render a scene, without the places in its own sources."""
     with pytest.raises(RuntimeError) as refusal:
-        scene = mi.load_file(str(path))
-        scene.integrator().render(scene, spp=1)
+        render(mi.load_file(str(path)))
     return unnumbered(refusal).rpartition("] ")[2].strip().splitlines()[0]
 
 
