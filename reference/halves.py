@@ -103,7 +103,7 @@ def pair(
     register()
     graph = source.parse()
     settings = preparation.prepare(graph, resolution, sensor)
-    geometry = cache(graph.copy().instantiate)
+    geometry = cache(_bare(graph).instantiate)
 
     heuristic = graph.copy()
     given_physical = bsdfs.to_heuristic(heuristic, convention)
@@ -139,6 +139,16 @@ def pair(
         media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
         overridden=tuple(settings.overridden),
     )
+
+
+def _bare(graph):
+    """Return a copy of a graph without materials, which can take long to make."""
+    copy = graph.copy()
+    for shape in copy.nodes(mi.ObjectType.Shape):
+        for kind in (mi.ObjectType.BSDF, mi.ObjectType.Medium):
+            for key, _ in copy.children(shape, kind):
+                copy.detach(shape, key)
+    return copy
 
 
 def with_sampler(graph, plugin):

@@ -19,7 +19,6 @@ def measure(heuristic, reference, counted, noise=None):
     NonFiniteError
         For a NaN or an infinity.
     """
-    noise = 0.0 if noise is None else noise
     summary, _ = statistics.summarise(METRICS["dE2000"], heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
     test, truth = heuristic[counted], reference[counted]
