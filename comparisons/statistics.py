@@ -109,17 +109,20 @@ def summarise(
     mask = np.asarray(mask, bool)
     factor = best_exposure(metric, test, reference, mask, viewing)
     has_noise = noise is not None and np.any(noise)
-    distance, exposed, noisy = np.empty(test.shape[:-1]), [], []
+    distance, exposed, noisy = np.zeros(test.shape[:-1]), [], []
     for rows in _blocks(test):
-        fixed = metric.coordinates(reference[rows], viewing)
-        distance[rows] = metric.difference(fixed, metric.coordinates(test[rows], viewing))
-        here = mask[rows]
-        fixed = fixed[here]
+        here, truth = mask[rows], reference[rows]
+        # Equal colours are 0 apart: what lies around the objects of a figure costs nothing.
+        wanted = here | (test[rows] != truth).any(axis=-1)
+        fixed = metric.coordinates(truth[wanted], viewing)
+        shown = metric.coordinates(test[rows][wanted], viewing)
+        distance[rows][wanted] = metric.difference(fixed, shown)
+        fixed = fixed[here[wanted]]
         if factor != 1.0:
             shown = metric.coordinates(factor * test[rows][here], viewing)
             exposed.append(metric.difference(fixed, shown))
         if has_noise:
-            shown = metric.coordinates((reference[rows] + noise[rows])[here], viewing)
+            shown = metric.coordinates((truth + noise[rows])[here], viewing)
             noisy.append(metric.difference(fixed, shown))
     numbers = after = _numbers(distance[mask])
     if factor != 1.0:
