@@ -16,7 +16,7 @@ from comparisons.record import Comparison, Images
 from comparisons.significance import significance
 from heuristic.errors import InputError
 from reference import halves
-from reference.gbuffer import gbuffer
+from reference.gbuffer import gbuffer, image_size
 from reference.halves import Pair
 from reference.plan import Plan, plan, sampler
 from reference.rendering import Renderer, physical_integrator, variant
@@ -57,7 +57,7 @@ def prepare(source, options=None):
     options = options or Options()
     pair = _pair(source, options)
     physical = halves.with_sampler(pair.physical, sampler(options.everything)).instantiate()
-    width, height = (int(side) for side in physical.sensors()[0].film().crop_size())
+    width, height = image_size(physical)
     if width * height > LARGEST:
         raise InputError(
             f"{source.name}: an image of {width}x{height} pixels is too large: {LARGEST} pixels are"
@@ -115,7 +115,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     heuristic, reference = ready.heuristic, ready.reference
     stages.done("scene and pairing", ready.planning_seconds)
     stages.seconds["planning"] = ready.planning_seconds
-    width, height = (int(side) for side in ready.scene.sensors()[0].film().crop_size())
+    width, height = image_size(ready.scene)
     surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
     estimates = passes.render(ready, options, surface.hit, progress or _silent, kept)

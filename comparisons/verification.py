@@ -12,7 +12,7 @@ import numpy as np
 from comparisons.compare import LEVEL, Options, prepare
 from comparisons.significance import significance
 from reference import halves
-from reference.gbuffer import gbuffer
+from reference.gbuffer import gbuffer, image_size
 from reference.rendering import Accumulator, Renderer
 
 PASSES_WITH_PATHS = 4
@@ -117,7 +117,7 @@ def _kernel_difference(sides, seed):
 
 def _summarise(name, sides, estimates, kernel_difference, level):
     scene = sides[0].scene
-    width, height = (int(side) for side in scene.sensors()[0].film().crop_size())
+    width, height = image_size(scene)
     counted = gbuffer(scene, width, height).hit
     difference = estimates[0].mean - estimates[1].mean
     error = np.hypot(estimates[0].standard_error, estimates[1].standard_error)

@@ -40,6 +40,11 @@ class GBuffer:
         return float(np.mean(lit)) if len(distance) else 0.0
 
 
+def image_size(scene):
+    """Return width and height of the images of a scene's first sensor: those of its film's crop."""
+    return tuple(int(side) for side in scene.sensors()[0].film().crop_size())
+
+
 def gbuffer(scene, width=GRID, height=GRID, sensor=0):
     """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)

@@ -13,6 +13,7 @@ from PIL import Image
 from reports import cli
 
 SCHEMA = json.loads((Path(cli.__file__).parent / "fit.schema.json").read_text(encoding="utf-8"))
+CORPUS = Path(__file__).parent / "corpus"
 SMALL = ("--resolution", "16x12", "--spp", 4)
 
 
@@ -78,8 +79,31 @@ def test_bad_words_are_refused(words, expected, run, tmp_path):
     assert expected in messages
 
 
-def test_what_can_be_seen_through_is_refused_by_name(run, tmp_path):
-    scene = Path(__file__).parent / "corpus/bsdf-mask.xml"
-    code, _, messages = run("fit", scene, "-o", tmp_path, *SMALL)
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("bsdf-mask", "nothing is seen through"), ("bsdf-principled", "n varies over the surface")],
+)
+def test_what_a_fit_has_no_parameters_for_is_refused_by_name(name, expected, run, tmp_path):
+    code, _, messages = run("fit", CORPUS / f"{name}.xml", "-o", tmp_path, *SMALL)
     assert code == 2
-    assert "nothing is seen through" in messages
+    assert "material of shape-" in messages
+    assert expected in messages
+
+
+@pytest.mark.parametrize("name", ["film-crop", "sensor-several"])
+def test_a_fit_is_of_the_film_as_it_is(name, run, tmp_path):
+    words = ("--form", "phong", "--spp", 8, "--resolution", "48x36")
+    code, _, messages = run("fit", CORPUS / f"{name}.xml", "-o", tmp_path, *words)
+    assert (code, messages) == (0, "")
+
+
+def test_materials_of_an_instanced_group_have_names(run, tmp_path):
+    text = (CORPUS / "shape-instance.xml").read_text(encoding="utf-8")
+    mask = '<bsdf type="mask"><float name="opacity" value="0.6"/><bsdf type="diffuse"/></bsdf>'
+    assert mask in text
+    scene = tmp_path / "group.xml"
+    scene.write_text(text.replace(mask, '<bsdf type="diffuse"/>'), encoding="utf-8")
+    assert run("fit", scene, "-o", tmp_path, "--form", "phong", *SMALL)[0] == 0
+    record = json.loads((tmp_path / "group/fit.json").read_text(encoding="utf-8"))
+    names = [material["name"] for material in record["fits"][0]["materials"]]
+    assert "material 3" in names

@@ -15,7 +15,7 @@ from comparisons.cost.methods import Methods
 from comparisons.cost.prices import prices
 from comparisons.cost.split import split
 from comparisons.options import Options
-from reference.gbuffer import gbuffer
+from reference.gbuffer import gbuffer, image_size
 from reference.rendering import Accumulator, Renderer
 
 
@@ -82,7 +82,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
     ready = prepare(source, replace(options, spp=None))
-    width, height = (int(side) for side in ready.scene.sensors()[0].film().crop_size())
+    width, height = image_size(ready.scene)
     counted = gbuffer(ready.scene, width, height).hit
     reference = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)

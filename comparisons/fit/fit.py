@@ -84,7 +84,8 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     ------
     InputError
         When the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
-        Phong interpolation, something can be seen through, or the camera sees no surface.
+        Phong interpolation, something can be seen through or has a texture for ``n``, or the camera
+        sees no surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """

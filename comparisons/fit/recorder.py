@@ -29,7 +29,7 @@ class Recorder:
     Raises
     ------
     InputError
-        When something can be seen through.
+        When something can be seen through, or ``n`` is a texture.
     """
 
     def __init__(self, renderer):
@@ -39,7 +39,7 @@ class Recorder:
             self._eye = _eye(shading)
             self._materials = SceneMaterials(renderer.scene, prune=False)
             self._names = _names(renderer.scene, self._materials.bsdfs)
-            _require_opaque(self._names, self._materials.bsdfs)
+            _require_fittable(self._names, self._materials.bsdfs)
             point = dr.zeros(mi.SurfaceInteraction3f)
             self._lights = shading.lights(renderer.scene, point, True)
             self._ambient = shading.ambient_at(point, True)
@@ -95,13 +95,19 @@ class Recorder:
         )
 
 
-def _require_opaque(names, bsdfs):
-    """Refuse what one sees through: a sample is of one surface."""
+def _require_fittable(names, bsdfs):
+    """Refuse what one sees through, a sample is of one surface; and what has many exponents."""
     clear = [name for name, bsdf in zip(names, bsdfs, strict=True) if bsdf.is_clear]
     if clear:
         raise InputError(
             f"{', '.join(clear)}: a fit needs materials that nothing is seen through; glass, masks"
             " and `null` let light pass. Replace them by opaque ones."
+        )
+    varying = [n for n, bsdf in zip(names, bsdfs, strict=True) if isinstance(bsdf.n, mi.Texture)]
+    if varying:
+        raise InputError(
+            f"{', '.join(varying)}: n varies over the surface, and a fit has one n for a material."
+            " Give its roughness as a number."
         )
 
 
@@ -197,8 +203,14 @@ def _joined(parts):
 
 
 def _names(scene, bsdfs):
-    """Return a name for each material: its id, or that of the first shape that has it."""
+    """Return a name for each material: its id, that of the first shape that has it, or a number.
+
+    Shapes of a group that is instanced are not among the scene's.
+    """
     shapes = {}
     for shape in scene.shapes():
         shapes.setdefault(shape.bsdf(), shape.id())
-    return [bsdf.id() or f"material of {shapes[bsdf]}" for bsdf in bsdfs]
+    return [
+        bsdf.id() or (f"material of {shapes[bsdf]}" if bsdf in shapes else f"material {number}")
+        for number, bsdf in enumerate(bsdfs, start=1)
+    ]

@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
-from reference.gbuffer import gbuffer
+from reference.gbuffer import gbuffer, image_size
 from reference.rendering import Accumulator, variant
 from reference.scene import Source, properties
 
@@ -71,6 +71,6 @@ def render(ready, options, progress):
         recorder.render(seed)
     progress("rendering", ready.passes, ready.passes)
     before, reference, difference = (total.estimate() for total in sums)
-    seen = gbuffer(ready.scene, *options.resolution)
+    seen = gbuffer(ready.scene, *image_size(ready.scene))
     with variant(VARIANT):
         return Rendered(before.mean, reference, difference, recorder.surface(), seen.hit)

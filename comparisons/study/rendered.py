@@ -13,7 +13,7 @@ from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
 from reference import halves
-from reference.gbuffer import gbuffer
+from reference.gbuffer import gbuffer, image_size
 from reference.plan import plan, sampler
 from reference.rendering import Accumulator, Renderer, physical_integrator
 from reference.scene import Source
@@ -61,7 +61,7 @@ def row(part, point):
         integrator = physical_integrator(stage, physical, pair.hide_emitters)
         renderers.append(Renderer(physical, integrator, spp, "reference image"))
     images, noise = _render(renderers, part.seed)
-    counted = gbuffer(physical, *part.resolution).hit
+    counted = gbuffer(physical, *image_size(physical)).hit
     result = measure(images[0], images[-1], counted, noise)
     result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
     result["miss"] = largest_miss(pair.misses)
