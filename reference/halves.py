@@ -15,6 +15,7 @@ from heuristic import meshes
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
+from heuristic.plugins.interpolated import viewpoint
 from reference import bsdfs, emitters, meshing, preparation, to_heuristic, to_physical, values
 from reference.gbuffer import gbuffer
 from reference.pairing import Convention, Miss, specular_albedo
@@ -110,6 +111,8 @@ def pair(
     lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(heuristic, ambient, settings, interpolation, prune)
+    if interpolation is not Interpolation.PHONG:
+        viewpoint(geometry().sensors()[0])  # refuses what has none before anything renders
     if interpolation is not Interpolation.PHONG or tessellation is not None:
         meshing.replace_shapes(
             heuristic, geometry(), tessellation or meshes.RESOLUTION, interpolation

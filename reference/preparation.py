@@ -79,6 +79,23 @@ def _open_merged(graph):
             graph.remove(index)
 
 
+def film_size(graph, sensor=0):
+    """Return the width and height that the film of a sensor is given.
+
+    Raises
+    ------
+    InputError
+        When there is no such sensor.
+    """
+    films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
+    return _size(graph.props(films[0][1]) if films else {})
+
+
+def _size(film):
+    """Return a film's width and height, or what Mitsuba takes where they are not given."""
+    return tuple(int(film.get(side, usual)) for side, usual in (("width", 768), ("height", 576)))
+
+
 def keep_sensor(graph, number):
     """Keep one sensor of the scene, and return its index.
 
@@ -136,7 +153,7 @@ def _prepare_film(graph, sensor, resolution, overridden):
 
 def _resize(props, resolution):
     """Set a film's size; a crop keeps its place in the picture."""
-    old = props.get("width", 768), props.get("height", 576)
+    old = _size(props)
     for side, name, new, before in zip(
         ("width", "height"), ("x", "y"), resolution, old, strict=True
     ):

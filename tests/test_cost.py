@@ -14,6 +14,7 @@ from comparisons.cost.between import Between
 from comparisons.cost.effort import WIDTH, Effort, reduced
 from comparisons.cost.ladder import Method, ladder
 from comparisons.cost.methods import Methods
+from comparisons.cost.pairs import Pairs
 from comparisons.cost.run import cost
 from comparisons.metrics import delta_e_2000
 from comparisons.options import Options
@@ -22,7 +23,7 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.effects import Effect
 from reference.rendering import Accumulator
-from reference.scene import set_variant
+from reference.scene import Source, set_variant
 from reports import cli, cost_tables
 from reports import cost as results
 from tests.test_plan import scene as described
@@ -330,3 +331,27 @@ def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
         path.name for path in place.iterdir()
     }
     assert not list(place.glob("*.partial"))
+
+
+CORPUS = Path(__file__).parent / "corpus"
+
+
+def test_a_camera_without_a_viewpoint_has_no_flat_and_gouraud_rungs(rgb):
+    source = Source("orthographic", CORPUS / "sensor-orthographic.xml")
+    study = cost(source, Options(resolution=(16, 12)), TINY)
+    kernels = {point["rung"] for point in study.data["points"] if "kernel" in point["rung"]}
+    assert kernels == {"Phong kernel", "kernel with shadows"}
+
+
+def test_all_rungs_are_of_the_sensor_that_was_asked_for(rgb):
+    source = Source("several", CORPUS / "sensor-several.xml")
+    seen = Options(sensor=1)
+    assert reduced(source, seen, 1000) != reduced(source, Options(), 1000)
+    pairs = Pairs(source, seen, prepare(source, seen))
+    first, flat = (
+        pair.heuristic.instantiate().sensors()[0].world_transform().matrix.numpy()
+        for pair in (pairs.as_asked(), pairs.interpolated(Interpolation.FLAT))
+    )
+    other = prepare(source, Options()).pair.heuristic.instantiate().sensors()[0]
+    np.testing.assert_array_equal(first, flat)
+    assert (other.world_transform().matrix.numpy() != flat).any()

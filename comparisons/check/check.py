@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import mitsuba as mi
 import numpy as np
 
 from comparisons import record
@@ -12,8 +11,7 @@ from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import prepare
 from heuristic.errors import InputError
-from reference.preparation import keep_sensor
-from reference.scene import properties
+from reference.preparation import film_size
 
 LONGEST = 64
 """Pixels of the longer side that a scene is measured at, where nothing else is asked for."""
@@ -140,9 +138,6 @@ def new_baseline(scene, options, measured, images=None):
 
 def small_resolution(source, sensor=0):
     """Return ``(width, height)`` of a sensor's film reduced to `LONGEST`, in its proportions."""
-    graph = source.parse()
-    films = graph.children(keep_sensor(graph, sensor), mi.ObjectType.Film)
-    props = graph.props(films[0][1]) if films else properties("hdrfilm")
-    sides = [int(props.get(key, default)) for key, default in (("width", 768), ("height", 576))]
+    sides = film_size(source.parse(), sensor)
     scale = min(1.0, LONGEST / max(sides))
     return tuple(max(1, round(side * scale)) for side in sides)

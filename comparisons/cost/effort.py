@@ -7,7 +7,7 @@ from itertools import takewhile
 from comparisons.cost import shapley
 from comparisons.cost.ladder import DEPTHS
 from heuristic.errors import InputError
-from reference.preparation import FILM, SENSOR
+from reference.preparation import film_size
 
 DETERMINISTIC_SPP = 16
 """Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
@@ -86,13 +86,7 @@ def reduced(source, options, width):
     InputError
         When the scene cannot be read or has no sensor.
     """
-    given = options.resolution or _film_size(source.parse())
+    given = options.resolution or film_size(source.parse(), options.sensor)
     if given[0] <= width:
         return given
     return width, max(1, round(given[1] * width / given[0]))
-
-
-def _film_size(graph):
-    films = [film for sensor in graph.nodes(SENSOR) for _, film in graph.children(sensor, FILM)]
-    props = graph.props(films[0]) if films else {}
-    return int(props.get("width", 768)), int(props.get("height", 576))

@@ -81,7 +81,7 @@ class Methods:
         return replace(plan, integrator="path", max_depth=method.max_depth)
 
     def _interpolations(self):
-        """Return the interpolations that the scene's shapes allow: some make no meshes."""
+        """Return the interpolations that shapes and sensor allow: some make no meshes."""
         allowed = []
         for interpolation in Interpolation:
             try:

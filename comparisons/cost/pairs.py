@@ -32,7 +32,7 @@ class Pairs:
         Raises
         ------
         InputError
-            Where a shape makes no mesh.
+            Where a shape makes no mesh, or flat and Gouraud shading have no viewpoint.
         """
         return self._of(interpolation, self._options.tessellation)
 
@@ -50,5 +50,6 @@ class Pairs:
                 interpolation,
                 tessellation,
                 prune=not self._options.everything,
+                sensor=self._options.sensor,
             )
         return self._known[key]

@@ -32,7 +32,7 @@ def interpolating(base):
             return mi.Color3f(values) if mi.is_rgb else mi.Spectrum(values[0])
 
         def _store(self, scene, sensor):
-            viewer = _position(sensor)
+            viewer = viewpoint(sensor)
             for mesh in _meshes(scene):
                 at = shading_points(mesh, self.interpolation)
                 shade_mesh(
@@ -76,7 +76,7 @@ def _meshes(scene):
     return scene.shapes()
 
 
-def _position(sensor):
+def viewpoint(sensor):
     """Return the viewer's position, refusing cameras that have none."""
     if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
         raise InputError(
