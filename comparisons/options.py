@@ -15,7 +15,7 @@ class Options:
     Parameters
     ----------
     seed
-        Seed of the first pass; pass ``i`` has ``seed + i`` in both halves.
+        Of the run; each pass hashes its own from it (:func:`reference.rendering.pass_seed`).
     spp
         Samples a pixel in all, in place of the plan's. They are split into the plan's number of
         passes, or fewer where that leaves less than 4 a pass, at least 2. With ``noise``, the

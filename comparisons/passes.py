@@ -4,9 +4,9 @@ Passes are bounded in two ways. A wavefront, the samples that are under way at o
 :data:`WAVEFRONT`, which bounds the memory of large images. And with a noise target, passes go on
 until the noise is under it, or a limit on samples stops them.
 
-The state after each pass can be kept, so that an interrupted run goes on where it stopped. Pass
-``i`` has the seed ``seed + i`` and is added to the same sums in the same order, interrupted or not:
-the result is the same bit for bit.
+The state after each pass can be kept, so that an interrupted run goes on where it stopped. The seed
+of pass ``i`` is hashed from the run's seed and ``i``, and passes are added to the same sums in the
+same order, interrupted or not: the result is the same bit for bit.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.metrics import METRICS
-from reference.rendering import Accumulator, Estimate, Mean
+from reference.rendering import Accumulator, Estimate, Mean, pass_seed
 
 WAVEFRONT = 2**24
 """Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
@@ -127,7 +127,8 @@ def render(ready, options, counted, progress, kept=None):
     reached = None
     while done < ready.passes:
         progress("rendering", done, ready.passes)
-        images = [half.render(options.seed + done) for half in halves]
+        seed = pass_seed(options.seed, done)
+        images = [half.render(seed) for half in halves]
         images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
         for total, image in zip(sums, images, strict=True):
             total.add(image)

@@ -13,7 +13,7 @@ from comparisons.compare import LEVEL, Options, prepare
 from comparisons.significance import significance
 from reference import halves
 from reference.gbuffer import gbuffer, image_size
-from reference.rendering import Accumulator, Renderer
+from reference.rendering import Accumulator, Renderer, Stream, pass_seed
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
@@ -99,8 +99,8 @@ def verify(source, options=None, progress=None, level=LEVEL):
             progress("verifying", number, passes)
         for side, total in zip(sides, sums, strict=True):
             # Other seeds for the other side: equal ones would hide noise that both share.
-            shift = 0 if side is sides[0] else 1_000_000
-            total.add(side.reference.render(options.seed + shift + number))
+            stream = Stream.COMPARED if side is sides[0] else Stream.OTHER_SIDE
+            total.add(side.reference.render(pass_seed(options.seed, number, stream)))
     estimates = [total.estimate() for total in sums]
     return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed), level)
 
@@ -111,7 +111,9 @@ def _kernel_difference(sides, seed):
     images = []
     for side in sides:
         scene = halves.with_sampler(side.pair.heuristic, sampler).instantiate()
-        images.append(np.array(Renderer(scene, None, spp, "heuristic image").render(seed)))
+        images.append(
+            np.array(Renderer(scene, None, spp, "heuristic image").render(pass_seed(seed, 0)))
+        )
     return float(np.abs(images[0] - images[1]).max())
 
 

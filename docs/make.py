@@ -15,12 +15,13 @@ import nbformat
 from matplotlib.figure import Figure
 from nbclient import NotebookClient
 
+from comparisons import atomic
 from comparisons.compare import Options, compare
 from comparisons.scenes import builtin
 from heuristic import equations
 from heuristic.interpolation import Interpolation
 from reference.scene import set_variant
-from reports import figures, files, images, tables
+from reports import figures, images, tables
 
 DOCS = Path(__file__).parent
 SIDE, SAMPLES = 192, 64
@@ -64,7 +65,7 @@ def replace(page, part, lines):
     begin, end = marks(part)
     head, rest = text.split(begin)
     _, tail = rest.split(end)
-    files.write(path, "\n".join([head + begin, "", *lines, "", end + tail]))
+    atomic.write(path, "\n".join([head + begin, "", *lines, "", end + tail]))
 
 
 def marks(part):
@@ -116,7 +117,7 @@ def _sheet(name, titles, rows):
             place.axis("off")
     for place, title in zip(axes[0], titles, strict=True):
         place.set_title(title, fontsize=8, pad=3)
-    files.write(DOCS / name, figures.drawn(figure, "png", 100))
+    atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
 
 
 def _example():
@@ -125,7 +126,7 @@ def _example():
     for samples in (16, 256):
         options = Options(spp=samples, resolution=(256, 256))
         results.append(compare(builtin("cornell-box").source(), options))
-    files.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
+    atomic.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
     replace("reading.md", "example", tables.metrics_markdown(r.data for r in results))
 
 
@@ -136,7 +137,7 @@ def _notebook():
     NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
-    files.write(path, nbformat.writes(notebook) + "\n")
+    atomic.write(path, nbformat.writes(notebook) + "\n")
 
 
 if __name__ == "__main__":

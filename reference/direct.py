@@ -15,7 +15,8 @@ Parameter           Type (default)      Meaning
                                         where shadows are to be missing
 ``bsdf_samples``    integer (1)         samples of the BSDF that look for lights, 0 or 1. Such a
                                         ray meets what hides a light: without shadows, 0 where
-                                        something does
+                                        something does. Mirrors and glass take theirs all the same,
+                                        since nothing else finds a light in them
 ``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:mod:`reference.indirect`)
 ==================  ==================  ===========================================================
@@ -71,8 +72,8 @@ def _define():
                 colour += self._from_emitter(
                     scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
                 )
-            if extended and self.bsdf_samples:
-                colour += _from_bsdf(scene, si, bsdf, context, sampler, hit)
+            if extended and (self.bsdf_samples or _has_delta(scene)):
+                colour += _from_bsdf(scene, si, bsdf, context, sampler, hit, self.bsdf_samples)
             if self.max_depth != 2:
                 colour += indirect_light(
                     scene, sampler, si, bsdf, self.max_depth, hit, self.shadows, self.bsdf_samples
@@ -107,8 +108,17 @@ def _define():
     mi.register_integrator("direct_all", DirectAllIntegrator)
 
 
-def _from_bsdf(scene, si, bsdf, context, sampler, active):
-    """One sample of the BSDF, for the emitter that it happens to meet."""
+def _has_delta(scene):
+    """Tell whether a BSDF of the scene reflects or transmits in single directions."""
+    bsdfs = (shape.bsdf() for shape in scene.shapes())
+    return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
+
+
+def _from_bsdf(scene, si, bsdf, context, sampler, active, bsdf_samples):
+    """One sample of the BSDF, for the emitter that it happens to meet.
+
+    Without ``bsdf_samples`` only directions count that no sample of an emitter takes.
+    """
     bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
     active = active & (bs.pdf > 0)
     hit = scene.ray_intersect(si.spawn_ray(si.to_world(bs.wo)), active)
@@ -117,5 +127,6 @@ def _from_bsdf(scene, si, bsdf, context, sampler, active):
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+    active &= is_delta | (bsdf_samples > 0)
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     return dr.select(active, weight * emitter.eval(hit, active) * share, 0)

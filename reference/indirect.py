@@ -42,6 +42,7 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
     depth = mi.UInt32(2)  # of what the ray finds, seen from the camera
     previous = mi.Interaction3f(si)
     previous_pdf = mi.Float(bs.pdf)
+    previous_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     active = mi.Bool(active) & (bs.pdf > 0) & (depth < limit)
 
     while active:
@@ -49,9 +50,10 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         # What the first ray meets shines directly on the surface that it left, which is not ours.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
-        seen = active & (depth > 2) & (bsdf_samples > 0)
-        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen)
-        share = previous_pdf / (previous_pdf + emitter_pdf)
+        seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
+        # No sample of an emitter takes a direction that a mirror, glass or a mask demands.
+        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
 
         active &= si.is_valid() & (depth < limit)
@@ -70,6 +72,7 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         throughput *= weight
         previous = mi.Interaction3f(si)
         previous_pdf = mi.Float(bs.pdf)
+        previous_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         ray = si.spawn_ray(si.to_world(bs.wo))
         depth += 1
         largest = dr.max(throughput)

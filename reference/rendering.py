@@ -8,6 +8,7 @@ so that every standard error here comes from the spread of passes.
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import IntEnum
 from statistics import median
 from time import perf_counter
 
@@ -19,6 +20,24 @@ from heuristic.errors import InputError, NonFiniteError
 from reference import direct
 from reference.environment import AlbedoTable
 from reference.preparation import PATHS
+
+
+class Stream(IntEnum):
+    """What passes are for; passes of different streams are independent at any seed."""
+
+    COMPARED = 0
+    OTHER_SIDE = 1
+    REPLICATES = 2
+
+
+def pass_seed(seed, number, stream=Stream.COMPARED):
+    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
+
+    Both halves, and all methods that are compared, take the same one for a pass. So their camera
+    rays cancel, while runs of different seeds have no pass in common.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
+    return int(sequence.generate_state(1)[0])
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import os
 import re
 from pathlib import Path
 
-from reports import checking, junit
+from reports import checking, files, junit
 
 
 def annotate(results, folder, level, environment=None):
@@ -48,13 +48,13 @@ def annotate(results, folder, level, environment=None):
     if variables.get("GITLAB_CI") == "true":
         report = [_code_quality(result) for result in bad]
         folder.mkdir(parents=True, exist_ok=True)
-        path = folder / "gl-code-quality-report.json"
-        path.write_text(json.dumps(report, indent=2, ensure_ascii=False), encoding="utf-8")
+        content = json.dumps(report, indent=2, ensure_ascii=False)
+        files.write(folder / "gl-code-quality-report.json", content)
         return []
     if variables.get("TF_BUILD"):
         folder.mkdir(parents=True, exist_ok=True)
         path = (folder / "summary.md").resolve()
-        path.write_text(table(results, level), encoding="utf-8")
+        files.write(path, table(results, level))
         return [*map(_azure, bad), f"##vso[task.uploadsummary]{path}"]
     if variables.get("TEAMCITY_VERSION"):
         return [_teamcity(result) for result in bad]

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from comparisons import atomic
 from comparisons.check import baseline as format
 from comparisons.check.baseline import Baseline
 from heuristic.errors import InputError
@@ -99,7 +100,7 @@ def read(path):
 
 
 def write(path, baseline, pictures=None):
-    """Write a baseline whole or not at all, with small pictures of both halves where given.
+    """Write a baseline atomically, with small pictures of both halves where given.
 
     Raises
     ------
@@ -114,9 +115,7 @@ def write(path, baseline, pictures=None):
             layers = {f"baseline.{half}": image for half, image in pictures.items()}
             exr.write(images, layers, {"scene": baseline.scene})
             baseline = replace(baseline, images=images.name)
-        partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-        partial.write_text(baseline.text(), encoding="utf-8")
-        partial.replace(path)
+        atomic.write(path, baseline.text())
     except OSError as error:
         raise InputError(f"baseline {path}: {error.strerror or error}.") from error
 

@@ -37,7 +37,7 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
 
     places = _places(names)
     folder = output.prepare(folder)
-    output.recover(folder)
+    output.require_free(folder, places, wanted.figures)
     views, failures = {}, {}
     try:
         _compare(run, places, folder, wanted, views, failures)

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
+from comparisons import atomic
 from comparisons.check import check as checking
 from comparisons.check.check import Check
 from comparisons.check.moved import LEVEL
 from heuristic.errors import FotismosError
 from reference.scene import set_variant
-from reports import baselines, check_pictures, check_record, jobs
+from reports import baselines, check_pictures, check_record, files, jobs
 from reports.baselines import BaselineFile
 
 
@@ -167,17 +168,19 @@ def _small(pictures):
 
 def _clear(folder):
     """Delete the files of an earlier failure, and the folder unless it holds others."""
+    ours = files.made(folder)
     for name in ("check.json", *(f"{name}.png" for name in check_pictures.NAMES)):
-        (folder / name).unlink(missing_ok=True)
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
+        if name in ours:
+            (folder / name).unlink(missing_ok=True)
+    if folder.is_dir() and {path.name for path in folder.iterdir()} <= {files.MARK}:
+        atomic.remove(folder)
 
 
 def _write_failure(file, result):
     """Write pictures and the record."""
     folder = result.folder
-    folder.mkdir(parents=True, exist_ok=True)
+    files.folder(folder)
     for name, png in check_pictures.pictures(result.check, file.pictures()).items():
-        (folder / f"{name}.png").write_bytes(png)
+        files.write(folder / f"{name}.png", png)
     data = json.dumps(check_record.data(result), indent=2, ensure_ascii=False, allow_nan=False)
-    (folder / "check.json").write_text(data + "\n", encoding="utf-8")
+    files.write(folder / "check.json", data + "\n")

@@ -1,11 +1,10 @@
 """The files of a study of cost, and what a page shows of it."""
 
 import json
-import os
 from functools import partial
 
 from comparisons.cost.dominance import dominating
-from reports import charts, effects, images, vega
+from reports import charts, effects, files, images, vega
 from reports.cost_tables import noise
 
 DIGITS = "0123456789"
@@ -16,7 +15,7 @@ NO_EFFECT, UNCOUNTED = ".", "-"
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
 
-def files(study):
+def documents(study):
     """Return the files of a study by name: chart, pictures of rungs, parts and effects.
 
     Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
@@ -40,15 +39,13 @@ def files(study):
 
 
 def write(place, study):
-    """Write the files of a study to a folder, each whole or not at all; what else is there stays.
+    """Write the files of a study to a folder, each atomically; what else is there stays.
 
     The record comes last: where it is, its pictures are its own.
     """
-    place.mkdir(exist_ok=True)
-    for name, content in files(study).items():
-        partial_file = place / f".{name}.{os.getpid()}.partial"
-        partial_file.write_bytes(content)
-        partial_file.replace(place / name)
+    files.folder(place)
+    for name, content in documents(study).items():
+        files.write(place / name, content)
 
 
 def text(data):
@@ -85,7 +82,7 @@ def figures(data):
 def view(study, made):
     """Return what a page shows of a study: its record, pictures and the map of effects.
 
-    ``made`` are its :func:`files`.
+    ``made`` are its :func:`documents`.
     """
     data = json.loads(made["cost.json"])
     return {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from comparisons import atomic
 from heuristic.errors import InputError
 
 #: Layers that keep float32; the others are maps, for which half's 11 bits are enough.
@@ -35,7 +35,7 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
     header
         Metadata as strings, e.g. seed, samples and versions. BT.709's chromaticities are added.
 
-    The file appears whole or not at all: it is written beside `path` and then moved there.
+    The file is written atomically (:mod:`comparisons.atomic`).
     Raises `InputError` if layers differ in size or have another number of channels, `OSError`
     if the place cannot be written.
     """
@@ -48,15 +48,11 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         "compression": OpenEXR.ZIP_COMPRESSION,
         "chromaticities": BT709,
     }
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with atomic.replacing(path) as partial:
         # The bindings report an unwritable place as a RuntimeError; opening it says why.
         partial.touch()
         with OpenEXR.File(attributes, channels(layers)) as file:
             file.write(str(partial))
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:

@@ -50,7 +50,7 @@ PRINT = {
 
 def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
     """Write the strip and the histograms of a comparison as ``folder/name...`` in each format."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     figure = strip(comparison)
     for kind in FORMATS:
         files.write(folder / f"{name}.{kind}", drawn(figure, kind))
@@ -64,13 +64,13 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
 
 def write_run(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     """Write the departures of all scenes of a run as ``folder/departures`` in each format."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     write_chart(folder, "departures", departures(list(records)))
 
 
 def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
     """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     write_chart(folder, f"{name}-cost", charts.error_over_time(data))
 
 

@@ -1,13 +1,160 @@
-"""Files that appear whole or not at all."""
+"""Writing to folders that may hold other people's files: only what fotismos made is replaced.
 
-import os
+A folder that fotismos writes to holds a file `MARK`, which lists what was made there, one name per
+line. What is not in the list is not touched, and neither is a folder without such a file in it.
+"""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from comparisons import atomic
+from heuristic.errors import InputError
+
+MARK = ".fotismos"
 
 
-def write(path, content):
-    """Write bytes, or text as UTF-8, beside ``path`` and then move them there.
+def made(folder: Path) -> set[str]:
+    """Return the names of what fotismos made in a folder."""
+    try:
+        return set((folder / MARK).read_text(encoding="utf-8").splitlines())
+    except (OSError, UnicodeDecodeError):
+        return set()
 
-    Raises ``OSError`` where the place cannot be written to.
+
+def require_free(path: Path) -> None:
+    """Refuse a file that fotismos did not make.
+
+    Raises
+    ------
+    InputError
+        Naming it, or what is there in its place.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_bytes(content.encode() if isinstance(content, str) else content)
-    partial.replace(path)
+    if path.is_symlink() or (path.exists() and not _is_own_file(path)):
+        raise _not_ours(path)
+
+
+def require_free_folder(path: Path) -> None:
+    """Refuse a folder that fotismos did not make, unless it is empty.
+
+    Raises
+    ------
+    InputError
+        Naming it, or what is there in its place.
+    """
+    if path.is_symlink() or (path.exists() and not (_is_own_folder(path) or _is_empty(path))):
+        raise _not_ours(path)
+
+
+def _is_own_file(path: Path) -> bool:
+    return path.is_file() and path.name in made(path.parent)
+
+
+def _is_own_folder(path: Path) -> bool:
+    return path.name in made(path.parent) and (path / MARK).is_file()
+
+
+def _is_empty(path: Path) -> bool:
+    return path.is_dir() and not any(path.iterdir())
+
+
+def _not_ours(path: Path) -> InputError:
+    kind = "folder" if path.is_dir() else "file"
+    return InputError(
+        f"{path}: this {kind} was not made by fotismos, and is left as it is. Choose another output"
+        " folder with -o, or move it away."
+    )
+
+
+def claim(folder: Path, *names: str) -> None:
+    """Add to the list of what fotismos made in a folder."""
+    new = [name for name in names if name not in made(folder)]
+    if new or not (folder / MARK).exists():
+        with (folder / MARK).open("a", encoding="utf-8") as file:
+            file.write("".join(f"{name}\n" for name in new))
+
+
+def folder(path: Path) -> Path:
+    """Make a folder for results, or take one that fotismos made.
+
+    Raises
+    ------
+    InputError
+        Where it holds something else.
+    """
+    require_free_folder(path)
+    claim(path.parent, path.name)
+    path.mkdir(exist_ok=True)
+    claim(path)
+    return path
+
+
+def write(path: Path, content: str | bytes) -> None:
+    """Write bytes, or text as UTF-8, in place of an earlier result.
+
+    Raises
+    ------
+    InputError
+        Where the place holds something that fotismos did not make.
+    """
+    require_free(path)
+    claim(path.parent, path.name)
+    atomic.write(path, content)
+
+
+@contextmanager
+def replacing_folder(place: Path, keep: str | None = None) -> Iterator[Path]:
+    """Give a new folder to fill, and put it in the place of an earlier result at the end.
+
+    The old folder steps aside and is deleted last: at every moment one of the two is whole. What
+    others put into it is kept, and so are results whose names match the pattern ``keep``.
+
+    Raises
+    ------
+    InputError
+        Where the place holds something that fotismos did not make.
+    """
+    require_free_folder(place)
+    new, old = atomic.beside(place), atomic.beside(place, "old")
+    atomic.remove(new)
+    new.mkdir()
+    try:
+        yield new
+        claim(new, *sorted(path.name for path in new.iterdir()))
+        claim(place.parent, place.name)
+        if place.exists():
+            _keep(place, new, keep)
+            place.rename(old)
+        new.rename(place)
+    finally:
+        atomic.remove(new)
+    atomic.remove(old)
+
+
+def recover(folder: Path) -> None:
+    """Clear away what dead processes left half written, and restore what they were replacing."""
+    for partial, _ in atomic.abandoned(folder):
+        atomic.remove(partial)
+    for old, place in atomic.abandoned(folder, "old"):
+        if not (old / MARK).is_file():
+            continue
+        if place.exists():
+            atomic.remove(old)
+        else:
+            old.rename(place)
+
+
+def _keep(place: Path, new: Path, pattern: str | None) -> None:
+    """Copy from an old folder what is not fotismos's, and its results that match a pattern."""
+    ours = made(place) | {MARK}
+    for path in place.iterdir():
+        is_result = path.name in ours or atomic.LEFT.fullmatch(path.name)
+        if (new / path.name).exists() or (is_result and not (pattern and path.match(pattern))):
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.copytree(path, new / path.name, symlinks=True)
+        else:
+            shutil.copy2(path, new / path.name, follow_symlinks=False)
+        if is_result:
+            claim(new, path.name)

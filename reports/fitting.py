@@ -24,7 +24,7 @@ FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
 
 def write(folder, fit):
     """Write ``fit.json`` and ``fit.png`` to a folder."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     files.write(folder / "fit.png", picture(fit))
     text = json.dumps(fit.data, indent=2, ensure_ascii=False, allow_nan=False)
     files.write(folder / "fit.json", text + "\n")

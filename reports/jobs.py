@@ -66,7 +66,7 @@ def rendering_options(command):
                      help="Variant of the heuristic half, where it is another: RGB shading against"
                      " a spectral reference. [default: the scene's own, else that of --variant]"),
         click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
-                     help="Seed of the first pass."),
+                     help="Seed of the run; each pass hashes its own from it."),
         click.option("--spp", type=click.IntRange(min=2),
                      help="Samples a pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=Resolution(),

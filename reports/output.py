@@ -1,9 +1,7 @@
-"""Writing the results of a run: whole or not at all, and never at the cost of an earlier result."""
+"""Writing the results of a run atomically, and never at the cost of an earlier result."""
 
 import json
 import os
-import shutil
-from contextlib import contextmanager
 from pathlib import Path
 
 from comparisons.metrics import METRICS
@@ -20,7 +18,7 @@ TABLES, FIGURES = "tables", "figures"
 
 
 def prepare(folder):
-    """Make the output folder, and see that it can be written to.
+    """Make the output folder, clear away what killed runs left, and ensure it can be written to.
 
     Raises
     ------
@@ -33,6 +31,7 @@ def prepare(folder):
         probe = folder / f".fotismos-{os.getpid()}"
         probe.touch()
         probe.unlink()
+        files.recover(folder)
     except OSError as error:
         raise InputError(
             f"output folder {folder}: {error.strerror or error}. Choose another one with -o."
@@ -40,19 +39,18 @@ def prepare(folder):
     return folder
 
 
-def recover(folder):
-    """Clear away what a killed run left half written, and restore what it was about to replace."""
-    for partial in folder.glob(".*.partial"):
-        if partial.is_dir():
-            shutil.rmtree(partial)
-        else:
-            partial.unlink()
-    for old in folder.glob(".*.old"):
-        place = folder / old.name.removeprefix(".").removesuffix(".old")
-        if place.exists():
-            shutil.rmtree(old)
-        else:
-            old.rename(place)
+def require_free(folder, places, with_figures=False):
+    """Ensure, before anything is rendered, that a run will replace nothing but earlier results.
+
+    Raises
+    ------
+    InputError
+        Naming what is not fotismos's.
+    """
+    for name in ("index.html", "run.json"):
+        files.require_free(folder / name)
+    for name in (*places, TABLES, *([FIGURES] if with_figures else ())):
+        files.require_free_folder(folder / name)
 
 
 def write_scene(folder, name, comparison, study=None, key=None):
@@ -83,7 +81,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
 
     layers = _layers(shown)
     pictured = pictures()
-    priced = cost.files(study) if study else {}
+    priced = cost.documents(study) if study else {}
     largest = max(data["resolution"])
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
     view = {
@@ -97,12 +95,12 @@ def write_scene(folder, name, comparison, study=None, key=None):
         "charts": cost.figures(study.data) if study else (),
         "cost": cost.view(study, priced) if study else None,
     }
-    with _replacing(folder / name) as place:
+    with files.replacing_folder(folder / name, keep=None if study else COST_FILES) as place:
         for png_name, png in pictured.items():
             (place / f"{png_name}.png").write_bytes(png)
         exr.write(place / "comparison.exr", layers, _header(data))
         (place / "comparison.json").write_text(_json(data), encoding="utf-8")
-        for file, content in priced.items() if study else _kept(folder / name, COST_FILES):
+        for file, content in priced.items():
             (place / file).write_bytes(content)
         if key is not None:
             (place / finished.FILE).write_text(finished.text(view, key), encoding="utf-8")
@@ -145,12 +143,6 @@ def _layers(shown):
     }
 
 
-def _kept(place, pattern):
-    """Yield the names and contents of an earlier result's files."""
-    for path in sorted(place.glob(pattern)):
-        yield path.name, path.read_bytes()
-
-
 def _header(data):
     header = {
         "scene": data["scene"],
@@ -162,26 +154,3 @@ def _header(data):
     }
     header |= {f"version {name}": version for name, version in data["versions"].items()}
     return {key: str(value) for key, value in header.items()}
-
-
-@contextmanager
-def _replacing(place):
-    """Give a new folder to write to, and put it in the place of the old one at the end.
-
-    The old folder steps aside and is deleted last: at every moment one of the two is whole.
-    """
-    new = place.with_name(f".{place.name}.{os.getpid()}.partial")
-    old = place.with_name(f".{place.name}.old")
-    if old.exists() and not place.exists():
-        old.rename(place)  # an interruption came between the two renamings below
-    shutil.rmtree(new, ignore_errors=True)
-    new.mkdir()
-    try:
-        yield new
-        shutil.rmtree(old, ignore_errors=True)
-        if place.exists():
-            place.rename(old)
-        new.rename(place)
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
-    shutil.rmtree(old, ignore_errors=True)

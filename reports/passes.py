@@ -1,18 +1,19 @@
 """Passes of a long run, kept in a file so that an interruption loses little.
 
-``.SCENE.passes.npz`` lies beside the folder of a scene's results. It is written whole or not at
-all, belongs to one scene, one set of options and one set of versions, and goes away when the run
-succeeds.
+``.SCENE.fotismos-passes.npz`` lies beside the folder of a scene's results. It is written
+atomically, belongs to one scene, one set of options and one set of versions, and goes away when the
+run succeeds.
 """
 
 import hashlib
 import json
-import os
 import zipfile
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+
+from comparisons import atomic
 
 INTERVAL_S = 10.0
 """Seconds from one writing to the next, at least: short runs write nothing."""
@@ -53,17 +54,14 @@ class KeptPasses:
         begin = perf_counter()
         if begin < self._next:
             return
-        partial = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
-        with partial.open("wb") as file:
+        with atomic.replacing(self.path) as partial, partial.open("wb") as file:
             np.savez(file, key=np.array(self.key), **state())
-        partial.replace(self.path)
         end = perf_counter()
         self._next = end + max(self.interval, (end - begin) / SHARE)
 
     def remove(self):
-        """Delete the file, and what interrupted writings left of it."""
-        for path in (self.path, *self.path.parent.glob(f"{self.path.name}.*.partial")):
-            path.unlink(missing_ok=True)
+        """Delete the file."""
+        self.path.unlink(missing_ok=True)
 
 
 def of_scene(folder, name, source, options, variant):
@@ -74,7 +72,7 @@ def of_scene(folder, name, source, options, variant):
     from comparisons import record
 
     key = key_of(source, options, variant, record.versions())
-    return KeptPasses(folder / f".{name}.passes.npz", key)
+    return KeptPasses(folder / f".{name}.fotismos-passes.npz", key)
 
 
 def key_of(source, options, variant, versions):

@@ -6,11 +6,13 @@ from pathlib import Path
 import jinja2
 import vl_convert
 
-from comparisons.study import dataset, query
+from comparisons import atomic
+from comparisons.study import dataset, query, run
 from heuristic.errors import InputError
-from reports import study_charts
+from reports import files, study_charts
 
 VEGALITE = "5.21"
+FIGURES = "figures"
 
 
 @dataclass(frozen=True)
@@ -48,28 +50,44 @@ def page(study, file, findings):
 
 def write(study, outcome, folder, page=None):
     """Write dataset, figures, and the page of findings if there is one; yields where they are."""
-    place = folder / f"{study.name}.parquet"
+    place, figures = folder / f"{study.name}.parquet", folder / FIGURES
+    files.claim(folder, place.name)
     dataset.write(place, outcome.table)
-    figures = folder / "figures"
-    write_figures(study, outcome.table, figures)
+    for name, svg in drawn(study, outcome.table):
+        files.write(files.folder(figures) / name, svg)
     yield str(place)
     yield str(figures)
     if page is not None:
         dataset.write(page.dataset, outcome.table)
-        write_figures(study, outcome.table, page.file.with_suffix(""))
-        page.file.write_text(findings(study, outcome.table, page), encoding="utf-8")
+        page.file.with_suffix("").mkdir(exist_ok=True)
+        for name, svg in drawn(study, outcome.table):
+            atomic.write(page.file.with_suffix("") / name, svg)
+        atomic.write(page.file, findings(study, outcome.table, page))
         yield str(page.file)
 
 
-def write_figures(study, table, folder):
-    """Write all figures of a study as SVG; parts without a result are left out."""
-    folder.mkdir(parents=True, exist_ok=True)
+def require_free(study, folder):
+    """Ensure, before anything is rendered, that a study will replace nothing but its own results.
+
+    Raises
+    ------
+    InputError
+        Naming what is not fotismos's.
+    """
+    files.require_free(folder / f"{study.name}.parquet")
+    for name in (FIGURES, run.POINTS):
+        files.require_free_folder(folder / name)
+    files.folder(folder / run.POINTS)
+
+
+def drawn(study, table):
+    """Yield the names and contents of a study's figures; parts without a result are left out."""
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in (*study.figures, *study_charts.default_figures(study)):
         if figure["part"] in with_result:
             spec = study_charts.chart(figure, table, study)
             svg = vl_convert.vegalite_to_svg(spec, vl_version=VEGALITE)
-            (folder / f"{figure['name']}.svg").write_text(svg, encoding="utf-8")
+            yield f"{figure['name']}.svg", svg
 
 
 def findings(study, table, page):

@@ -47,7 +47,7 @@ def markdown(
 
 def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     """Write ``metrics.csv`` and ``metrics.md`` of the records of a run to a folder."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     records = list(records)
     files.write(folder / "metrics.csv", metrics_csv(records))
     files.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
@@ -55,7 +55,7 @@ def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
 
 def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
     """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
-    folder.mkdir(exist_ok=True)
+    files.folder(folder)
     for part, (headings, rows) in {"cost": methods(data), "prices": prices(data)}.items():
         files.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
         shown = [[_shown(cell) for cell in row] for row in rows]

@@ -116,20 +116,6 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
         assert finished.load(place, key) is None
 
 
-def test_what_a_killed_run_left_is_cleared_away_and_restored(tmp_path):
-    from reports import output
-
-    (tmp_path / ".a.12.partial").mkdir()
-    (tmp_path / ".index.html.12.partial").touch()
-    for name in (".a.old", "b", ".b.old"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "comparison.json").write_text(name)
-    output.recover(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
-    assert (tmp_path / "a/comparison.json").read_text() == ".a.old"
-    assert (tmp_path / "b/comparison.json").read_text() == "b"
-
-
 def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
     (folder / "c.py").write_text(GOOD)

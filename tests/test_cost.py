@@ -134,7 +134,7 @@ def test_scenes_have_the_effects_and_parts_that_they_are_made_of(study):
 
 def test_the_record_holds_to_its_schema_and_survives_json(study):
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
-    made = results.files(study)
+    made = results.documents(study)
     record = json.loads(made["cost.json"])
     jsonschema.Draft202012Validator(SCHEMA).validate(record)
     assert made["cost.svg"].startswith(b"<svg")

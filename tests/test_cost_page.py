@@ -22,7 +22,7 @@ def study():
 
 def shown(study, record=None, **more):
     """The page of one scene with its study."""
-    made = cost.files(study)
+    made = cost.documents(study)
     view = {
         "record": record or records.record(),
         "images": {},
@@ -33,7 +33,7 @@ def shown(study, record=None, **more):
 
 
 def test_the_made_up_record_holds_to_the_schema(study):
-    made = json.loads(cost.files(study)["cost.json"])
+    made = json.loads(cost.documents(study)["cost.json"])
     jsonschema.Draft202012Validator(SCHEMA).validate(made)
 
 
@@ -70,7 +70,7 @@ def test_names_from_files_stay_text(study):
 
 
 def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
-    found = cost.view(study, cost.files(study))["effects"]
+    found = cost.view(study, cost.documents(study))["effects"]
     assert found["names"] == list(cost_records.EFFECTS)
     assert len(set(found["colours"])) == 3
     rows = [found["map"][start : start + 12] for start in range(0, 96, 12)]

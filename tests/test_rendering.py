@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from comparisons.compare import compare
+from comparisons.options import Options
 from comparisons.scenes import SCENES
 from heuristic.errors import NonFiniteError
 from reference import halves, rendering
@@ -131,6 +133,36 @@ def test_another_seed_gives_other_camera_rays(rgb):
     first, again, other = (np.array(mi.render(made, spp=4, seed=seed)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.any(first != other)
+
+
+def test_no_two_runs_have_a_pass_in_common():
+    """Seeds of runs next to each other, of 64 passes each and of every stream."""
+    streams = list(rendering.Stream)
+    seeds = [
+        rendering.pass_seed(seed, number, stream)
+        for seed in range(50)
+        for number in range(64)
+        for stream in streams
+    ]
+    assert all(0 <= seed < 2**32 for seed in seeds)
+    # Of 9,600 numbers of 32 bits, 0.01 pairs are expected to be equal by chance.
+    assert len(set(seeds)) == len(seeds) == 50 * 64 * len(streams)
+
+
+def test_neighbouring_seeds_are_as_different_as_distant_ones(rgb):
+    """By mean absolute difference, on the Cornell box: 0.23 of it while seeds were added up."""
+
+    def image(seed):
+        options = Options(seed=seed, resolution=(48, 48), spp=64)
+        return compare(SCENES["cornell-box"].source(), options).images.reference
+
+    def off(one, other):
+        return np.mean(np.abs(one - other))
+
+    images = {seed: image(seed) for seed in (0, 1, 2, 3, 1000, 2000)}
+    near = [off(images[a], images[b]) for a, b in ((0, 1), (1, 2), (2, 3))]
+    far = [off(images[a], images[b]) for a, b in ((0, 1000), (1, 2000), (1000, 2000))]
+    assert np.mean(near) / np.mean(far) == pytest.approx(1, abs=0.1)
 
 
 # --- Direct light ----------------------------------------------------------------------------

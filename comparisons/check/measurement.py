@@ -15,6 +15,7 @@ from comparisons.metrics import METRICS, Array, log2_luminance_ratio, rmse
 from comparisons.spaces import Viewing
 from comparisons.statistics import noise_floor
 from reference.gbuffer import gbuffer
+from reference.rendering import pass_seed
 
 PASSES = 16
 """Enough for a t-test corrected for a hundred quantities to see five standard errors."""
@@ -121,7 +122,7 @@ def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, P
     ready : comparisons.compare.Prepared
         The scene; its renderers say how many samples a pass has.
     seed
-        Of the first pass; pass ``i`` has ``seed + i``.
+        Of the run; each pass hashes its own from it (:func:`reference.rendering.pass_seed`).
     passes
         Independent passes, 2 or more.
     viewing
@@ -138,9 +139,8 @@ def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, P
     for number in range(passes):
         if progress:
             progress("rendering", number, passes)
-        images.append(
-            [np.array(half.render(seed + number)) for half in (ready.heuristic, ready.reference)]
-        )
+        own = pass_seed(seed, number)
+        images.append([np.array(half.render(own)) for half in (ready.heuristic, ready.reference)])
     if progress:
         progress("rendering", passes, passes)
     images = np.array(images, np.float64)

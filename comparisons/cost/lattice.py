@@ -14,7 +14,7 @@ from comparisons.cost.between import Between
 from heuristic.interpolation import Interpolation
 from reference.effects import Effect
 from reference.halves import with_sampler
-from reference.rendering import Renderer, variant
+from reference.rendering import Renderer, Stream, pass_seed, variant
 
 KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
 
@@ -41,7 +41,7 @@ class Lattice:
     spp
         Samples a pixel of each replicate.
     seed
-        Of the first replicate.
+        Of the study.
     """
 
     def __init__(self, options, methods, replicates, spp, seed):
@@ -165,7 +165,8 @@ class Lattice:
         return self._glows[glow]
 
     def _passes(self, renderer):
-        images = [np.array(renderer.render(self.seed + i)) for i in range(self.replicates)]
+        seeds = [pass_seed(self.seed, i, Stream.REPLICATES) for i in range(self.replicates)]
+        images = [np.array(renderer.render(seed)) for seed in seeds]
         return np.stack(images), np.array(renderer.times[1:])
 
     def _between_here(self):

@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 
 from comparisons.metrics import METRICS
-from reference.rendering import variant
+from reference.rendering import pass_seed, variant
 
 LEVEL = 0.95
 
@@ -147,7 +147,7 @@ def measure(renderers, judge, rounds, seed, progress):
     rounds
         Repeats, at least 2.
     seed
-        Of the first run; the rounds take the next ones.
+        Of the study; each round hashes its own from it.
     progress : callable
         ``progress(stage, done, total)``.
 
@@ -159,10 +159,11 @@ def measure(renderers, judge, rounds, seed, progress):
     images = {}
     for number in range(rounds + 2):
         progress("timing", number, rounds + 2)
+        own = pass_seed(seed, number)
         for name, group in by_variant(renderers).items():
             with variant(name):
                 for key, renderer in group.items():
-                    images[key] = np.array(renderer.render(seed + number))
+                    images[key] = np.array(renderer.render(own))
         if number > 1:
             for key, image in images.items():
                 errors[key].append(judge.errors(image))

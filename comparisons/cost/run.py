@@ -16,7 +16,7 @@ from comparisons.cost.prices import prices
 from comparisons.cost.split import split
 from comparisons.options import Options
 from reference.gbuffer import gbuffer, image_size
-from reference.rendering import Accumulator, Renderer
+from reference.rendering import Accumulator, Renderer, Stream, pass_seed
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     methods = Methods(source, options, ready, effort.depths)
     rungs = methods.rungs
     measured = _measured(methods, effort, judge, options.seed, progress)
-    lattice = Lattice(
-        options, methods, effort.replicates, effort.replicate_spp, options.seed + 2_000_000
-    )
+    lattice = Lattice(options, methods, effort.replicates, effort.replicate_spp, options.seed)
     progress("pricing effects", 0, 1)
     priced = prices(lattice, judge, options.seed, effort.exact_effects, effort.orders)
     parts, whole = split(lattice, counted, options.viewing)
@@ -177,7 +175,7 @@ def _converged(ready, effort, seed, progress):
     total = Accumulator()
     for number in range(ready.plan.passes):
         progress("reference", number, ready.plan.passes)
-        total.add(renderer.render(seed + 1_000_000 + number))
+        total.add(renderer.render(pass_seed(seed, number, Stream.OTHER_SIDE)))
     return total.estimate()
 
 

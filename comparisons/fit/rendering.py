@@ -8,7 +8,7 @@ import numpy as np
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
 from reference.gbuffer import gbuffer, image_size
-from reference.rendering import Accumulator, variant
+from reference.rendering import Accumulator, pass_seed, variant
 from reference.scene import Source, properties
 
 VARIANT = "llvm_ad_rgb"
@@ -63,7 +63,7 @@ def render(ready, options, progress):
     sums = [Accumulator() for _ in range(3)]
     for number in range(ready.passes):
         progress("rendering", number, ready.passes)
-        seed = options.seed + number
+        seed = pass_seed(options.seed, number)
         images = [half.render(seed) for half in (ready.heuristic, ready.reference)]
         images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
         for total, image in zip(sums, images, strict=True):

@@ -1,12 +1,12 @@
 """Rows as one Parquet file, with units, meanings and provenance in its schema."""
 
 import json
-import os
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from comparisons import atomic
 from comparisons.record import versions
 from comparisons.study.columns import IDENTITY, PARAMETERS, RESULTS, Column
 from heuristic.errors import InputError
@@ -46,14 +46,9 @@ def table(study, rows):
 
 
 def write(path, data):
-    """Write a table to a Parquet file, which appears whole or not at all."""
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    """Write a table to a Parquet file, atomically."""
+    with atomic.replacing(Path(path)) as partial:
         pq.write_table(data, partial, compression="zstd")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def read(path):

@@ -15,7 +15,7 @@ from heuristic.errors import InputError
 from reference import halves
 from reference.gbuffer import gbuffer, image_size
 from reference.plan import plan, sampler
-from reference.rendering import Accumulator, Renderer, physical_integrator
+from reference.rendering import Accumulator, Renderer, pass_seed, physical_integrator
 from reference.scene import Source
 
 PASSES = 4
@@ -97,7 +97,7 @@ def _render(renderers, seed):
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for number in range(PASSES):
-        passes = [renderer.render(seed + number) for renderer in renderers]
+        passes = [renderer.render(pass_seed(seed, number)) for renderer in renderers]
         for total, image in zip(sums, passes, strict=True):
             total.add(image)
         difference.add(passes[0] - passes[-1])

@@ -5,12 +5,15 @@ So a run that ends early loses nothing, and the next one repeats nothing.
 """
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from comparisons import atomic
 from comparisons.study import dataset, point, processes
 from comparisons.study.point import Block
+
+POINTS = "points"
+"""Folder of the finished blocks."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def run(study, folder, spread=None, progress=None):
     """
     for part in study.parts:
         point.check(part)
-    kept = Path(folder) / "points"
+    kept = Path(folder) / POINTS
     kept.mkdir(parents=True, exist_ok=True)
     blocks = [block for part in study.parts for block in point.blocks(part)]
     found = {block.key: _read(kept / f"{block.key}.json") for block in blocks}
@@ -93,6 +96,4 @@ def _read(path):
 
 
 def _write(path, rows):
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(rows, ensure_ascii=False), encoding="utf-8")
-    partial.replace(path)
+    atomic.write(path, json.dumps(rows, ensure_ascii=False))

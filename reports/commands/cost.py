@@ -35,18 +35,20 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     from comparisons.cost.run import cost as run
     from reference.scene import set_variant
     from reports import cost as results
-    from reports import cost_tables, progress, tables
+    from reports import cost_tables, files, progress, tables
     from reports import figures as prints
     from reports import output as folders
 
     folder = folders.prepare(output)
     source, chosen = jobs.job(scene, rendering)
+    place = folder / folders.folder_name(source.name, ())
+    for used in (place, folder / folders.TABLES, *([folder / folders.FIGURES] if figures else ())):
+        files.require_free_folder(used)
     set_variant(chosen["variant"])
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     words = jobs.command(source, chosen, "cost") + (f" --rounds {rounds}" if rounds else "")
     with progress.shown() as bar:
         study = run(source, jobs.options(chosen), effort, bar.of(source.name), words)
-    place = folder / folders.folder_name(source.name, ())
     results.write(place, study)
     tables.write_cost(folder / folders.TABLES, place.name, study.data)
     if figures:

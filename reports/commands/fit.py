@@ -58,6 +58,7 @@ def fit(scenes, output, form, as_json, markdown, **words):
       fotismos fit my_scene.xml --loss linear --form phong --intensities
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
+    from comparisons import atomic
     from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit import fit as run
     from heuristic.materials import FORMS
@@ -68,17 +69,20 @@ def fit(scenes, output, form, as_json, markdown, **words):
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
     folder = folders.prepare(output)
-    records, names = [], []
+    wanted = [jobs.job(name, words) for name in scenes]
+    records, places = [], []
+    for source, _ in wanted:
+        places.append(folders.folder_name(source.name, places))
+        files.require_free_folder(folder / places[-1])
     with progress.shown() as bar:
-        for source, rendering in [jobs.job(name, words) for name in scenes]:
+        for source, rendering in wanted:
             set_variant(rendering["variant"])
             command = jobs.command(source, rendering | fitting_words | {"form": form}, "fit")
             result = run(source, jobs.options(rendering), chosen, bar.of(source.name), command)
-            names.append(folders.folder_name(source.name, names))
-            fitting.write(folder / names[-1], result)
+            fitting.write(folder / places.pop(0), result)
             records.append(result.data)
     if markdown:
-        files.write(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
+        atomic.write(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
     if as_json:
         click.echo(json.dumps(records, indent=2, ensure_ascii=False))
         return

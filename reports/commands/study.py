@@ -66,6 +66,7 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     wanted = design.read(file)
     page = studying.page(wanted, file, findings)
     folder = files.prepare(output or Path("out", wanted.name))
+    studying.require_free(wanted, folder)
     if scheduler:
         spreading = cluster.connected(scheduler)
     elif workers:

@@ -1,0 +1,116 @@
+"""Light by way of mirrors, glass and masks: `direct_all` against Mitsuba's `path`.
+
+No sample of a light takes the one direction that such a surface demands, so that a light found
+there counts in full. Samples are independent: Mitsuba's multijitter is biased where paths are long.
+Shapes are not merged: the box about merged rectangles is invalid in Mitsuba 3.9.1, and the shadow
+rays to an environment then end inside the scene.
+"""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy import stats
+
+from reference.rendering import Accumulator, Renderer, Stream, pass_seed
+from tests.test_physics import look_at
+
+SIDE, SPP, PASSES = 24, 256, 8
+
+BALLS = {
+    "mirror": {"type": "conductor", "material": "none"},
+    "glass": {"type": "dielectric", "int_ior": 1.5},
+    "thin glass": {"type": "thindielectric", "int_ior": 1.5},
+    "smooth plastic": {"type": "plastic", "diffuse_reflectance": 0.5},
+    "null": {"type": "null"},
+    "mask": {"type": "mask", "opacity": 0.4, "bsdf": {"type": "diffuse", "reflectance": 0.5}},
+    "diffuse": {"type": "diffuse", "reflectance": 0.5},
+    "rough metal": {"type": "roughconductor", "material": "none", "alpha": 0.2},
+}
+
+
+def _wall(target, distance=2.0):
+    at = np.array(target, float) * distance
+    return {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().look_at(
+            at.tolist(), [0.0, 0.0, 0.0], [0.0, 1.0, 0.0] if target[1] == 0 else [0.0, 0.0, 1.0]
+        )
+        @ mi.ScalarTransform4f().scale(distance),
+        "bsdf": {"type": "diffuse", "reflectance": 0.6},
+    }
+
+
+def _scene(ball, light):
+    """A ball in a room: closed about a lamp or a point, open at the top to the sky."""
+    lights = {
+        "area": {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f()
+            .translate((0, 0, 1.9))
+            .rotate((1, 0, 0), 180)
+            .scale(0.5),
+            "emitter": {"type": "area", "radiance": 8.0},
+        },
+        "constant": {"type": "constant", "radiance": 1.0},
+        "point": {"type": "point", "position": (0.3, -0.4, 1.5), "intensity": 6.0},
+    }
+    sides = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, -1)]
+    sides += [(0, 0, 1)] if light != "constant" else []
+    walls = {f"wall_{number}": _wall(side) for number, side in enumerate(sides)}
+    return {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "fov": 70.0,
+            "to_world": look_at((1.5, -1.7, 0.6)),
+            "film": {
+                "type": "hdrfilm",
+                "width": SIDE,
+                "height": SIDE,
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "independent"},
+        },
+        "ball": {"type": "sphere", "radius": 0.8, "bsdf": BALLS[ball]},
+        "light": lights[light],
+        **walls,
+    }
+
+
+def _estimate(made, integrator, stream):
+    renderer = Renderer(made, mi.load_dict(integrator), SPP, "a test")
+    total = Accumulator()
+    for number in range(PASSES):
+        image = np.array(renderer.render(pass_seed(3, number, stream)))
+        total.add(mi.TensorXf(image.mean(axis=(0, 1), keepdims=True)))
+    return total.estimate()
+
+
+@pytest.mark.parametrize("light", ["area", "constant", "point"])
+@pytest.mark.parametrize("ball", BALLS)
+def test_a_light_found_by_way_of_a_ball_counts_as_in_mitsubas_path(rgb, ball, light):
+    """Means of the whole image; the test rejects once in a thousand times."""
+    made = mi.load_dict(_scene(ball, light), optimize=False)
+    ours, theirs = (
+        _estimate(made, {"type": kind, "max_depth": 8}, stream)
+        for kind, stream in (("direct_all", Stream.COMPARED), ("path", Stream.OTHER_SIDE))
+    )
+    difference = (ours.mean - theirs.mean).mean()
+    error = np.hypot(ours.standard_error, theirs.standard_error).mean()
+    assert error < 0.01 * theirs.mean.mean(), "the noise hides a departure of a few per cent"
+    t = abs(difference) / error
+    assert t < stats.t.isf(0.0005, PASSES - 1), (
+        f"{difference / theirs.mean.mean():+.2%}, t = {t:.1f}"
+    )
+
+
+def test_without_shadows_a_mirror_still_shows_the_lamp(rgb):
+    """Only its own ray finds the lamp there, whatever is said about the rays of other surfaces."""
+    made = mi.load_dict(_scene("mirror", "area"), optimize=False)
+    brightest = {}
+    for samples in (0, 1):
+        integrator = {"type": "direct_all", "shadows": False, "bsdf_samples": samples}
+        image = np.array(mi.render(made, integrator=mi.load_dict(integrator), spp=256, seed=1))
+        brightest[samples] = image.max()
+    assert brightest[0] == pytest.approx(brightest[1], rel=0.1)
+    assert brightest[0] > 2

@@ -1,0 +1,171 @@
+"""What fotismos replaces and clears away: its own results, and nothing else."""
+
+import json
+import os
+import subprocess
+import sys
+from random import Random
+
+import pytest
+
+from comparisons import atomic
+from heuristic.errors import InputError
+from reports import files, output
+
+SMALL = ("--spp", 2, "--resolution", "12x12")
+
+
+def contents(folder):
+    """Return everything below a folder: files with their bytes, folders, links."""
+    return {
+        path.relative_to(folder): (
+            os.readlink(path) if path.is_symlink() else path.is_file() and path.read_bytes()
+        )
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def partial(folder, name, pid, host=atomic.HOST, kind="partial"):
+    return folder / f".{name}.{host}.{pid}.fotismos-{kind}"
+
+
+@pytest.fixture
+def dead():
+    """The number of a process that has ended."""
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    return ended.pid
+
+
+@pytest.mark.parametrize(
+    "name", ["my scene/note.txt", "my scene", "index.html", "run.json", "tables/metrics.csv"]
+)
+def test_compare_refuses_to_replace_what_it_did_not_make(run, scene_file, name):
+    """A folder `my-scene` with textures, a page, a table: one message, nothing touched."""
+    folder = scene_file.parent
+    place = folder / name.replace("my scene", "my-scene")
+    place.parent.mkdir(exist_ok=True)
+    place.write_text("mine", encoding="utf-8")
+    before = contents(folder)
+    code, printed, messages = run("compare", scene_file, "-o", folder, *SMALL)
+    assert (code, printed) == (2, "")
+    assert "was not made by fotismos" in messages
+    assert "-o" in messages
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("command", ["cost", "fit"])
+def test_other_commands_refuse_it_too(run, scene_file, command):
+    folder = scene_file.parent
+    (folder / "my-scene").mkdir()
+    (folder / "my-scene/note.txt").write_text("mine", encoding="utf-8")
+    before = contents(folder)
+    code, _, messages = run(command, scene_file, "-o", folder, "--resolution", "12x12")
+    assert code == 2
+    assert "was not made by fotismos" in messages
+    assert contents(folder) == before
+
+
+def test_a_link_to_a_folder_of_the_user_is_not_replaced(run, scene_file, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "note.txt").write_text("mine", encoding="utf-8")
+    (scene_file.parent / "my-scene").symlink_to(elsewhere)
+    assert run("compare", scene_file, "-o", scene_file.parent, *SMALL)[0] == 2
+    assert (elsewhere / "note.txt").read_text() == "mine"
+    assert (scene_file.parent / "my-scene").is_symlink()
+
+
+def test_an_earlier_result_is_replaced_and_what_others_put_there_is_kept(run, scene_file):
+    out = scene_file.parent / "out"
+    assert run("compare", scene_file, "-o", out, *SMALL)[0] == 0
+    place = out / "my-scene"
+    (place / "notes").mkdir()
+    (place / "notes/mine.txt").write_text("mine", encoding="utf-8")
+    (place / "mine.png").write_bytes(b"mine")
+    first = json.loads((place / "comparison.json").read_text(encoding="utf-8"))
+    assert run("compare", scene_file, "-o", out, *SMALL, "--seed", 5)[0] == 0
+    second = json.loads((place / "comparison.json").read_text(encoding="utf-8"))
+    assert (first["seed"], second["seed"]) == (0, 5)
+    assert (place / "notes/mine.txt").read_text(encoding="utf-8") == "mine"
+    assert (place / "mine.png").read_bytes() == b"mine"
+
+
+def test_hidden_entries_of_others_are_left_as_they_are(tmp_path, dead):
+    """Whatever they end with, and whatever is in them; so are the partial files of a live run."""
+    for name in (".config.old", ".my.partial", ".a.12.partial", ".env.old.fotismos-old"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine").write_text("mine", encoding="utf-8")
+    (tmp_path / ".env.old").write_text("mine", encoding="utf-8")
+    partial(tmp_path, "a", os.getpid()).mkdir()
+    partial(tmp_path, "a", dead, "another-machine").mkdir()
+    partial(tmp_path, "b", dead, kind="old").mkdir()  # no mark in it: nobody's result
+    before = contents(tmp_path)
+    output.prepare(tmp_path)
+    assert contents(tmp_path) == before
+
+
+def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
+    partial(tmp_path, "a", dead).mkdir()
+    partial(tmp_path, "index.html", dead).touch()
+    for name in ("a", "b"):
+        old = partial(tmp_path, name, dead, kind="old")
+        old.mkdir()
+        files.claim(old)
+        (old / "comparison.json").write_text(f"old {name}")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b/comparison.json").write_text("b")
+    output.prepare(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+    assert (tmp_path / "a/comparison.json").read_text() == "old a"
+    assert (tmp_path / "b/comparison.json").read_text() == "b"
+
+
+def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
+    from reports.checks import _clear
+
+    files.folder(tmp_path / "a")
+    for name in ("check.json", "heuristic.png"):
+        files.write(tmp_path / "a" / name, b"ours")
+    (tmp_path / "a/reference.png").write_bytes(b"mine")
+    _clear(tmp_path / "a")
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {"reference.png", files.MARK}
+    (tmp_path / "a/reference.png").unlink()
+    _clear(tmp_path / "a")
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
+    """Files and folders of both kinds, written and replaced in any order, links included."""
+    random, mine, ours = Random(seed), {}, set()
+    names = [f"n{number}" for number in range(6)]
+    for step in range(60):
+        name, inner = random.choice(names), random.choice(names)
+        place, action = tmp_path / name, random.randrange(5)
+        if action == 0 and not place.exists() and not place.is_symlink():
+            place.write_text(f"mine {step}")
+            mine[place] = f"mine {step}"
+        elif action == 1:
+            place.mkdir(exist_ok=True) if not place.exists() and not place.is_symlink() else None
+            if place.is_dir() and (place / inner) not in ours and not (place / inner).exists():
+                (place / inner).write_text(f"mine {step}")
+                mine[place / inner] = f"mine {step}"
+        elif action == 2:
+            try:
+                files.write(place, "ours")
+            except InputError:
+                continue
+            assert place not in mine
+        else:
+            try:
+                with files.replacing_folder(place) as new:
+                    if random.random() < 0.3:
+                        raise KeyboardInterrupt
+                    for chosen in random.sample(names, 2):
+                        if (place / chosen) not in mine:
+                            (new / chosen).write_text("ours")
+                            ours.add(place / chosen)
+            except (InputError, KeyboardInterrupt):
+                continue
+        assert all(path.read_text() == text for path, text in mine.items())
+    assert not [path for path in tmp_path.iterdir() if "fotismos-" in path.name]
