@@ -8,18 +8,19 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 
-from comparisons import passes, record, reference_limits, regions, statistics
-from comparisons.histograms import histogram
-from comparisons.metrics import METRICS
+from comparisons import passes, record
+from comparisons.departure import limits, regions, statistics
+from comparisons.departure.histogram import histogram
+from comparisons.departure.marks import significance
+from comparisons.departure.metrics import METRICS
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
-from comparisons.significance import significance
 from heuristic.errors import InputError
-from reference import halves
-from reference.gbuffer import gbuffer, image_size
-from reference.halves import Pair
-from reference.plan import Plan, plan, sampler
-from reference.rendering import Renderer, physical_integrator, variant
+from reference.pairing import halves
+from reference.pairing.halves import Pair
+from reference.planning.planner import Plan, plan, sampler
+from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.renderer import Renderer, physical_integrator, variant
 
 LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
@@ -86,7 +87,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
 
     Parameters
     ----------
-    source : reference.scene.Source
+    source : reference.scene.graph.Source
         The scene.
     options : Options, optional
         What is rendered, and how it is judged.
@@ -124,8 +125,8 @@ def compare(source, options=None, progress=None, command="", kept=None):
     stages.done("sums of passes", rendering if estimates.new else 0.0)
     metrics, images = _measure(estimates, surface, options)
     stages.done("metrics")
-    limits = reference_limits.find(
-        reference_limits.of_scene(ready.scene, width, height),
+    faults = limits.find(
+        limits.of_scene(ready.scene, width, height),
         estimates.reference.mean,
         estimates.reference.standard_error,
         images.counted,
@@ -144,7 +145,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         "viewing": options.viewing.record(),
         "metrics": metrics,
         "pixels": {"counted": int(images.counted.sum()), "total": width * height},
-        "limits": limits.data(),
+        "limits": faults.data(),
         "regions": [region.data() for region in found],
         "histograms": {
             name: histogram(images.maps[name][images.counted]).data() for name in METRICS

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from comparisons.spaces import DEFAULT_VIEWING, Viewing
+from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference.pairing import Convention
+from reference.pairing.factors import Convention
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Options:
     Parameters
     ----------
     seed
-        Of the run; each pass hashes its own from it (:func:`reference.rendering.pass_seed`).
+        Of the run; each pass hashes its own from it (`pass_seed`).
     spp
         Samples a pixel in all, in place of the plan's. They are split into the plan's number of
         passes, or fewer where that leaves less than 4 a pass, at least 2. With ``noise``, the

@@ -15,8 +15,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from comparisons.metrics import METRICS
-from reference.rendering import Accumulator, Estimate, Mean, pass_seed
+from comparisons.departure.metrics import METRICS
+from reference.rendering.renderer import Accumulator, Estimate, Mean, pass_seed
 
 WAVEFRONT = 2**24
 """Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
@@ -41,7 +41,7 @@ def schedule(plan, pixels, spp=None, noise=None):
 
     Parameters
     ----------
-    plan : reference.plan.Plan
+    plan : reference.planning.planner.Plan
         Its samples and passes, which hold where nothing else is asked for.
     pixels
         Of the image.

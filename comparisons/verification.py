@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from comparisons.compare import LEVEL, Options, prepare
-from comparisons.significance import significance
-from reference import halves
-from reference.gbuffer import gbuffer, image_size
-from reference.rendering import Accumulator, Renderer, Stream, pass_seed
+from comparisons.departure.marks import significance
+from reference.pairing import halves
+from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.renderer import Accumulator, Renderer, Stream, pass_seed
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few

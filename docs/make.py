@@ -17,11 +17,13 @@ from nbclient import NotebookClient
 
 from comparisons import atomic
 from comparisons.compare import Options, compare
-from comparisons.scenes import builtin
+from comparisons.gallery.builtin import builtin
 from heuristic import equations
 from heuristic.interpolation import Interpolation
-from reference.scene import set_variant
-from reports import figures, images, tables
+from reference.scene.graph import set_variant
+from reports.charts import figures
+from reports.files import images
+from reports.terminal import tables
 
 DOCS = Path(__file__).parent
 SIDE, SAMPLES = 192, 64

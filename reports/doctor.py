@@ -32,11 +32,11 @@ def examine(variants):
 
 def _render(variant):
     """Render a small figure in a variant, and say how that went."""
-    from reference.scene import set_variant
+    from reference.scene.graph import set_variant
 
     set_variant(variant)
     from comparisons.compare import Options, compare
-    from comparisons.scenes import builtin
+    from comparisons.gallery.builtin import builtin
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"

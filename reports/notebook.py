@@ -19,8 +19,9 @@ from typing import Any
 from comparisons.compare import compare as compare_halves
 from comparisons.options import Options
 from comparisons.record import Comparison
-from reference.scene import Source, set_variant
-from reports import output, page
+from reference.scene.graph import Source, set_variant
+from reports.page import page
+from reports.run import output
 
 HEIGHT = 720
 """Pixels of the frame; what is longer scrolls."""

@@ -11,12 +11,12 @@ import mitsuba as mi
 import pytest
 
 from heuristic import plugins
-from reference import direct
+from reference.rendering import direct
 from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:
-    pytest_plugins = ["reports.pytest_plugin"]
+    pytest_plugins = ["reports.ci.pytest_plugin"]
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.cost.run import Study
+from comparisons.cost.cost import Study
 from tests import records
 
 WIDTH, HEIGHT = 12, 8

@@ -1,6 +1,6 @@
 """A record as in ``comparison.json``, with made-up numbers, each of them different."""
 
-from comparisons.metrics import Viewing
+from comparisons.departure.metrics import Viewing
 
 
 def metric(mean):

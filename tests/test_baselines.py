@@ -2,7 +2,7 @@
 
 import pytest
 
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 
 SPECTRAL = ("narrow-band-lamp", "metameric-pair")
 

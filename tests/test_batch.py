@@ -14,6 +14,7 @@ from random import Random
 import jsonschema
 import pytest
 
+from tests.schemas import schema
 from tests.small_scene import SCENE
 
 ROOT = Path(__file__).parents[1]
@@ -78,8 +79,8 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
 
 def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
     from comparisons.options import Options
-    from reference.scene import Source
-    from reports.passes import key_of
+    from reference.scene.graph import Source
+    from reports.run.kept import key_of
 
     texture = (
         '<texture type="bitmap" name="diffuse_reflectance">'
@@ -95,7 +96,7 @@ def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
 
 
 def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypatch):
-    from reports import finished, output
+    from reports.run import finished, output
 
     written = []
     keep = output.write_scene
@@ -133,8 +134,7 @@ def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_pa
     assert all((out / name / "comparison.json").is_file() for name in "abc")
     assert not (out / "aa").exists()
     record = json.loads((out / "run.json").read_text(encoding="utf-8"))
-    schema = (ROOT / "reports/run.schema.json").read_text(encoding="utf-8")
-    jsonschema.validate(record, json.loads(schema))
+    jsonschema.validate(record, schema("run"))
     failures = record["failures"]
     assert [failure["scene"] for failure in failures] == ["aa"]
     assert "SIGABRT" in (out / "index.html").read_text(encoding="utf-8")

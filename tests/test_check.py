@@ -11,11 +11,11 @@ from comparisons.check import baseline, check
 from comparisons.check.measurement import measure
 from comparisons.check.moved import differences, moved
 from comparisons.compare import prepare
+from comparisons.departure.spaces import DEFAULT_VIEWING
+from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from comparisons.scenes import SCENES
-from comparisons.spaces import DEFAULT_VIEWING
 from heuristic.errors import InputError
-from reference.scene import Source
+from reference.scene.graph import Source
 
 SMALL = Options(resolution=(64, 64))
 

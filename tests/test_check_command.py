@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from reports import annotations, cli, junit
-from tests.test_cli import ROOT
+from reports import cli
+from reports.ci import annotations, junit
+from tests.schemas import schema
 
-SCHEMA = json.loads((ROOT / "reports/baseline.schema.json").read_text(encoding="utf-8"))
+SCHEMA = schema("baseline")
 FAST = ("--spp", 32, "--resolution", "16x12")
 SERVICES = ("GITHUB_ACTIONS", "GITLAB_CI", "TF_BUILD", "TEAMCITY_VERSION")
 

@@ -11,7 +11,7 @@ from scipy import special, stats
 from comparisons.check import measurement as measuring
 from comparisons.check import moved as moving
 from comparisons.check.measurement import Colours, Measurement, Metric, measurement
-from comparisons.spaces import DEFAULT_VIEWING
+from comparisons.departure.spaces import DEFAULT_VIEWING
 
 PASSES = 16
 

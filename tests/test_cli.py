@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from tests.schemas import schema
 from tests.small_scene import SCENE
 
 ROOT = Path(__file__).parent.parent
@@ -21,10 +22,10 @@ def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
     code, printed, messages = run("compare", scene_file, "fig-8-9", "-o", out, "--spp", 4)
     assert (code, messages) == (0, "")
     assert str(out / "index.html") in printed
-    schema = json.loads((ROOT / "reports/comparison.schema.json").read_text(encoding="utf-8"))
+    published = schema("comparison")
     for name, scene, size in (("my-scene", "my scene", [24, 16]), ("fig-8-9",) * 2 + ([512, 512],)):
         record = json.loads((out / name / "comparison.json").read_text(encoding="utf-8"))
-        jsonschema.validate(record, schema)
+        jsonschema.validate(record, published)
         assert record["scene"] == scene
         assert record["resolution"] == size
         assert (out / name / "comparison.exr").stat().st_size > 0
@@ -117,7 +118,7 @@ def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypat
     def fail(*_args, **_kwargs):
         raise RuntimeError("the disk is full")
 
-    monkeypatch.setattr("reports.exr.write", fail)
+    monkeypatch.setattr("reports.files.exr.write", fail)
     with pytest.raises(RuntimeError, match="disk"):
         run("compare", scene_file, "-o", out, "--spp", 4, "--seed", 1)
     assert (out / "my-scene/comparison.json").read_bytes() == before

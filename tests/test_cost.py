@@ -10,27 +10,27 @@ import numpy as np
 import pytest
 
 from comparisons.compare import prepare
-from comparisons.cost.between import Between
+from comparisons.cost.cost import cost
 from comparisons.cost.effort import WIDTH, Effort, reduced
 from comparisons.cost.ladder import Method, ladder
 from comparisons.cost.methods import Methods
 from comparisons.cost.pairs import Pairs
-from comparisons.cost.run import cost
-from comparisons.metrics import delta_e_2000
+from comparisons.departure.metrics import delta_e_2000
+from comparisons.effects.between import Between
+from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from comparisons.scenes import SCENES
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference.effects import Effect
-from reference.rendering import Accumulator
-from reference.scene import Source, set_variant
-from reports import cli, cost_tables
-from reports import cost as results
+from reference.planning.effects import Effect
+from reference.rendering.renderer import Accumulator
+from reference.scene.graph import Source, set_variant
+from reports import cli
+from reports.run import cost_files as results
+from reports.terminal import cost_tables
+from tests.schemas import schema
 from tests.test_plan import scene as described
 
-SCHEMA = json.loads(
-    (Path(results.__file__).parent / "cost.schema.json").read_text(encoding="utf-8")
-)
+SCHEMA = schema("cost")
 TINY = Effort(rounds=2, largest=4, depths=(3,), reference_spp=4, replicates=3, replicate_spp=4)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import vl_convert
 
-from reports import charts, labels
+from reports.charts import error_over_time, labels
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -51,7 +51,7 @@ def data(points, floor=0.4):
     ids=["one point", "no error at all", "ladder"],
 )
 def test_it_draws_and_names_axes_units_and_every_rung(points, floor):
-    svg = vl_convert.vegalite_to_svg(charts.error_over_time(data(points, floor)))
+    svg = vl_convert.vegalite_to_svg(error_over_time.error_over_time(data(points, floor)))
     for word in ("time for one image (ms", "mean ΔE2000", "Pareto", *(p["rung"] for p in points)):
         assert word in svg
     assert "NaN" not in svg
@@ -59,8 +59,10 @@ def test_it_draws_and_names_axes_units_and_every_rung(points, floor):
 
 def test_points_lie_where_their_axes_say():
     points = [point("full plan", n, 0.02 * n, 8 / n**0.5) for n in (4, 16, 64)]
-    rows = [charts._row(p) for p in points]
-    x = charts._Axis(min(r["low"] for r in rows), max(r["high"] for r in rows), charts.WIDTH)
+    rows = [error_over_time._row(p) for p in points]
+    x = error_over_time._Axis(
+        min(r["low"] for r in rows), max(r["high"] for r in rows), error_over_time.WIDTH
+    )
     pixels = [x.pixel(row["time"]) for row in rows]
     assert np.diff(pixels)[0] == pytest.approx(np.diff(pixels)[1])
-    assert 0 < pixels[0] < pixels[-1] < charts.WIDTH
+    assert 0 < pixels[0] < pixels[-1] < error_over_time.WIDTH

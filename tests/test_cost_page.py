@@ -1,18 +1,19 @@
 """What a page and its files show of a study of cost: the record's figures, and what dominates."""
 
 import json
-from pathlib import Path
 
 import jsonschema
 import pytest
 
-from reports import cost, cost_overview, output, page
-from reports.run import Run
+from reports.page import cost_overview, page
+from reports.run import cost_files, output
+from reports.run.stages import Run
 from tests import cost_records, records
 from tests.browser.conftest import noisy
+from tests.schemas import schema
 from tests.test_page import HOSTILE, Page
 
-SCHEMA = json.loads((Path(cost.__file__).parent / "cost.schema.json").read_text(encoding="utf-8"))
+SCHEMA = schema("cost")
 
 
 @pytest.fixture(scope="module")
@@ -22,18 +23,18 @@ def study():
 
 def shown(study, record=None, **more):
     """The page of one scene with its study."""
-    made = cost.documents(study)
+    made = cost_files.documents(study)
     view = {
         "record": record or records.record(),
         "images": {},
-        "charts": cost.figures(study.data),
-        "cost": cost.view(study, made),
+        "charts": cost_files.figures(study.data),
+        "cost": cost_files.view(study, made),
     }
     return page.render([view], **more)
 
 
 def test_the_made_up_record_holds_to_the_schema(study):
-    made = json.loads(cost.documents(study)["cost.json"])
+    made = json.loads(cost_files.documents(study)["cost.json"])
     jsonschema.Draft202012Validator(SCHEMA).validate(made)
 
 
@@ -70,7 +71,7 @@ def test_names_from_files_stay_text(study):
 
 
 def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
-    found = cost.view(study, cost.documents(study))["effects"]
+    found = cost_files.view(study, cost_files.documents(study))["effects"]
     assert found["names"] == list(cost_records.EFFECTS)
     assert len(set(found["colours"])) == 3
     rows = [found["map"][start : start + 12] for start in range(0, 96, 12)]
@@ -80,9 +81,9 @@ def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
 
 
 def test_every_effect_with_a_price_has_a_colour_of_its_own():
-    from comparisons.cost import between
-    from reference.effects import Effect
-    from reports.effects import COLOURS
+    from comparisons.effects import between
+    from reference.planning.effects import Effect
+    from reports.charts.price_chart import COLOURS
 
     heuristic_only = {Effect.EMISSION, Effect.AMBIENT, Effect.DIFFUSE, Effect.SPECULAR}
     assert set(COLOURS) == set(Effect) - heuristic_only

@@ -6,9 +6,9 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from comparisons.cost import shapley
 from comparisons.cost.front import Point, equal_error, equal_time, pareto
-from comparisons.cost.measure import interval
+from comparisons.cost.timing import interval
+from comparisons.effects import shapley
 from tests.benchmarks import cost as repeats
 
 NOISY = [Point("noise alone", n, 0.01 * n, 8 / sqrt(n)) for n in (1, 4, 16, 64)]

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import heuristic
-from comparisons import metrics
+from comparisons.departure import metrics
 from heuristic import terms
-from reference import pairing
+from reference.pairing import factors
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("heuristic", "reference", "comparisons", "reports")
@@ -37,8 +37,8 @@ SHOWN_BY_EXAMPLE = (
     heuristic.shade,
     *(terms.diffuse, terms.specular, terms.attenuation, terms.clamped_attenuation),
     *(terms.normalisation, terms.spot_falloff),
-    *(pairing.alpha_of, pairing.exponent_of, pairing.specular_albedo),
-    *(pairing.to_roughplastic, pairing.to_phong),
+    *(factors.alpha_of, factors.exponent_of, factors.specular_albedo),
+    *(factors.to_roughplastic, factors.to_phong),
     *(metrics.delta_e_2000, metrics.delta_e_itp, metrics.delta_e_cam16ucs),
     *(metrics.rmse, metrics.log2_luminance_ratio),
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.cost.dominance import LEAST, NONE, UNCOUNTED, dominating, in_region
+from comparisons.effects.dominance import LEAST, NONE, UNCOUNTED, dominating, in_region
 
 ALL = np.ones((4, 6), bool)
 

@@ -7,8 +7,9 @@ import zlib
 import numpy as np
 import pytest
 
-from comparisons.metrics import METRICS
-from reports import embedding, exr
+from comparisons.departure.metrics import METRICS
+from reports.files import exr
+from reports.page import embedding
 
 
 def value_of(code, digits):

@@ -6,7 +6,7 @@ import OpenEXR
 import pytest
 
 from heuristic.errors import InputError
-from reports import exr
+from reports.files import exr
 
 CONTRACT = {
     *(f"heuristic.{c}" for c in "RGB"),

@@ -7,7 +7,7 @@ sums are Mitsuba's in one and the kernel's in the other.
 import mitsuba as mi
 import pytest
 
-from comparisons.scenes import SCENES, THREE_LIGHTS, VIEWER_C
+from comparisons.gallery.builtin import SCENES, THREE_LIGHTS, VIEWER_C
 from tests import checks
 
 FIGURES = [name for name in SCENES if name.startswith("fig-8")]

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from drjit.llvm.ad import Array3f64
 
+from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.fit import identify, optimise
 from comparisons.fit.fit import FitOptions, fit
 from comparisons.fit.loss import LOSSES
 from comparisons.fit.model import Model
 from comparisons.fit.parameters import bounds, parameters, start
 from comparisons.fit.recorder import Recorder
+from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
-from comparisons.scenes import builtin
-from comparisons.spaces import DEFAULT_VIEWING
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.terms import normalisation
-from reference.rendering import Renderer
-from reference.scene import Source
+from reference.rendering.renderer import Renderer
+from reference.scene.graph import Source
 
 SIZE = 40
 RED = {"k_a": (0.3, 0.1, 0.1), "k_d": (0.6, 0.2, 0.1), "k_s": 0.4, "n": 12.0}

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from reports import cli
+from tests.schemas import schema
 
-SCHEMA = json.loads((Path(cli.__file__).parent / "fit.schema.json").read_text(encoding="utf-8"))
+SCHEMA = schema("fit")
 CORPUS = Path(__file__).parent / "corpus"
 SMALL = ("--resolution", "16x12", "--spp", 4)
 

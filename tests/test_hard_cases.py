@@ -4,9 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
+from comparisons.departure.limits import LOST
 from comparisons.hard import catalogue, physical, terminators
 from comparisons.hard.cases import Convention, error, evaluate
-from comparisons.reference_limits import LOST
 from tests import conftest
 
 CASES = {case.name: case for case in catalogue.CASES}

@@ -5,13 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from comparisons.hard import record as hard_record
+from comparisons.hard import collection as hard_record
 from comparisons.hard.cases import Convention, Outcome, evaluate
 from comparisons.hard.catalogue import CASES
+from comparisons.hard.collection import HardCases, Picture
 from comparisons.hard.furnace import Furnace
-from comparisons.hard.record import HardCases, Picture
-from reports import hard_cases as section
-from reports import output, page
+from reports.page import hard_cases as section
+from reports.page import page
+from reports.run import output
 
 
 @pytest.fixture

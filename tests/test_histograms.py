@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from comparisons.histograms import BINS_A_DECADE, DECADES, histogram
-from reports import histograms
+from comparisons.departure.histogram import BINS_A_DECADE, DECADES, histogram
+from reports.charts import histograms
 from tests import records
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons.metrics import LOG2_RANGE, METRICS
-from reports import images
+from comparisons.departure.metrics import LOG2_RANGE, METRICS
+from reports.files import images
 
 
 def pixels_of(picture):

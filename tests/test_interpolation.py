@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comparisons.scenes import builtin
+from comparisons.gallery.builtin import builtin
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade
 from heuristic.errors import InputError
 from heuristic.interpolation import (
@@ -21,7 +21,7 @@ from heuristic.interpolation import (
 )
 from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
 from heuristic.vertex_normals import Weighting
-from reference.scene import Reference, properties
+from reference.scene.graph import Reference, properties
 from tests import oracle
 from tests.test_normals import rows, uv_sphere
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from comparisons.metrics import METRICS, log2_luminance_ratio, require_finite, rmse
-from comparisons.spaces import Viewing
+from comparisons.departure.metrics import METRICS, log2_luminance_ratio, require_finite, rmse
+from comparisons.departure.spaces import Viewing
 from heuristic.errors import NonFiniteError
 
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())

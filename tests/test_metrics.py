@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.exposure import best_exposure, best_exposure_rmse
-from comparisons.metrics import (
+from comparisons.departure.exposure import best_exposure, best_exposure_rmse
+from comparisons.departure.marks import critical_t, significance
+from comparisons.departure.metrics import (
     LOG2_EPSILON,
     METRICS,
     Viewing,
@@ -19,8 +20,7 @@ from comparisons.metrics import (
     require_finite,
     rmse,
 )
-from comparisons.significance import critical_t, significance
-from comparisons.statistics import (
+from comparisons.departure.statistics import (
     noise_floor,
     summarise,
     summarise_log2_luminance,

@@ -10,7 +10,7 @@ import drjit as dr
 import drjit.llvm.ad
 import pytest
 
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 from heuristic import DirectionalLight, Material, shading, terms
 from heuristic.plugins import integrator
 from tests import checks

@@ -10,10 +10,11 @@ import pytest
 from comparisons.compare import prepare
 from comparisons.options import Options
 from comparisons.verification import verify
-from reference import Convention, Source, albedo, halves
-from reference.albedo import RoughPlastic
-from reference.measured_lights import beam, mean_radiance
-from reference.nearest import nearest_of
+from reference import Convention, Source
+from reference.pairing import albedo, halves
+from reference.pairing.albedo import RoughPlastic
+from reference.pairing.lights.measured import beam, mean_radiance
+from reference.pairing.nearest import nearest_of
 from tests.test_physics import look_at
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter

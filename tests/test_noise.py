@@ -13,11 +13,11 @@ import pytest
 from scipy.special import stdtrit
 
 from comparisons.compare import prepare
-from comparisons.metrics import METRICS
+from comparisons.departure.metrics import METRICS
+from comparisons.departure.statistics import noise_floor
+from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from comparisons.scenes import SCENES
-from comparisons.statistics import noise_floor
-from reference.rendering import Accumulator
+from reference.rendering.renderer import Accumulator
 
 SIZE, PASSES, SPP, FEW = 12, 16, 64, 4
 

@@ -10,7 +10,8 @@ import pytest
 
 from comparisons import atomic
 from heuristic.errors import InputError
-from reports import files, output
+from reports.files import ownership
+from reports.run import output
 
 SMALL = ("--spp", 2, "--resolution", "12x12")
 
@@ -110,7 +111,7 @@ def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
     for name in ("a", "b"):
         old = partial(tmp_path, name, dead, kind="old")
         old.mkdir()
-        files.claim(old)
+        ownership.claim(old)
         (old / "comparison.json").write_text(f"old {name}")
     (tmp_path / "b").mkdir()
     (tmp_path / "b/comparison.json").write_text("b")
@@ -121,14 +122,14 @@ def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
 
 
 def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
-    from reports.checks import _clear
+    from reports.ci.checks import _clear
 
-    files.folder(tmp_path / "a")
+    ownership.folder(tmp_path / "a")
     for name in ("check.json", "heuristic.png"):
-        files.write(tmp_path / "a" / name, b"ours")
+        ownership.write(tmp_path / "a" / name, b"ours")
     (tmp_path / "a/reference.png").write_bytes(b"mine")
     _clear(tmp_path / "a")
-    assert {path.name for path in (tmp_path / "a").iterdir()} == {"reference.png", files.MARK}
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {"reference.png", ownership.MARK}
     (tmp_path / "a/reference.png").unlink()
     _clear(tmp_path / "a")
     assert not (tmp_path / "a").exists()
@@ -152,13 +153,13 @@ def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
                 mine[place / inner] = f"mine {step}"
         elif action == 2:
             try:
-                files.write(place, "ours")
+                ownership.write(place, "ours")
             except InputError:
                 continue
             assert place not in mine
         else:
             try:
-                with files.replacing_folder(place) as new:
+                with ownership.replacing_folder(place) as new:
                     if random.random() < 0.3:
                         raise KeyboardInterrupt
                     for chosen in random.sample(names, 2):

@@ -1,7 +1,6 @@
 """The record's schema, and the page: its numbers are the record's and it loads nothing."""
 
 import copy
-import json
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -10,14 +9,15 @@ import numpy as np
 import pytest
 
 import reports
-from comparisons.metrics import METRICS
+from comparisons.departure.metrics import METRICS
 from heuristic.equations import Entry
-from reports import embedding, images, page, printing
+from reports.files import images
+from reports.page import embedding, page
+from reports.terminal import printing
 from tests import records
+from tests.schemas import schema
 
-SCHEMA = json.loads(
-    (Path(page.__file__).parent / "comparison.schema.json").read_text(encoding="utf-8")
-)
+SCHEMA = schema("comparison")
 HOSTILE = "../\"><script>alert('x')</script><img src=http://example.org/x onerror=alert(1)>"
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 from heuristic.errors import InputError
-from reference import Convention, Source, albedo, halves, pairing
-from reference.pairing import Phong
+from reference import Convention, Source
+from reference.pairing import albedo, factors, halves
+from reference.pairing.factors import Phong
 from tests.test_physics import look_at
 
 MATCHED, LITERAL = Convention.MATCHED, Convention.LITERAL
@@ -57,7 +58,7 @@ def monte_carlo_albedo(plastic, size=700, batches=8):
     """Albedo of Mitsuba's roughplastic under light from the normal, with its standard error.
 
     Cosine-weighted directions, one in each of ``size``² cells, ``batches`` times: it shares nothing
-    with the Gauss-Legendre rule of `reference.albedo`. Returns mean and error of both parts.
+    with the Gauss-Legendre rule of `pairing.albedo`. Returns mean and error of both parts.
     """
     bsdf = mi.load_dict(
         {
@@ -97,7 +98,7 @@ def monte_carlo_albedo(plastic, size=700, batches=8):
 @pytest.mark.parametrize("phong", REACHABLE.values(), ids=REACHABLE.keys())
 def test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to(rgb, phong):
     """``k_d`` and ``2 k_s / (n + 2)``, within 5 standard errors of an independent quadrature."""
-    plastic, misses = pairing.to_roughplastic(phong, MATCHED)
+    plastic, misses = factors.to_roughplastic(phong, MATCHED)
     assert misses == []
     mean, error = monte_carlo_albedo(plastic)
     wanted = np.array([phong.k_d, 2 * np.array(phong.k_s) / (phong.n + 2)])
@@ -129,15 +130,15 @@ def test_the_albedo_of_the_lobe(form, n):
     integral, _ = quad(lambda t: np.cos(t / part) ** n * np.cos(t) * np.sin(t), 0, pi / 2)
     expected = 2 * pi * (0.7 / pi) * integral
     plain = Phong((0.5,) * 3, (0.7,) * 3, n, form=form)
-    np.testing.assert_allclose(pairing.specular_albedo(plain), expected, rtol=1e-9)
+    np.testing.assert_allclose(factors.specular_albedo(plain), expected, rtol=1e-9)
     normalised = Phong((0.5,) * 3, (0.7,) * 3, n, form=form, normalised=True)
-    np.testing.assert_allclose(pairing.specular_albedo(normalised), 0.7, rtol=1e-9)
+    np.testing.assert_allclose(factors.specular_albedo(normalised), 0.7, rtol=1e-9)
 
 
 @pytest.mark.parametrize("phong", REACHABLE.values(), ids=REACHABLE.keys())
 def test_there_and_back_gives_the_same_phong(rgb, phong):
-    plastic, _ = pairing.to_roughplastic(phong, MATCHED)
-    back, misses = pairing.to_phong(plastic, MATCHED)
+    plastic, _ = factors.to_roughplastic(phong, MATCHED)
+    back, misses = factors.to_phong(plastic, MATCHED)
     assert misses == []
     np.testing.assert_allclose(back.k_d, phong.k_d, rtol=2e-5)
     np.testing.assert_allclose(back.k_s, phong.k_s, rtol=2e-5)
@@ -147,9 +148,9 @@ def test_there_and_back_gives_the_same_phong(rgb, phong):
 @pytest.mark.parametrize("form", ["phong", "blinn"])
 def test_roughness_and_exponent_are_inverse_to_each_other(form):
     for n in (0.0, 1.0, 9.0, 1000.0):
-        assert pairing.exponent_of(pairing.alpha_of(n, form), form) == pytest.approx(n, abs=1e-9)
-    assert pairing.alpha_of(0, form) == 1
-    assert pairing.exponent_of(2.0, form) == 0
+        assert factors.exponent_of(factors.alpha_of(n, form), form) == pytest.approx(n, abs=1e-9)
+    assert factors.alpha_of(0, form) == 1
+    assert factors.exponent_of(2.0, form) == 0
 
 
 @pytest.mark.parametrize("form", ["phong", "blinn"])
@@ -160,7 +161,7 @@ def test_a_matched_highlight_is_as_wide(rgb, form):
     across the lobe.
     """
     n = 400.0
-    plastic, _ = pairing.to_roughplastic(Phong((0.1,) * 3, (2.0,) * 3, n, form=form), MATCHED)
+    plastic, _ = factors.to_roughplastic(Phong((0.1,) * 3, (2.0,) * 3, n, form=form), MATCHED)
     half = np.arccos(0.5 ** (1 / n)) * (2 if form == "blinn" else 1)
     bsdf = mi.load_dict(
         {"type": "roughplastic", "alpha": plastic.alpha, "int_ior": plastic.int_ior}
@@ -178,7 +179,7 @@ def test_a_matched_highlight_is_as_wide(rgb, form):
 @pytest.mark.parametrize("k_s", [1e-6, 1e-8, 1e-12])
 def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb, k_s):
     """A smooth surface reflects ``((ior - 1) / (ior + 1))^2``, here ``2 k_s / (n + 2)``."""
-    plastic, misses = pairing.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
+    plastic, misses = factors.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
     reflected = ((plastic.int_ior - 1) / (plastic.int_ior + 1)) ** 2
     faintest = 2.5e-9
     assert reflected == pytest.approx(max(2 * k_s / 102, faintest), rel=0.05)
@@ -187,7 +188,7 @@ def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb, k_s):
 
 def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
     """And what it reaches instead is what the record says, by the independent quadrature."""
-    plastic, misses = pairing.to_roughplastic(UNREACHABLE, MATCHED)
+    plastic, misses = factors.to_roughplastic(UNREACHABLE, MATCHED)
     assert misses
     mean, error = monte_carlo_albedo(plastic)
     wanted = {"diffuse": 0.5, "specular": 0.28}
@@ -201,7 +202,7 @@ def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
 
 def test_the_nearest_plastic_is_taken_where_none_reaches(rgb):
     """No index of refraction and reflectance come nearer, in the sum of squares of both parts."""
-    plastic, _ = pairing.to_roughplastic(UNREACHABLE, MATCHED)
+    plastic, _ = factors.to_roughplastic(UNREACHABLE, MATCHED)
     wanted = np.array([0.5, 0.28])
 
     def distance(int_ior, rho):
@@ -214,13 +215,13 @@ def test_the_nearest_plastic_is_taken_where_none_reaches(rgb):
 
 
 def test_the_literal_convention_goes_by_name(rgb):
-    plastic, misses = pairing.to_roughplastic(UNREACHABLE, LITERAL)
+    plastic, misses = factors.to_roughplastic(UNREACHABLE, LITERAL)
     assert misses == []
     assert plastic.diffuse_reflectance == (0.5,) * 3
     assert plastic.int_ior == 1.5
     assert plastic.alpha == pytest.approx(sqrt(2 / 5))
     assert plastic.specular_reflectance == (1.0,) * 3
-    back, _ = pairing.to_phong(
+    back, _ = factors.to_phong(
         albedo.RoughPlastic((0.1, 0.2, 0.3), 0.2, 1.9, specular_reflectance=(0.5, 0.6, 0.7)),
         LITERAL,
     )
@@ -228,7 +229,7 @@ def test_the_literal_convention_goes_by_name(rgb):
 
 
 def test_a_literal_reflectance_above_1_is_limited_and_said_so(rgb):
-    plastic, misses = pairing.to_roughplastic(Phong((1.5, 0.5, 0.5), (0.1,) * 3, 9.0), LITERAL)
+    plastic, misses = factors.to_roughplastic(Phong((1.5, 0.5, 0.5), (0.1,) * 3, 9.0), LITERAL)
     assert plastic.diffuse_reflectance == (1.0, 0.5, 0.5)
     assert [(miss.wanted, miss.reached) for miss in misses] == [(1.5, 1.0)]
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from comparisons.compare import compare, prepare
-from comparisons.metrics import METRICS
+from comparisons.departure.metrics import METRICS
+from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.passes import LIMIT_SPP, WAVEFRONT, is_checked, schedule
-from comparisons.scenes import SCENES
 from heuristic.errors import InputError
-from reports.passes import KeptPasses, key_of
+from reports.run.kept import KeptPasses, key_of
 
 ROOT = Path(__file__).parents[1]
 SMALL = (24, 24)
@@ -25,9 +25,9 @@ import heuristic
 import os, signal, sys
 from comparisons.compare import compare
 from comparisons.options import Options
-from comparisons.scenes import SCENES
-from reference.scene import set_variant
-from reports.passes import KeptPasses
+from comparisons.gallery.builtin import SCENES
+from reference.scene.graph import set_variant
+from reports.run.kept import KeptPasses
 
 set_variant("llvm_ad_rgb")
 

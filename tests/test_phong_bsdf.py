@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 from tests import checks
 
 MATERIALS = {

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from comparisons.compare import Options, compare
-from comparisons.scenes import SCENES
-from reference import Source, halves, rendering
+from comparisons.gallery.builtin import SCENES
+from reference import Source
+from reference.pairing import halves
+from reference.rendering import renderer
 from tests import checks
 
 ALBEDO = np.array([0.7, 0.45, 0.2])
@@ -106,10 +108,10 @@ def test_a_diffuse_sphere_in_a_constant_environment(rgb):
         heuristic[0][inside], np.tile(radiance * ALBEDO, (inside.sum(), 1)), rtol=1e-5
     )
     pair = halves.pair(Source("a closed form", description))
-    renderer = rendering.Renderer(
+    half = renderer.Renderer(
         pair.physical.instantiate(), mi.load_dict({"type": "direct_all"}), 16, "reference"
     )
-    passes = np.array([np.array(renderer.render(seed)) for seed in range(8)], float)
+    passes = np.array([np.array(half.render(seed)) for seed in range(8)], float)
     mean = passes.reshape(8, -1, 3)[:, inside].mean(axis=1)  # each pass, over the sphere
     error = mean.std(axis=0, ddof=1) / np.sqrt(8)
     np.testing.assert_array_less(np.abs(mean.mean(axis=0) - radiance * ALBEDO), 4.5 * error + 1e-5)

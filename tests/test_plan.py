@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from comparisons.compare import Options, prepare
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 from comparisons.verification import verify
-from reference.effects import Effect
-from reference.environment import AlbedoTable
-from reference.plan import wants_spectra
-from reference.scene import Source
-from reference.structure import examine
+from reference.planning.effects import Effect
+from reference.planning.planner import wants_spectra
+from reference.planning.structure import examine
+from reference.rendering.environment import AlbedoTable
+from reference.scene.graph import Source
 
 WHITE = {"type": "diffuse", "reflectance": 0.7}
 BLACK = {"type": "diffuse", "reflectance": 0.0}
@@ -181,8 +181,10 @@ def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr("reference.rules.occlusion", lambda structure: (False, "wrong"))
-    monkeypatch.setattr("reference.rules.interreflection", lambda structure: (False, "wrong"))
+    monkeypatch.setattr("reference.planning.rules.occlusion", lambda structure: (False, "wrong"))
+    monkeypatch.setattr(
+        "reference.planning.rules.interreflection", lambda structure: (False, "wrong")
+    )
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
     assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
 

@@ -8,9 +8,10 @@ import colour
 import numpy as np
 import pytest
 
-from comparisons.histograms import histogram
-from comparisons.metrics import METRICS
-from reports import figures, images
+from comparisons.departure.histogram import histogram
+from comparisons.departure.metrics import METRICS
+from reports.charts import figures
+from reports.files import images
 from tests import records
 
 SRGB_VIEWING = (64 / np.pi * 0.2, 20.0)

@@ -80,7 +80,7 @@ def suite(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n", encoding="utf-8")
 
     def run(*arguments, **variables):
-        words = [sys.executable, "-m", "pytest", "-p", "reports.pytest_plugin", "-W", "error"]
+        words = [sys.executable, "-m", "pytest", "-p", "reports.ci.pytest_plugin", "-W", "error"]
         # Without the colours and services of the run that this is part of.
         environment = {
             k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "GITHUB"))
@@ -134,9 +134,8 @@ def test_without_llvm_tests_are_skipped_with_the_reason(suite):
 
 
 def test_the_plugin_imports_nothing_heavy():
-    code = (
-        "import reports.pytest_plugin, sys; print({'mitsuba', 'drjit', 'numpy'} & {*sys.modules})"
-    )
+    heavy = "{'mitsuba', 'drjit', 'numpy'}"
+    code = f"import reports.ci.pytest_plugin, sys; print({heavy} & {{*sys.modules}})"
     words = [sys.executable, "-c", code]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
@@ -146,4 +145,4 @@ def test_the_package_brings_the_plugin():
     import tomllib
 
     data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert data["project"]["entry-points"]["pytest11"] == {"fotismos": "reports.pytest_plugin"}
+    assert data["project"]["entry-points"]["pytest11"] == {"fotismos": "reports.ci.pytest_plugin"}

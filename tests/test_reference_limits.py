@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.reference_limits import (
+from comparisons.departure.limits import (
     SMALLEST_ALPHA,
     WEDGE_LOST,
     Lights,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons import regions
+from comparisons.departure import regions
 
 ALL = np.ones((96, 96), bool)
 

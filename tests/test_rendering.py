@@ -7,10 +7,11 @@ import pytest
 from scipy import stats
 
 from comparisons.compare import compare
+from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from comparisons.scenes import SCENES
 from heuristic.errors import NonFiniteError
-from reference import halves, rendering
+from reference.pairing import halves
+from reference.rendering import renderer
 from tests import checks
 from tests.test_physics import look_at
 
@@ -58,10 +59,10 @@ def lamp():
 
 
 def estimate(made, integrator, spp, passes, first_seed=0):
-    renderer = rendering.Renderer(made, integrator, spp, "a test")
-    total = rendering.Accumulator()
+    half = renderer.Renderer(made, integrator, spp, "a test")
+    total = renderer.Accumulator()
     for seed in range(passes):
-        total.add(renderer.render(first_seed + seed))
+        total.add(half.render(first_seed + seed))
     return total.estimate()
 
 
@@ -72,7 +73,7 @@ def estimate(made, integrator, spp, passes, first_seed=0):
 def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
     rng = np.random.default_rng(passes)
     images = rng.exponential(size=(passes, 5, 7, 3)).astype(np.float32)
-    total = rendering.Accumulator()
+    total = renderer.Accumulator()
     for image in images:
         total.add(mi.TensorXf(image))
     found, images = total.estimate(), images.astype(float)
@@ -88,7 +89,7 @@ def test_running_sums_keep_small_noise_on_a_large_level(rgb):
     """A sum of squares less the square of the sum would lose it."""
     rng = np.random.default_rng(1)
     images = 1e4 + rng.normal(size=(50, 4, 4, 3)) * 1e-3
-    total = rendering.Accumulator()
+    total = renderer.Accumulator()
     for image in images:
         total.add(mi.TensorXd(image))
     error = images.std(axis=0, ddof=1) / np.sqrt(50)
@@ -98,7 +99,7 @@ def test_running_sums_keep_small_noise_on_a_large_level(rgb):
 def test_the_noise_image_has_the_spread_of_the_mean(rgb):
     """Its root mean square is the standard error's, over many pixels."""
     rng = np.random.default_rng(2)
-    total = rendering.Accumulator()
+    total = renderer.Accumulator()
     for _ in range(8):
         total.add(mi.TensorXd(5 + rng.normal(size=(100, 100, 3))))
     found = total.estimate()
@@ -137,9 +138,9 @@ def test_another_seed_gives_other_camera_rays(rgb):
 
 def test_no_two_runs_have_a_pass_in_common():
     """Seeds of runs next to each other, of 64 passes each and of every stream."""
-    streams = list(rendering.Stream)
+    streams = list(renderer.Stream)
     seeds = [
-        rendering.pass_seed(seed, number, stream)
+        renderer.pass_seed(seed, number, stream)
         for seed in range(50)
         for number in range(64)
         for stream in streams
@@ -318,11 +319,11 @@ def broken_integrator(value, row, column):
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_pixel_that_is_no_number_is_an_error_that_names_it(rgb, value):
     made = mi.load_dict(scene(point=POINT))
-    renderer = rendering.Renderer(made, broken_integrator(value, 5, 17), 256, "reference image")
+    half = renderer.Renderer(made, broken_integrator(value, 5, 17), 256, "reference image")
     with pytest.raises(
         NonFiniteError, match=r"reference image, pass with seed 4: 1 pixels .* x = 17, y = 5"
     ):
-        renderer.render(4)
+        half.render(4)
 
 
 def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):
@@ -335,9 +336,9 @@ def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):
 
     monkeypatch.setattr(dr, "kernel_history", recorded)
     made = mi.load_dict(checks.with_film(SCENES["fig-8-9"].make(), 24, 4))
-    renderer = rendering.Renderer(made, None, 4, "heuristic image")
+    half = renderer.Renderer(made, None, 4, "heuristic image")
     for seed in (0, 1, 123_457):
-        renderer.render(seed)
+        half.render(seed)
     first, *others = [[kernel["hash"] for kernel in kernels] for kernels in histories]
     assert first
     assert others == [first, first]
@@ -346,10 +347,10 @@ def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):
 
 def test_times_are_of_all_passes(rgb):
     made = mi.load_dict(checks.with_film(SCENES["fig-8-9"].make(), 24, 4))
-    renderer = rendering.Renderer(made, None, 4, "heuristic image")
+    half = renderer.Renderer(made, None, 4, "heuristic image")
     for seed in range(5):
-        renderer.render(seed)
-    times = renderer.pass_times()
+        half.render(seed)
+    times = half.pass_times()
     assert times.passes == 5
     assert 0 < times.median < times.total
     assert times.first < times.total

@@ -4,20 +4,20 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons import spectral_scenes
 from comparisons.compare import Options, compare
-from comparisons.scenes import SCENES
+from comparisons.gallery import spectral
+from comparisons.gallery.builtin import SCENES
 
 
 def xyz(spectrum, illuminant):
     """Tristimulus values on the scenes' own grid of wavelengths, by a plain sum."""
-    matching = np.array(mi.cie1931_xyz(mi.Float(spectral_scenes.WAVELENGTHS)))
+    matching = np.array(mi.cie1931_xyz(mi.Float(spectral.WAVELENGTHS)))
     return matching @ (spectrum * illuminant)
 
 
 def test_metamers_have_one_colour_in_daylight_and_two_under_a_lamp(rgb):
-    plain, other = spectral_scenes.metamers()
-    wavelengths = spectral_scenes.WAVELENGTHS
+    plain, other = spectral.metamers()
+    wavelengths = spectral.WAVELENGTHS
     daylight = np.array(mi.cie_d65(mi.Float(wavelengths)))
     assert xyz(other, daylight) == pytest.approx(xyz(plain, daylight), rel=1e-5)
     metres = wavelengths * 1e-9

@@ -3,9 +3,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference import spots
-from reference.halves import pair
-from reference.scene import Source
+from reference.pairing.halves import pair
+from reference.pairing.lights import spots
+from reference.scene.graph import Source
 
 
 def solid_angle_error(cutoff, exponent, beam_width, edge=None):

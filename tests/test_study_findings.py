@@ -7,7 +7,8 @@ import pytest
 
 from comparisons.study import dataset, design, point, query
 from heuristic.errors import InputError
-from reports import study_charts, studying
+from reports.charts import study_charts
+from reports.run import study_files
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "studies/phong-roughplastic.toml"
@@ -50,12 +51,12 @@ def test_points_computed_again_are_as_in_the_dataset(part, every, rgb, shipped):
 
 def test_the_page_says_what_the_dataset_says(shipped):
     study, table = shipped
-    page = studying.page(study, FILE, PAGE)
-    assert studying.findings(study, table, page) == PAGE.read_text(encoding="utf-8")
+    page = study_files.page(study, FILE, PAGE)
+    assert study_files.findings(study, table, page) == PAGE.read_text(encoding="utf-8")
     changed = table.set_column(
         table.column_names.index("dE2000"), table.schema.field("dE2000"), table["rmse"]
     )
-    assert studying.findings(study, changed, page) != PAGE.read_text(encoding="utf-8")
+    assert study_files.findings(study, changed, page) != PAGE.read_text(encoding="utf-8")
 
 
 def test_each_finding_names_its_figure_and_each_figure_is_there(shipped):

@@ -10,11 +10,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.study import cluster, dataset, design, editing, point, processes, rendered, run
+from comparisons.study import cluster, dataset, design, editing, point, processes, rendered, running
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError
-from reference import halves
-from reference.scene import Source
+from reference.pairing import halves
+from reference.scene.graph import Source
 
 SMALL = "spp = 16\nresolution = [12, 12]"
 
@@ -92,7 +92,7 @@ def test_an_edited_scene_renders_as_one_made_anew(scene, rgb):
 
 def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, monkeypatch):
     wanted = study("alpha = [0.1, 0.2, 0.3, 0.4]\nlight_angle = [0, 60]", "lobe", "")
-    whole = run.run(wanted, tmp_path / "whole")
+    whole = running.run(wanted, tmp_path / "whole")
 
     def interrupted(given):
         for number, block in enumerate(given):
@@ -101,7 +101,7 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, mon
             yield block, point.rows(block)
 
     with pytest.raises(KeyboardInterrupt):
-        run.run(wanted, tmp_path / "cut", interrupted)
+        running.run(wanted, tmp_path / "cut", interrupted)
     half = next((tmp_path / "cut/points").glob("*.json"))
     half.write_text(half.read_text(encoding="utf-8")[:40], encoding="utf-8")
     done = []
@@ -111,11 +111,11 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, mon
             done.append(block.first)
             yield block, point.rows(block)
 
-    outcome = run.run(wanted, tmp_path / "cut", noted)
+    outcome = running.run(wanted, tmp_path / "cut", noted)
     assert len(done) == 8 - 3 + 1  # the one whose file is damaged is done again
     assert (outcome.done, outcome.at_hand, outcome.failed) == (6, 2, 0)
     assert outcome.table.equals(whole.table)
-    assert run.run(wanted, tmp_path / "cut").done == 0
+    assert running.run(wanted, tmp_path / "cut").done == 0
 
 
 def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
@@ -128,7 +128,7 @@ def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
             given.append(block)
             yield block, point.rows(block)
 
-    table = run.run(design.parse(twice), tmp_path, noted).table
+    table = running.run(design.parse(twice), tmp_path, noted).table
     assert len(given) == 2
     assert table["part"].to_pylist() == ["lobe", "lobe", "again", "again"]
     assert table["dE2000"].to_pylist()[:2] == table["dE2000"].to_pylist()[2:]
@@ -137,7 +137,7 @@ def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
 def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, monkeypatch):
     monkeypatch.setattr(processes, "WORTH_A_PROCESS", 1)
     wanted = study("alpha = [0.1, 0.2, 0.3]\nlight_angle = {from=0, to=85, steps=18}", "lobe", "")
-    alone = run.run(wanted, tmp_path / "a")
+    alone = running.run(wanted, tmp_path / "a")
 
     def killing(given):
         for number, done in enumerate(processes.over(2)(given)):
@@ -146,8 +146,8 @@ def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, mo
                 os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
 
     with pytest.raises(LostProcessError, match="run the same command again"):
-        run.run(wanted, tmp_path / "b", killing)
-    outcome = run.run(wanted, tmp_path / "b")
+        running.run(wanted, tmp_path / "b", killing)
+    outcome = running.run(wanted, tmp_path / "b")
     assert outcome.at_hand >= 3
     assert outcome.done < 54
     assert outcome.table.equals(alone.table)
@@ -176,18 +176,18 @@ def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(point, "_lobe", fails_once)
-        outcome = run.run(wanted, tmp_path)
+        outcome = running.run(wanted, tmp_path)
     assert outcome.failed == 1
     assert outcome.table["error"].to_pylist() == [None, "ZeroDivisionError: by nothing", None]
     assert outcome.table["dE2000"].to_pylist()[1] is None
     assert outcome.table["alpha"].to_pylist() == [0.1, 0.2, 0.3]
-    again = run.run(wanted, tmp_path)
+    again = running.run(wanted, tmp_path)
     assert (again.done, again.at_hand, again.failed) == (1, 2, 0)
 
 
 def test_the_dataset_says_units_meanings_and_where_it_comes_from(rgb, tmp_path):
     wanted = study("light_angle = [0, 30]", "lobe", "")
-    outcome = run.run(wanted, tmp_path)
+    outcome = running.run(wanted, tmp_path)
     dataset.write(tmp_path / "d.parquet", outcome.table)
     table = dataset.read(tmp_path / "d.parquet")
     assert table.equals(outcome.table, check_metadata=True)
@@ -204,18 +204,18 @@ def test_the_dataset_says_units_meanings_and_where_it_comes_from(rgb, tmp_path):
 
 def test_a_scene_of_ones_own_is_varied_by_paths(rgb, tmp_path):
     wanted = study("'white.reflectance' = [0.2, 0.9]", "cornell-box")
-    table = run.run(wanted, tmp_path).table
+    table = running.run(wanted, tmp_path).table
     assert table["white.reflectance"].to_pylist() == [0.2, 0.9]
     dark, bright = table["reference"].to_pylist()
     assert bright > 1.3 * dark
     assert table["interreflection"].to_pylist()[1] > 2 * table["interreflection"].to_pylist()[0]
     for path, expected in (("white.albedo", "white.reflectance"), ("floor.to_world", "no number")):
         with pytest.raises(InputError, match=expected):
-            run.run(study(f"'{path}' = 0.5", "cornell-box"), tmp_path)
+            running.run(study(f"'{path}' = 0.5", "cornell-box"), tmp_path)
     with pytest.raises(InputError, match="neither a file nor"):
-        run.run(study("'a.b' = 1", "nowhere"), tmp_path)
+        running.run(study("'a.b' = 1", "nowhere"), tmp_path)
     with pytest.raises(InputError, match="llvm_ad_spectral"):
-        run.run(study("'a.b' = 1", "metameric-pair"), tmp_path)
+        running.run(study("'a.b' = 1", "metameric-pair"), tmp_path)
 
 
 def test_steps_name_what_changes_the_image(rgb):
@@ -246,7 +246,7 @@ def pids(client):
 )
 def test_killed_workers_change_nothing(count, workers, rgb, tmp_path):
     wanted = study(MANY % count)
-    undisturbed = run.run(wanted, tmp_path / "a")
+    undisturbed = running.run(wanted, tmp_path / "a")
     shot = []
     with cluster.local(workers) as spread:
 
@@ -264,7 +264,7 @@ def test_killed_workers_change_nothing(count, workers, rgb, tmp_path):
                         os.kill(int(pid), signal.SIGKILL)
                         shot.append(pid)
 
-        outcome = run.run(wanted, tmp_path / "b", under_fire)
+        outcome = running.run(wanted, tmp_path / "b", under_fire)
     assert len(shot) >= 0.3 * workers
     assert outcome.failed == 0
     assert outcome.table.equals(undisturbed.table)

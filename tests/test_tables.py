@@ -7,7 +7,8 @@ from io import StringIO
 import pytest
 from markdown_it import MarkdownIt
 
-from reports import output, tables
+from reports.run import output
+from reports.terminal import tables
 from tests import records
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reports import cli, progress
+from reports import cli
+from reports.terminal import progress
 
 ROOT = Path(__file__).parent.parent
 COMMANDS = sorted(cli.cli.commands)

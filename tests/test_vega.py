@@ -3,7 +3,8 @@
 import json
 import re
 
-from reports import page, vega
+from reports.charts import vega
+from reports.page import page
 from tests import records
 from tests.test_page import HOSTILE, Page
 

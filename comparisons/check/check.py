@@ -11,7 +11,7 @@ from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import prepare
 from heuristic.errors import InputError
-from reference.preparation import film_size
+from reference.scene.preparation import film_size
 
 LONGEST = 64
 """Pixels of the longer side that a scene is measured at, where nothing else is asked for."""
@@ -75,7 +75,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
 
     Parameters
     ----------
-    source : reference.scene.Source
+    source : reference.scene.graph.Source
         The scene.
     options : comparisons.options.Options
         What is rendered; ``spp`` is over all passes, and the plan's where it is not given.

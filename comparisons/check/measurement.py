@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.metrics import METRICS, Array, log2_luminance_ratio, rmse
-from comparisons.spaces import Viewing
-from comparisons.statistics import noise_floor
-from reference.gbuffer import gbuffer
-from reference.rendering import pass_seed
+from comparisons.departure.metrics import METRICS, Array, log2_luminance_ratio, rmse
+from comparisons.departure.spaces import Viewing
+from comparisons.departure.statistics import noise_floor
+from reference.rendering.gbuffer import gbuffer
+from reference.rendering.renderer import pass_seed
 
 PASSES = 16
 """Enough for a t-test corrected for a hundred quantities to see five standard errors."""
@@ -122,7 +122,7 @@ def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, P
     ready : comparisons.compare.Prepared
         The scene; its renderers say how many samples a pass has.
     seed
-        Of the run; each pass hashes its own from it (:func:`reference.rendering.pass_seed`).
+        Of the run; each pass hashes its own from it (`pass_seed`).
     passes
         Independent passes, 2 or more.
     viewing

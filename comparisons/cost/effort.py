@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from itertools import count as count_from
 from itertools import takewhile
 
-from comparisons.cost import shapley
 from comparisons.cost.ladder import DEPTHS
+from comparisons.effects import shapley
 from heuristic.errors import InputError
-from reference.preparation import film_size
+from reference.scene.preparation import film_size
 
 DETERMINISTIC_SPP = 16
 """Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
@@ -35,7 +35,7 @@ class Effort:
         Replicates of each image for prices and parts, at least 3, and samples a pixel of each.
     exact_effects, orders
         Effects up to which every subset is rendered, and orders drawn where there are more
-        (:func:`comparisons.cost.shapley.shares`).
+        (:func:`comparisons.effects.shapley.shares`).
 
     Raises
     ------

@@ -8,7 +8,7 @@ that keeps their names.
 from dataclasses import dataclass, replace
 
 from heuristic.interpolation import Interpolation
-from reference.effects import Effect
+from reference.planning.effects import Effect
 
 DEPTHS = (3, 4, 5)
 """Depths of ``path`` that are rungs, as Mitsuba counts: 2 is direct light."""

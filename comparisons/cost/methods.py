@@ -3,14 +3,14 @@
 from dataclasses import replace
 from functools import cache
 
-from comparisons.cost.between import OF_BSDFS, Between
 from comparisons.cost.ladder import DEPTHS, ladder, scope
 from comparisons.cost.pairs import Pairs
+from comparisons.effects.between import OF_BSDFS, Between
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference.effects import Effect
-from reference.halves import INTEGRATOR, with_sampler
-from reference.rendering import Renderer, physical_integrator, variant
+from reference.pairing.halves import INTEGRATOR, with_sampler
+from reference.planning.effects import Effect
+from reference.rendering.renderer import Renderer, physical_integrator, variant
 
 
 class Methods:

@@ -3,7 +3,7 @@
 import mitsuba as mi
 
 from heuristic.interpolation import Interpolation
-from reference import halves
+from reference.pairing import halves
 
 
 class Pairs:

@@ -11,14 +11,14 @@ import numpy as np
 
 from comparisons import record as comparison_record
 from comparisons.compare import prepare
-from comparisons.fit import record
+from comparisons.fit import summary
 from comparisons.fit.identify import identify
 from comparisons.fit.loss import LOSSES
 from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
 from comparisons.fit.parameters import parameters
-from comparisons.fit.record import Fit, FitImages
 from comparisons.fit.rendering import BoxFiltered, render
+from comparisons.fit.summary import Fit, FitImages
 from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
@@ -64,7 +64,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
 
     Parameters
     ----------
-    source : reference.scene.Source
+    source : reference.scene.graph.Source
         The scene.
     options : comparisons.options.Options, optional
         What is rendered; :data:`RESOLUTION` and :data:`SPP` where it does not say. Films get a box
@@ -153,11 +153,11 @@ def _attempt(rendered, form, chosen, viewing):
 
 def _measured(ready, rendered, attempts, best, chosen, options):
     """Return the record of all attempts, and the residual maps of the best one."""
-    physical = record.physical_materials(ready.pair.physical)
+    physical = summary.physical_materials(ready.pair.physical)
     lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
     fits, maps = [], []
     for attempt in attempts:
-        departure, residual = record.departure(
+        departure, residual = summary.departure(
             rendered.before,
             attempt.image(rendered),
             rendered.reference.mean,
@@ -200,9 +200,9 @@ def _fit_data(attempt, departure, physical, lights):
             "normalised": normalised,
             "loss": attempt.solution.loss,
             "departure": departure,
-            "materials": record.materials_data(model, *judged, normalised, physical),
-            "lights": record.lights_data(model, *judged, lights) if lights else [],
-            "convergence": record.convergence_data(attempt.solution),
+            "materials": summary.materials_data(model, *judged, normalised, physical),
+            "lights": summary.lights_data(model, *judged, lights) if lights else [],
+            "convergence": summary.convergence_data(attempt.solution),
         }
         for normalised in (False, True)
     ]

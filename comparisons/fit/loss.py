@@ -3,10 +3,10 @@
 =================  =====================================================================  =========
 Loss               Distance of two pixels                                                 Unit
 =================  =====================================================================  =========
-``perceptual``     Euclidean in CAM16-UCS (:func:`comparisons.spaces.cam16ucs`)            ΔE
+``perceptual``     Euclidean in CAM16-UCS (`cam16ucs`)                                    ΔE
 ``linear``         its square, in linear RGB; 1 is display white                          white
 ``log-luminance``  square of the ratio of luminances, each with                           stops
-                   :data:`comparisons.metrics.LOG2_EPSILON` added, in stops
+                   :data:`comparisons.departure.metrics.LOG2_EPSILON` added, in stops
 =================  =====================================================================  =========
 
 ``perceptual`` is the default: departures are reported as mean colour differences, and of the three
@@ -29,8 +29,8 @@ from math import inf
 
 import numpy as np
 
-from comparisons.metrics import LOG2_EPSILON
-from comparisons.spaces import cam16ucs, luminance
+from comparisons.departure.metrics import LOG2_EPSILON
+from comparisons.departure.spaces import cam16ucs, luminance
 
 STEP = 1e-4
 """Relative step of the finite differences of colour spaces; their own error is its square."""

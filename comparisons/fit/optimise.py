@@ -76,7 +76,7 @@ class Residuals:
         (N, 3).
     distance : comparisons.fit.loss.Loss
         In whose coordinates.
-    viewing : comparisons.spaces.Viewing
+    viewing : comparisons.departure.spaces.Viewing
         How linear values are looked at.
     """
 

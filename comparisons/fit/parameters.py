@@ -27,7 +27,7 @@ from math import log
 import numpy as np
 
 from heuristic.terms import normalisation
-from reference.pairing import Phong, alpha_of, exponent_of, specular_albedo
+from reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
 
 EXPONENTS = (0.5, 4096.0)
 """Below, a lobe is as broad as the hemisphere; above, it is narrower than a pixel's view of it."""

@@ -12,7 +12,7 @@ from heuristic.errors import InputError
 from heuristic.materials import Material
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.shading import shade
-from reference.rendering import Accumulator, Renderer, variant
+from reference.rendering.renderer import Accumulator, Renderer, variant
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
 """Those that are fitted."""
@@ -23,7 +23,7 @@ class Recorder:
 
     Parameters
     ----------
-    renderer : reference.rendering.Renderer
+    renderer : reference.rendering.renderer.Renderer
         Of the heuristic half, with Phong shading and a box filter.
 
     Raises

@@ -7,9 +7,9 @@ import numpy as np
 
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
-from reference.gbuffer import gbuffer, image_size
-from reference.rendering import Accumulator, pass_seed, variant
-from reference.scene import Source, properties
+from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.renderer import Accumulator, pass_seed, variant
+from reference.scene.graph import Source, properties
 
 VARIANT = "llvm_ad_rgb"
 

@@ -3,14 +3,14 @@
 Those of the group ``reference`` need a Mitsuba variant and the plugins.
 """
 
-from comparisons.hard import colours, conventions, kernel, orientation, physical, surfaces
+from comparisons.hard import colour_values, conventions, kernel, orientation, physical, surfaces
 
 CASES = (
     *kernel.CASES,
     *orientation.CASES,
     *surfaces.CASES,
     *physical.CASES,
-    *colours.CASES,
+    *colour_values.CASES,
 )
 
 CONVENTIONS = conventions.CONVENTIONS

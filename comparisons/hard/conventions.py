@@ -8,11 +8,11 @@ import numpy as np
 from drjit.llvm import Array3f, Float
 
 import heuristic
+from comparisons.departure.metrics import delta_e_2000
 from comparisons.hard.cases import Convention
-from comparisons.metrics import delta_e_2000
 from heuristic import vectors
-from reference.pairing import SMALLEST_IOR, Phong, to_roughplastic
-from reference.pairing import Convention as Pairing
+from reference.pairing.factors import SMALLEST_IOR, Phong, to_roughplastic
+from reference.pairing.factors import Convention as Pairing
 
 
 def _behind_an_even_spot(exponent):

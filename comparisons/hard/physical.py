@@ -3,7 +3,7 @@
 Two kinds. Where Mitsuba is right but its formula breaks as printed, ours is the reference's own
 value, held against the formula in extended precision. Where Mitsuba itself is at fault, what counts
 is what is booked on the heuristic: the exact value over the reference's, which is to be 1. Naively
-every pixel counts; ours sets those aside that `comparisons.reference_limits` marks.
+every pixel counts; ours sets those aside that `comparisons.departure.limits` marks.
 
 All of it needs a Mitsuba variant and the plugins.
 """
@@ -13,13 +13,13 @@ from functools import cache
 import mitsuba as mi
 import numpy as np
 
+from comparisons.departure.limits import LOST, Lights, Surfaces, find
 from comparisons.hard import microfacets, terminators
 from comparisons.hard.cases import HardCase, quietly
 from comparisons.hard.furnace import evaluate
 from comparisons.hard.textbook import EXACT, NAIVE
-from comparisons.reference_limits import LOST, Lights, Surfaces, find
-from reference import albedo
-from reference.albedo import RoughPlastic
+from reference.pairing import albedo
+from reference.pairing.albedo import RoughPlastic
 
 WHITE = (1.0, 1.0, 1.0)
 SHARP = np.repeat(np.logspace(-4, 0, 9), 5).astype(np.float32)

@@ -9,7 +9,7 @@ from functools import cache
 import mitsuba as mi
 import numpy as np
 
-from comparisons.reference_limits import find, of_scene
+from comparisons.departure.limits import find, of_scene
 from heuristic.meshes import to_mesh
 
 SIDE = 48

@@ -45,7 +45,7 @@ def rows(block, threads):
 def local(workers):
     """Make a Dask cluster of separate processes on this machine, which share its cores.
 
-    Gives what :func:`comparisons.study.run.run` takes as ``spread``.
+    Gives what :func:`comparisons.study.running.run` takes as ``spread``.
 
     Raises
     ------

@@ -16,7 +16,7 @@
     int_ior = 1.5
 
 What is not named has its default. A part of a scene that is rendered may set ``resolution`` and
-``spp`` too. Figures (``[[figure]]``) are read by :mod:`reports.study_charts`.
+``spp`` too. Figures (``[[figure]]``) are read by :mod:`reports.charts.study_charts`.
 """
 
 import tomllib
@@ -27,10 +27,10 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+from comparisons.study.levels import Fixed, Span, values
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED
-from comparisons.study.values import Fixed, Span, values
 from heuristic.errors import InputError
-from reference.pairing import Convention
+from reference.pairing.factors import Convention
 
 DESIGNS = ("grid", "random", "sobol")
 LARGEST = 1_000_000

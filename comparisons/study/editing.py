@@ -12,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.errors import InputError
-from reference.scene import Reference
-from reference.values import COLOURS
+from reference.scene.graph import Reference
+from reference.scene.values import COLOURS
 
 EDITABLE = {
     "phong": {
@@ -150,7 +150,7 @@ class EditedSource:
 
     Parameters
     ----------
-    source : reference.scene.Source
+    source : reference.scene.graph.Source
         The scene.
     values
         Numbers by path, ``<id of the element>.<parameter>``, such as ``"red.reflectance"``. The

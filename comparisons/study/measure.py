@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from comparisons import statistics
-from comparisons.metrics import METRICS, checked_pair
+from comparisons.departure import statistics
+from comparisons.departure.metrics import METRICS, checked_pair
 
 ITP, CAM16 = METRICS["dE_ITP"], METRICS["dE_CAM16UCS"]
 

@@ -14,8 +14,8 @@ from comparisons.study.measure import largest_miss, measure, measure_each
 from comparisons.study.scenes import SCENES
 from heuristic import __version__, plugins
 from heuristic.errors import FotismosError, InputError
-from reference import direct
-from reference.scene import set_variant
+from reference.rendering import direct
+from reference.scene.graph import set_variant
 
 VARIANT = "llvm_ad_rgb"
 PEAK_STEP = 0.05

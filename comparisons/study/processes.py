@@ -25,7 +25,7 @@ def cores():
 
 
 def over(count):
-    """Return what :func:`comparisons.study.run.run` takes as ``spread``, for a number of processes.
+    """Return what `study.run` takes as ``spread``, for a number of processes.
 
     Raises
     ------

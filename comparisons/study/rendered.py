@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.scenes import builtin
+from comparisons.gallery.builtin import builtin
 from comparisons.study.editing import EditedSource, Kept
 from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
-from reference import halves
-from reference.gbuffer import gbuffer, image_size
-from reference.plan import plan, sampler
-from reference.rendering import Accumulator, Renderer, pass_seed, physical_integrator
-from reference.scene import Source
+from reference.pairing import halves
+from reference.planning.planner import plan, sampler
+from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.renderer import Accumulator, Renderer, pass_seed, physical_integrator
+from reference.scene.graph import Source
 
 PASSES = 4
 """Few passes of many samples: small images cost a launch each, and the samples of one pass are

@@ -15,9 +15,9 @@ import numpy as np
 import heuristic
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
-from reference import pairing
-from reference.albedo import RoughPlastic
-from reference.pairing import Convention, Miss, Phong
+from reference.pairing import factors
+from reference.pairing.albedo import RoughPlastic
+from reference.pairing.factors import Convention, Miss, Phong
 
 HEIGHTS, AZIMUTHS = 240, 120
 """Directions of the quadrature over the hemisphere, half of it for symmetry."""
@@ -70,13 +70,13 @@ def _of_phong(phong: Phong, convention: Convention):
     if not any(phong.k_s):
         # Pairing makes it a plain diffuse surface, which a roughplastic is not.
         return Material(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
-    plastic, misses = pairing.to_roughplastic(phong, convention)
+    plastic, misses = factors.to_roughplastic(phong, convention)
     return Material(phong, plastic, tuple(misses))
 
 
 @lru_cache(maxsize=256)
 def _of_plastic(plastic: RoughPlastic, convention: Convention):
-    phong, misses = pairing.to_phong(plastic, convention)
+    phong, misses = factors.to_phong(plastic, convention)
     return Material(phong, plastic, tuple(misses))
 
 

@@ -27,8 +27,8 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
+from heuristic.plugins.emitters import FAR
 from heuristic.plugins.interpolated import interpolating
-from heuristic.plugins.lights import FAR
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.shading import shade

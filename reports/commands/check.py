@@ -7,7 +7,8 @@ import click
 from click.core import ParameterSource
 
 from heuristic.errors import InputError
-from reports import jobs, terminal
+from reports.asked import jobs
+from reports.terminal import verbosity
 
 
 @click.command()
@@ -43,7 +44,7 @@ from reports import jobs, terminal
 @jobs.output_option("out/check")
 @jobs.rendering_options
 @jobs.scene_options
-@terminal.quiet_option
+@verbosity.quiet_option
 @click.pass_context
 def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
           **rendering):  # fmt: skip
@@ -66,8 +67,8 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     }
     _require_consistent(update, scenes, images, given)
     jobs.check_installation()
-    from reports import annotations, check_record, checking
-    from reports import junit as junit_xml
+    from reports.ci import annotations, check_record, lines
+    from reports.ci import junit as junit_xml
 
     if update:
         results = _update(baseline, scenes, images, significance, given)
@@ -80,11 +81,11 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     if as_json:
         data = check_record.summary(results, significance)
         click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
-    elif not terminal.is_quiet():
-        for line in checking.lines(results, significance):
+    elif not verbosity.is_quiet():
+        for line in lines.lines(results, significance):
             click.echo(line)
     elif any(result.exit_code for result in results):
-        click.echo(checking.verdict(results, significance))
+        click.echo(lines.verdict(results, significance))
     for line in notes:
         click.echo(line, err=as_json)
     context.exit(max(result.exit_code for result in results))
@@ -104,7 +105,8 @@ def _require_consistent(update, scenes, images, given):
 def _examine(path, significance, seed, output):
     """Check one baseline or a folder of them; the significance is shared."""
     from comparisons.check.moved import level_of_each
-    from reports import baselines, checks, progress
+    from reports.ci import baselines, checks
+    from reports.terminal import progress
 
     paths = baselines.find(path)
     level = level_of_each(significance, len(paths))
@@ -124,7 +126,7 @@ def _examine(path, significance, seed, output):
 
 
 def _update(path, scenes, images, significance, given):
-    from reports import progress
+    from reports.terminal import progress
 
     with progress.shown() as bar:
         results = []
@@ -135,7 +137,7 @@ def _update(path, scenes, images, significance, given):
 
 def _update_one(path, scene, images, significance, given, bar):
     """Write one baseline, unless it is there with the same options and nothing moved."""
-    from reports import baselines, checks
+    from reports.ci import baselines, checks
 
     def run():
         file, options, named, pictures = _readable(path, scene), dict(given), scene, images
@@ -157,7 +159,7 @@ def _update_one(path, scene, images, significance, given, bar):
 
 def _readable(path, scene):
     """Read a baseline; one that is missing, or broken where its scene is given, is none."""
-    from reports import baselines
+    from reports.ci import baselines
 
     if not path.exists():
         return None
@@ -171,8 +173,8 @@ def _readable(path, scene):
 
 def _targets(path, scenes):
     """Return ``(file, scene)`` of the baselines to write; without a scene, the file knows it."""
-    from comparisons.scenes import SCENES
-    from reports import baselines
+    from comparisons.gallery.builtin import SCENES
+    from reports.ci import baselines
 
     if path.suffix == ".json":
         if len(scenes) > 1:
@@ -195,7 +197,7 @@ def _stem(scene):
 
 
 def _folder(path):
-    from reports import output
+    from reports.run import output
 
     return output.prepare(path)
 

@@ -2,8 +2,10 @@
 
 import click
 
-from reports import batch, jobs, terminal
+from reports.asked import jobs
 from reports.commands import completion
+from reports.run import batch
+from reports.terminal import verbosity
 
 
 @click.command()
@@ -14,8 +16,8 @@ from reports.commands import completion
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.rendering_options
-@terminal.quiet_option
-@terminal.verbose_option
+@verbosity.quiet_option
+@verbosity.verbose_option
 @click.option(
     "--noise",
     type=float,

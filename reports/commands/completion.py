@@ -29,7 +29,7 @@ def completion(context, shell):
 
 def scene(context, parameter, beginning):
     """Complete a SCENE: the built-in ones that begin so, or else files."""
-    from comparisons.scenes import SCENES
+    from comparisons.gallery.builtin import SCENES
 
     named = [name for name in SCENES if name.startswith(beginning)]
     found = [CompletionItem(name, help=SCENES[name].title) for name in named]

@@ -4,8 +4,9 @@ import json
 
 import click
 
-from reports import jobs, terminal
+from reports.asked import jobs
 from reports.commands import completion
+from reports.terminal import verbosity
 
 
 @click.command()
@@ -14,7 +15,7 @@ from reports.commands import completion
 @jobs.figures_option
 @jobs.rendering_options
 @jobs.scene_options
-@terminal.quiet_option
+@verbosity.quiet_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of tables.")
 def cost(scene, output, figures, rounds, as_json, **rendering):
@@ -31,19 +32,20 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
-    from comparisons.cost.run import Effort
-    from comparisons.cost.run import cost as run
-    from reference.scene import set_variant
-    from reports import cost as results
-    from reports import cost_tables, files, progress, tables
-    from reports import figures as prints
-    from reports import output as folders
+    from comparisons.cost.cost import Effort
+    from comparisons.cost.cost import cost as run
+    from reference.scene.graph import set_variant
+    from reports.charts import figures as prints
+    from reports.files import ownership
+    from reports.run import cost_files as results
+    from reports.run import output as folders
+    from reports.terminal import cost_tables, progress, tables
 
     folder = folders.prepare(output)
     source, chosen = jobs.job(scene, rendering)
     place = folder / folders.folder_name(source.name, ())
     for used in (place, folder / folders.TABLES, *([folder / folders.FIGURES] if figures else ())):
-        files.require_free_folder(used)
+        ownership.require_free_folder(used)
     set_variant(chosen["variant"])
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     words = jobs.command(source, chosen, "cost") + (f" --rounds {rounds}" if rounds else "")
@@ -56,5 +58,5 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     if as_json:
         click.echo(json.dumps(study.data, indent=2, ensure_ascii=False))
         return
-    terminal.tell(cost_tables.lines(study.data))
-    terminal.tell_where(place / "cost.svg")
+    verbosity.tell(cost_tables.lines(study.data))
+    verbosity.tell_where(place / "cost.svg")

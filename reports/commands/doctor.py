@@ -2,7 +2,7 @@
 
 import click
 
-from reports import jobs
+from reports.asked import jobs
 
 
 @click.command()

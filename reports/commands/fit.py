@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
-from reports import jobs, terminal
+from reports.asked import jobs
 from reports.commands import completion
+from reports.terminal import verbosity
 
 
 @click.command()
@@ -44,7 +45,7 @@ from reports.commands import completion
 )
 @jobs.rendering_options
 @jobs.scene_options
-@terminal.quiet_option
+@verbosity.quiet_option
 def fit(scenes, output, form, as_json, markdown, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
@@ -62,9 +63,11 @@ def fit(scenes, output, form, as_json, markdown, **words):
     from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit import fit as run
     from heuristic.materials import FORMS
-    from reference.scene import set_variant
-    from reports import files, fitting, progress
-    from reports import output as folders
+    from reference.scene.graph import set_variant
+    from reports.files import ownership
+    from reports.run import fit_files
+    from reports.run import output as folders
+    from reports.terminal import progress
 
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
@@ -73,19 +76,19 @@ def fit(scenes, output, form, as_json, markdown, **words):
     records, places = [], []
     for source, _ in wanted:
         places.append(folders.folder_name(source.name, places))
-        files.require_free_folder(folder / places[-1])
+        ownership.require_free_folder(folder / places[-1])
     with progress.shown() as bar:
         for source, rendering in wanted:
             set_variant(rendering["variant"])
             command = jobs.command(source, rendering | fitting_words | {"form": form}, "fit")
             result = run(source, jobs.options(rendering), chosen, bar.of(source.name), command)
-            fitting.write(folder / places.pop(0), result)
+            fit_files.write(folder / places.pop(0), result)
             records.append(result.data)
     if markdown:
-        atomic.write(markdown, "\n".join(fitting.markdown(records, scenes)) + "\n")
+        atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:
         click.echo(json.dumps(records, indent=2, ensure_ascii=False))
         return
     for record in records:
-        terminal.tell(fitting.lines(record))
-    terminal.tell_where(folder)
+        verbosity.tell(fit_files.lines(record))
+    verbosity.tell_where(folder)

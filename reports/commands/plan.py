@@ -4,7 +4,7 @@ import json
 
 import click
 
-from reports import jobs
+from reports.asked import jobs
 from reports.commands import completion
 
 
@@ -23,8 +23,8 @@ def plan(scene, as_json, verify, **rendering):
       fotismos plan --verify fig-8-9 --resolution 128x128
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
-    from reference.scene import set_variant
-    from reports import planning, progress
+    from reference.scene.graph import set_variant
+    from reports.terminal import plan_lines, progress
 
     source, chosen = jobs.job(scene, rendering)
     set_variant(chosen["variant"])
@@ -34,12 +34,12 @@ def plan(scene, as_json, verify, **rendering):
 
         with progress.shown() as bar:
             data = run(source, options, bar.of(source.name)).data()
-        lines = planning.verification_lines([data])
+        lines = plan_lines.verification_lines([data])
     else:
         from comparisons.compare import prepare
 
-        data = planning.data(source.name, prepare(source, options), chosen["variant"])
-        lines = planning.lines(data)
+        data = plan_lines.data(source.name, prepare(source, options), chosen["variant"])
+        lines = plan_lines.lines(data)
     if as_json:
         lines = [json.dumps(data, indent=2, ensure_ascii=False)]
     for line in lines:

@@ -2,7 +2,9 @@
 
 import click
 
-from reports import batch, jobs, terminal
+from reports.asked import jobs
+from reports.run import batch
+from reports.terminal import verbosity
 
 VERIFIED_AT = (96, 96)
 """Resolution at which a report verifies its plans."""
@@ -13,8 +15,8 @@ VERIFIED_AT = (96, 96)
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.rendering_options
-@terminal.quiet_option
-@terminal.verbose_option
+@verbosity.quiet_option
+@verbosity.verbose_option
 def report(output, figures, fresh, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
 
@@ -26,7 +28,7 @@ def report(output, figures, fresh, **rendering):
       fotismos report
       fotismos report --resolution 128x128 -o small --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    from comparisons.scenes import SCENES
+    from comparisons.gallery.builtin import SCENES
     from heuristic import equations
 
     names = tuple(SCENES)
@@ -53,8 +55,8 @@ def _verify(names, rendering):
     from comparisons.check.moved import level_of_each
     from comparisons.compare import LEVEL
     from comparisons.verification import verify
-    from reference.scene import set_variant
-    from reports import progress
+    from reference.scene.graph import set_variant
+    from reports.terminal import progress
 
     level = level_of_each(LEVEL, len(names))
     with progress.shown() as bar:

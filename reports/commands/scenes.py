@@ -12,7 +12,7 @@ def scenes():
       fotismos scenes
       fotismos scenes | grep sphere
     """  # noqa: D301 click reads the \b as: keep these lines
-    from comparisons.scenes import SCENES
+    from comparisons.gallery.builtin import SCENES
 
     width = max(map(len, SCENES))
     for scene in SCENES.values():

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from reports import jobs, terminal
+from reports.asked import jobs
+from reports.terminal import verbosity
 
 
 @click.command()
@@ -40,7 +41,7 @@ from reports import jobs, terminal
     help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
     " dataset beside FILE.",
 )
-@terminal.quiet_option
+@verbosity.quiet_option
 def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
@@ -58,15 +59,16 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
     jobs.check_installation()
-    from comparisons.study import cluster, design, run
+    from comparisons.study import cluster, design, running
     from comparisons.study import processes as pool
-    from reports import output as files
-    from reports import progress, studying
+    from reports.run import output as files
+    from reports.run import study_files
+    from reports.terminal import progress
 
     wanted = design.read(file)
-    page = studying.page(wanted, file, findings)
+    page = study_files.page(wanted, file, findings)
     folder = files.prepare(output or Path("out", wanted.name))
-    studying.require_free(wanted, folder)
+    study_files.require_free(wanted, folder)
     if scheduler:
         spreading = cluster.connected(scheduler)
     elif workers:
@@ -74,8 +76,8 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     else:
         spreading = nullcontext(pool.over(processes or pool.cores()))
     with spreading as spread, progress.shown("points") as bar:
-        outcome = run.run(wanted, folder, spread, bar.of(wanted.name))
-    places = list(studying.write(wanted, outcome, folder, page))
-    terminal.tell([*studying.summary(wanted, outcome), ""])
+        outcome = running.run(wanted, folder, spread, bar.of(wanted.name))
+    places = list(study_files.write(wanted, outcome, folder, page))
+    verbosity.tell([*study_files.summary(wanted, outcome), ""])
     for place in places:
         click.echo(place)

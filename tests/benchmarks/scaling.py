@@ -27,8 +27,8 @@ import heuristic
 import resource, sys
 from comparisons.compare import compare
 from comparisons.options import Options
-from comparisons.scenes import SCENES
-from reference.scene import set_variant
+from comparisons.gallery.builtin import SCENES
+from reference.scene.graph import set_variant
 
 name, side, spp = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 set_variant(SCENES[name].variant)
@@ -42,7 +42,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
 def run(rounds):
     """Measure, print a table each, and return the numbers."""
     import heuristic  # noqa: F401  first: it finds LLVM
-    from reference.scene import set_variant
+    from reference.scene.graph import set_variant
 
     set_variant("llvm_ad_rgb")
     rounds = min(rounds, 7)  # the largest sizes take seconds
@@ -70,13 +70,13 @@ def _times(renderers, rounds):
 
 
 def _cornell_box(side, spp):
-    from comparisons.scenes import SCENES
+    from comparisons.gallery.builtin import SCENES
 
     return _halves(SCENES[SCENE].source(), (side, side), spp)
 
 
 def _lit_floor(count):
-    from reference.scene import Source
+    from reference.scene.graph import Source
 
     return _halves(Source("lit floor", lambda: _floor(count)), (256, 256), 4)
 

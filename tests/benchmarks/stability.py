@@ -24,7 +24,7 @@ import mitsuba as mi
 import numpy as np
 from drjit.llvm import Array3f, Float
 
-from comparisons.scenes import SCENES
+from comparisons.gallery.builtin import SCENES
 from heuristic import lobes, numerics, terms, vectors
 
 SIDE, SPP = 512, 4

@@ -9,13 +9,13 @@ import OpenEXR
 import pytest
 from playwright.sync_api import sync_playwright
 
-from comparisons import regions
-from comparisons.cost.run import Study
-from comparisons.histograms import histogram
-from comparisons.metrics import METRICS, log2_luminance_ratio
+from comparisons.cost.cost import Study
+from comparisons.departure import regions
+from comparisons.departure.histogram import histogram
+from comparisons.departure.metrics import METRICS, log2_luminance_ratio
 from comparisons.record import Comparison, Images
-from reports import output
-from reports.run import Run
+from reports.run import output
+from reports.run.stages import Run
 from tests import cost_records, records
 
 WIDTH, HEIGHT = 48, 32

@@ -2,8 +2,9 @@
 
 import pytest
 
-from reports import output, page
 from reports.notebook import Shown
+from reports.page import page
+from reports.run import output
 from tests.browser.conftest import EXACT, exact
 
 SEEN = "document.documentElement.dataset.view"

@@ -1,0 +1,189 @@
+"""What accuracy costs on one scene: the whole study."""
+
+import gc
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from comparisons import record
+from comparisons.compare import prepare
+from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
+from comparisons.cost.front import Point, equal_error, equal_time, pareto
+from comparisons.cost.methods import Methods
+from comparisons.cost.timing import Judge, measure
+from comparisons.effects.lattice import Lattice
+from comparisons.effects.prices import prices
+from comparisons.effects.split import split
+from comparisons.options import Options
+from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.renderer import Accumulator, Renderer, Stream, pass_seed
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study returns: the data of ``cost.json``, and images by name.
+
+    Attributes
+    ----------
+    data
+        Plain data.
+    rungs
+        ``{rung name: (H, W, 3)}``, of the most samples.
+    parts
+        ``{part: (H, W, 3)}``, signed and linear.
+    difference
+        (H, W, 3): reference minus kernel, which the parts add up to.
+    effects
+        ``{effect: (H, W)}``: the ΔE2000 that it removes.
+    error
+        (H, W): the kernel's ΔE2000, which those of the effects add up to.
+    reference
+        (H, W, 3).
+    counted
+        (H, W): the pixels that count.
+    """
+
+    data: dict
+    rungs: dict
+    parts: dict
+    difference: np.ndarray
+    effects: dict
+    error: np.ndarray
+    reference: np.ndarray
+    counted: np.ndarray
+
+
+def cost(source, options=None, effort=None, progress=None, command=""):
+    """Study what accuracy costs on one scene, in the current variant.
+
+    Parameters
+    ----------
+    source, options, progress, command
+        As of :func:`comparisons.compare.compare`. ``options.spp`` are the most samples of a Monte
+        Carlo rung. Without a resolution, the film's own is reduced to :data:`WIDTH`.
+    effort : Effort, optional
+        How much is rendered.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
+    """
+    options, effort = options or Options(), effort or Effort()
+    progress = progress or _silent
+    if options.resolution is None:
+        options = replace(options, resolution=reduced(source, options, WIDTH))
+    if options.spp is not None:
+        effort = replace(effort, largest=options.spp)
+    ready = prepare(source, replace(options, spp=None))
+    width, height = image_size(ready.scene)
+    counted = gbuffer(ready.scene, width, height).hit
+    reference = _converged(ready, effort, options.seed, progress)
+    judge = Judge(reference, counted, options.viewing)
+
+    methods = Methods(source, options, ready, effort.depths)
+    rungs = methods.rungs
+    measured = _measured(methods, effort, judge, options.seed, progress)
+    lattice = Lattice(options, methods, effort.replicates, effort.replicate_spp, options.seed)
+    progress("pricing effects", 0, 1)
+    priced = prices(lattice, judge, options.seed, effort.exact_effects, effort.orders)
+    parts, whole = split(lattice, counted, options.viewing)
+    progress("pricing effects", 1, 1)
+
+    points = [Point(m.rung, m.spp, m.seconds.median, m.error) for m in measured]
+    front = {(point.method, point.spp) for point in pareto(points)}
+    data = {
+        "scene": source.name,
+        "variant": ready.reference.variant,
+        "heuristic_variant": methods.heuristic_variant,
+        "interpolation": options.interpolation.value,
+        "seed": options.seed,
+        "resolution": [width, height],
+        "rounds": effort.rounds,
+        "reference": {
+            "integrator": ready.plan.integrator,
+            "max_depth": ready.plan.max_depth,
+            "spp": effort.reference_spp * reference.passes,
+            "passes": reference.passes,
+            "noise_floor": judge.floor,
+            "mean_variance": judge.variance,
+        },
+        "rungs": [
+            {"name": rung.name, "names": list(rung.names), "monte_carlo": rung.monte_carlo}
+            for rung in rungs
+        ],
+        "points": [_without(m, "image") | {"pareto": (m.rung, m.spp) in front} for m in measured],
+        "equal_time": [asdict(row) for row in equal_time(points)],
+        "equal_error": [asdict(row) for row in equal_error(points)],
+        "prices": {
+            **_without(priced, "effects", "map"),
+            "effects": [_without(price, "map") for price in priced.effects],
+        },
+        "split": {
+            "parts": [_without(part, "map") for part in parts],
+            "departure": _without(whole, "map"),
+        },
+        "viewing": options.viewing.record(),
+        "pixels": {"counted": int(counted.sum()), "total": width * height},
+        "machine": record.machine(),
+        "versions": record.versions(),
+        "command": command,
+    }
+    return Study(
+        data=data,
+        rungs={m.rung: m.image for m in measured},
+        parts={part.name: part.map for part in parts},
+        difference=whole.map,
+        effects={price.effect: price.map for price in priced.effects},
+        error=priced.map,
+        reference=reference.mean,
+        counted=counted,
+    )
+
+
+def quick(source, options=None, progress=None, command=""):
+    """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
+    options = options or Options()
+    small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
+    return cost(source, small, QUICK, progress, command)
+
+
+def _measured(methods, effort, judge, seed, progress):
+    """Time and judge the rungs; their scenes are let go of, since they would slow what follows."""
+    renderers = {
+        (rung.name, spp): methods.renderer(rung.method, spp)
+        for rung in methods.rungs
+        for spp in (effort.counts if rung.monte_carlo else (DETERMINISTIC_SPP,))
+    }
+    gc.collect()  # scenes that pairing left behind
+    measured = measure(renderers, judge, effort.rounds, seed, progress)
+    methods.forget()
+    return measured
+
+
+def _converged(ready, effort, seed, progress):
+    """Render the reference that errors are told against, with seeds that no rung has."""
+    renderer = Renderer(
+        ready.scene, ready.reference.integrator, effort.reference_spp, "reference image"
+    )
+    total = Accumulator()
+    for number in range(ready.plan.passes):
+        progress("reference", number, ready.plan.passes)
+        total.add(renderer.render(pass_seed(seed, number, Stream.OTHER_SIDE)))
+    return total.estimate()
+
+
+def _without(item, *names):
+    """Return the fields of a record as plain data, without the arrays that are named."""
+    plain = replace(item, **dict.fromkeys(names)) if names else item
+    return {key: value for key, value in asdict(plain).items() if key not in names}
+
+
+def _silent(stage, done, total):
+    """Report no progress."""

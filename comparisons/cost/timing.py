@@ -1,0 +1,197 @@
+"""Timing and judging the rungs: in turn, so that a drift of the machine hits all alike.
+
+What is timed is one rendering of the whole image, evaluated and synchronised. The first run of each
+rung traces and compiles, and stands apart; a second one warms caches; the rounds follow, each with
+a seed of its own, so that their errors are independent as well.
+"""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from comparisons.departure.metrics import METRICS
+from reference.rendering.renderer import pass_seed, variant
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Interval:
+    """The median of repeats, their quartiles, and an interval for the median.
+
+    ``low`` and ``high`` are order statistics; ``level`` is the chance that they hold the true
+    median, whatever the distribution. With fewer than six repeats not even the extremes reach 95 %,
+    and ``level`` says what they do reach.
+    """
+
+    median: float
+    p25: float
+    p75: float
+    low: float
+    high: float
+    level: float
+    repeats: int
+
+
+def interval(values):
+    """Return the :class:`Interval` of at least two repeats."""
+    ordered = np.sort(np.asarray(values, float))
+    count = len(ordered)
+    place = 0
+    while place + 1 < count - 1 - (place + 1) and _coverage(count, place + 1) >= LEVEL:
+        place += 1
+    p25, median, p75 = np.percentile(ordered, (25, 50, 75))
+    return Interval(
+        median=float(median),
+        p25=float(p25),
+        p75=float(p75),
+        low=float(ordered[place]),
+        high=float(ordered[count - 1 - place]),
+        level=_coverage(count, place),
+        repeats=count,
+    )
+
+
+def _coverage(count, place):
+    """Chance that the median lies between the ordered values ``place`` and ``count - 1 - place``.
+
+    Each value is below the median with chance 1/2: ``1 - 2 sum_{i <= place} C(n, i) / 2^n``.
+    """
+    return 1 - 2 * sum(comb(count, i) for i in range(place + 1)) / 2**count
+
+
+class Judge:
+    """Errors against a converged reference whose own noise is known.
+
+    Parameters
+    ----------
+    reference : reference.rendering.renderer.Estimate
+        The reference.
+    counted
+        (H, W): the pixels that count.
+    viewing : comparisons.departure.spaces.Viewing
+        How linear values are looked at.
+    """
+
+    def __init__(self, reference, counted, viewing):
+        self.metric = METRICS["dE2000"]
+        self.viewing = viewing
+        self.counted = counted
+        self.reference = reference.mean[counted]
+        self.coordinates = self.metric.coordinates(self.reference, viewing)
+        self.variance = float(np.mean(reference.standard_error[counted] ** 2))
+        """Mean variance of the reference, which a mean squared error holds on top of its own."""
+        self.floor = float(self._distance(reference.mean[counted] + reference.noise[counted]))
+        """Mean ΔE2000 that the reference's noise alone gives."""
+
+    def map(self, image):
+        """Return the map (H, W) of ΔE2000, 0 where no pixel is counted."""
+        values = np.zeros(self.counted.shape)
+        here = self.metric.coordinates(np.asarray(image)[self.counted], self.viewing)
+        values[self.counted] = self.metric.difference(self.coordinates, here)
+        return values
+
+    def errors(self, image):
+        """Return mean ΔE2000, and the linear MSE without the reference's share (can be < 0)."""
+        image = np.asarray(image, float)[self.counted]
+        mse = float(np.mean((image - self.reference) ** 2)) - self.variance
+        return float(self._distance(image)), mse
+
+    def _distance(self, pixels):
+        here = self.metric.coordinates(pixels, self.viewing)
+        return np.mean(self.metric.difference(self.coordinates, here))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A rung at one sample count.
+
+    Attributes
+    ----------
+    rung, spp
+        Name of the rung, and samples a pixel as rendered.
+    first_s, compile_s
+        Time of the first run, and what LLVM took of it.
+    seconds
+        Of the rounds.
+    error, error_stderr
+        Mean ΔE2000 of one rendering, mean over rounds, and its standard error.
+    mse, mse_stderr
+        Linear mean squared error, the reference's variance subtracted.
+    image
+        The last round's, (H, W, 3).
+    """
+
+    rung: str
+    spp: int
+    first_s: float
+    compile_s: float
+    seconds: Interval
+    error: float
+    error_stderr: float
+    mse: float
+    mse_stderr: float
+    image: np.ndarray
+
+
+def measure(renderers, judge, rounds, seed, progress):
+    """Time and judge renderers in turn.
+
+    Parameters
+    ----------
+    renderers
+        ``{(name, spp): renderer}``; see :class:`reference.rendering.renderer.Renderer`.
+    judge : Judge
+        What tells errors.
+    rounds
+        Repeats, at least 2.
+    seed
+        Of the study; each round hashes its own from it.
+    progress : callable
+        ``progress(stage, done, total)``.
+
+    Returns
+    -------
+    tuple of Measured
+    """
+    errors = {key: [] for key in renderers}
+    images = {}
+    for number in range(rounds + 2):
+        progress("timing", number, rounds + 2)
+        own = pass_seed(seed, number)
+        for name, group in by_variant(renderers).items():
+            with variant(name):
+                for key, renderer in group.items():
+                    images[key] = np.array(renderer.render(own))
+        if number > 1:
+            for key, image in images.items():
+                errors[key].append(judge.errors(image))
+    return tuple(
+        _summarise(key, renderer, errors[key], images[key]) for key, renderer in renderers.items()
+    )
+
+
+def by_variant(renderers):
+    """Group renderers by their variant: changing it takes Mitsuba as long as a small rendering."""
+    groups = {}
+    for key, renderer in renderers.items():
+        groups.setdefault(renderer.variant, {})[key] = renderer
+    return groups
+
+
+def _summarise(key, renderer, errors, image):
+    means = np.mean(errors, axis=0)
+    stderrs = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors))
+    return Measured(
+        rung=key[0],
+        spp=key[1],
+        first_s=renderer.times[0],
+        compile_s=renderer.compilation,
+        seconds=interval(renderer.times[2:]),
+        error=float(means[0]),
+        error_stderr=float(stderrs[0]),
+        mse=float(means[1]),
+        mse_stderr=float(stderrs[1]),
+        image=image,
+    )

@@ -1,0 +1,1 @@
+"""The difference between the halves: metrics, statistics, marks, regions."""

@@ -1,0 +1,231 @@
+"""Pixels where the reference itself is at fault, so that they are not booked on the heuristic.
+
+================  ===========================================================================
+Limit             Where
+================  ===========================================================================
+``clamped``       the surface is smoother than Mitsuba computes: ``roughplastic`` takes every
+                  alpha below :data:`SMALLEST_ALPHA` for that
+``terminator``    the shading normal and the geometric one disagree on which side a light or
+                  the viewer is; one of the two renders black what the other lights
+``energy_loss``   the surface loses more than :data:`LOST` of the light that it should reflect:
+                  ``roughplastic`` follows light through one reflection alone
+``fireflies``     a few samples carry the estimate: its standard error is more than
+                  :data:`FIREFLY_SHARE` of it, and far above that of the pixels around it
+================  ===========================================================================
+
+Masks may overlap. `find` is a function of plain arrays; `of_scene` collects them.
+
+Of which lights the normals may disagree is geometry alone. Points, spots and directional lights
+have one direction. An area light is taken for :data:`LIGHT_GRID` squared points of each of its
+shapes, edges and corners among them, and one is enough; what may fall between them is so near the
+shading normal's horizon that it is dark. Under an environment, which has all
+directions, the normals' hemispheres always differ by a wedge, as soon as the normals do: of light
+from all sides alike it is the share ``(1 - N.N_g) / 2`` of the irradiance, which is lost, and
+counts from :data:`WEDGE_LOST` on.
+"""
+
+from dataclasses import dataclass, fields
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from reference.pairing.albedo import RoughPlastic, of_roughplastic
+
+SMALLEST_ALPHA = 1e-4
+LOST = 0.05
+"""Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
+WEDGE_LOST = 0.01
+"""That of normals 11.5 degrees apart."""
+LIGHT_GRID = 5
+FIREFLY_SHARE = 0.5
+FIREFLY_CONTRAST = 8.0
+NEIGHBOURHOOD = 5
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Masks (H, W) of counted pixels, by limit."""
+
+    clamped: np.ndarray
+    terminator: np.ndarray
+    energy_loss: np.ndarray
+    fireflies: np.ndarray
+
+    @property
+    def any(self):
+        """The pixels with one limit or more."""
+        return self.clamped | self.terminator | self.energy_loss | self.fireflies
+
+    def data(self):
+        """Return the number of pixels by limit, and ``any``, as plain data."""
+        counts = {field.name: int(getattr(self, field.name).sum()) for field in fields(self)}
+        return counts | {"any": int(self.any.sum())}
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Where light comes from: points (N, 3), directions towards it (M, 3), and from all sides."""
+
+    points: np.ndarray
+    directions: np.ndarray
+    surrounding: bool = False
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What limits depend on, at the first surface on a grid of camera rays.
+
+    ``alpha`` (H, W) is infinite and ``albedo`` (H, W) 1 where there is no ``roughplastic``;
+    ``albedo`` is that of the same surface under the white furnace: at normal incidence with a
+    reflectance of 1. ``position`` is in world space, ``shading`` and ``geometric`` are normals,
+    ``view`` the direction towards the viewer, (H, W, 3).
+    """
+
+    hit: np.ndarray
+    alpha: np.ndarray
+    albedo: np.ndarray
+    position: np.ndarray
+    shading: np.ndarray
+    geometric: np.ndarray
+    view: np.ndarray
+    lights: Lights
+
+
+def find(surfaces, mean, standard_error, counted=None):
+    """Return the :class:`Limits` of a reference.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        As `of_scene` returns them.
+    mean, standard_error
+        (H, W, 3): the reference's estimate and its standard error from independent passes.
+    counted
+        (H, W), the pixels that count; those that hit a surface where it is not given.
+    """
+    counted = surfaces.hit if counted is None else np.asarray(counted, bool)
+    return Limits(
+        clamped=counted & (surfaces.alpha <= SMALLEST_ALPHA),
+        terminator=counted & terminator(surfaces),
+        energy_loss=counted & (surfaces.albedo < 1 - LOST),
+        fireflies=counted & fireflies(mean, standard_error),
+    )
+
+
+def terminator(surfaces):
+    """Return where shading and geometric normal disagree about a light or the viewer."""
+    mask = surfaces.hit & (surfaces.shading != surfaces.geometric).any(axis=-1)
+    position, shading, geometric, view = (
+        getattr(surfaces, name)[mask] for name in ("position", "shading", "geometric", "view")
+    )
+
+    def disagree(direction):
+        sides = [np.einsum("...i,...i", n, direction) > 0 for n in (shading, geometric)]
+        return sides[0] != sides[1]
+
+    lights = surfaces.lights
+    found = disagree(view)
+    for point in lights.points:
+        found |= disagree(point - position)
+    for direction in lights.directions:
+        found |= disagree(np.broadcast_to(direction, shading.shape))
+    if lights.surrounding:
+        found |= (1 - np.einsum("...i,...i", shading, geometric)) / 2 > WEDGE_LOST
+    mask[mask] = found
+    return mask
+
+
+def fireflies(mean, standard_error):
+    """Return where a few samples carry the estimate.
+
+    If all light of a pixel came in one of many passes, its standard error would equal its mean. So
+    ``SE > FIREFLY_SHARE mean`` in the sum of the channels, and ``SE`` exceeds
+    :data:`FIREFLY_CONTRAST` times the median of the pixels around, where the image is not noisy
+    throughout.
+    """
+    from scipy.ndimage import median_filter
+
+    total = np.abs(np.asarray(mean, float)).sum(axis=-1)
+    error = np.asarray(standard_error, float).sum(axis=-1)
+    around = median_filter(error, size=NEIGHBOURHOOD, mode="nearest")
+    return (error > FIREFLY_SHARE * total) & (error > FIREFLY_CONTRAST * around)
+
+
+def of_scene(scene, width, height, sensor=0):
+    """Collect the :class:`Surfaces` that the centres of a scene's pixels see."""
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    place = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
+    ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
+    si = scene.ray_intersect(ray)
+    hit = si.is_valid()
+
+    def grid(vector):
+        return np.array(dr.select(hit, mi.Vector3f(vector), 0), float).T.reshape(height, width, 3)
+
+    index = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
+    alpha, albedo = np.full((height, width), np.inf), np.ones((height, width))
+    for shape in scene.shapes():
+        found = _roughplastic(shape.bsdf())
+        if found is not None:
+            is_here = index == int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+            alpha[is_here], albedo[is_here] = found.alpha, _furnace(found)
+    seen = np.array(hit).reshape(height, width)
+    normals = grid(si.sh_frame.n), grid(si.n)
+    return Surfaces(seen, alpha, albedo, grid(si.p), *normals, grid(-ray.d), lights_of(scene))
+
+
+def _roughplastic(bsdf):
+    """Return the parameters of a ``roughplastic``, also within ``twosided``, or None."""
+    if "RoughPlastic" not in str(bsdf):
+        return None
+    params = {name.rpartition(".")[2]: value for name, value in mi.traverse(bsdf)}
+    return RoughPlastic((1.0,) * 3, _first(params["alpha"]), _first(params["eta"]))
+
+
+def _first(value):
+    return float(np.ravel(value)[0])
+
+
+def _furnace(plastic):
+    albedo = of_roughplastic(plastic)
+    return float((albedo.diffuse + albedo.specular).mean())
+
+
+def lights_of(scene):
+    """Return the :class:`Lights` of a scene."""
+    points, directions, surrounding = [], [], False
+    shining = [shape for shape in scene.shapes() if shape.is_emitter()]
+    for emitter in scene.emitters():
+        flags = emitter.flags()
+        if flags & +mi.EmitterFlags.Surface:
+            continue
+        params = mi.traverse(emitter)
+        if flags & +mi.EmitterFlags.DeltaPosition:
+            points.append(_given(params, "position", column=3))
+        elif flags & +mi.EmitterFlags.DeltaDirection:
+            directions.append(-_given(params, "direction", column=2))
+        elif flags & +mi.EmitterFlags.Infinite:
+            surrounding = True
+    for shape in shining:
+        places, normals = _points_on(shape)
+        if shape.emitter().flags() & +mi.EmitterFlags.DeltaDirection:
+            directions.extend(-np.unique(normals, axis=0))
+        else:
+            points.extend(places)
+    return Lights(np.reshape(points, (-1, 3)), np.reshape(directions, (-1, 3)), surrounding)
+
+
+def _given(params, name, column):
+    """Return a parameter of three numbers, or the column of ``to_world`` that stands for it."""
+    value = params[name] if name in params else params["to_world"].matrix
+    value = np.array(value, float)
+    return value.ravel() if name in params else value[:3, column].ravel()
+
+
+def _points_on(shape):
+    """Return points of a shape and its normals, (N, 3) each, by sampling a grid with its edges."""
+    places = np.linspace(0, 1 - 2**-24, LIGHT_GRID)
+    x, y = (axis.ravel() for axis in np.meshgrid(places, places))
+    found = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
+    return np.array(found.p, float).T, np.array(found.n, float).T

@@ -1,0 +1,1 @@
+"""The departure attributed to effects."""

@@ -1,0 +1,104 @@
+"""The departure split into its causes: a chain of images from the kernel to the reference.
+
+==================  ==========================================================================
+Part                Between
+==================  ==========================================================================
+interpolation       the kernel as asked for, and with an exact normal at each point
+implementation      the kernel, and the ``phong`` plugin under Mitsuba's direct light: nothing
+spectral            the variant of the heuristic half, and that of the reference
+visibility          no shadows, and shadows
+light form          the heuristic half's lights, and the physical ones
+BSDF form           phong, and the physical BSDFs, both with direct light
+transport           direct light, and all of it
+==================  ==========================================================================
+
+Every part is a signed linear image, later minus earlier, so that the parts add up to reference
+minus kernel in every pixel. A part that the scene does not have is left out; implementation, BSDF
+form and transport are always there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from comparisons.departure.metrics import delta_e_2000
+from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
+from reference.planning.effects import Effect
+
+LIGHTS = {Effect.ATTENUATION, Effect.CONE, Effect.EXTENDED, Effect.ENVIRONMENT}
+STEPS = (
+    ("spectral", {Effect.SPECTRAL}),
+    ("visibility", {Effect.OCCLUSION}),
+    ("light form", LIGHTS),
+    ("BSDF form", {Effect.MICROFACETS, Effect.TRANSMISSION}),
+)
+ALWAYS = ("implementation", "BSDF form", "transport")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One cause of the departure.
+
+    Attributes
+    ----------
+    name
+        As in the table.
+    mean, mean_stderr
+        Signed mean over the counted pixels and channels, linear, and its standard error.
+    rms
+        Root mean square.
+    dE2000
+        Mean ΔE2000 between the two images; those of the parts do not add up.
+    map
+        (H, W, 3), linear and signed.
+    """
+
+    name: str
+    mean: float
+    mean_stderr: float
+    rms: float
+    dE2000: float
+    map: np.ndarray
+
+
+def split(lattice, counted, viewing):
+    """Return the :class:`Part` tuple of a lattice's departure, and the whole as one more part."""
+    chain = _chain(lattice)
+    lattice.render(key for _, key in chain)
+    images = [lattice.of(key).images.astype(float) for _, key in chain]
+    parts = [
+        _part(name, before, after, counted, viewing)
+        for (name, _), before, after in zip(chain[1:], images, images[1:], strict=False)
+    ]
+    return tuple(parts), _part("departure", images[0], images[-1], counted, viewing)
+
+
+def _chain(lattice):
+    """Return ``(name of the step that leads there, image)`` from the kernel to the reference."""
+    effects = set(lattice.effects)
+    chain = [("", KERNEL)]
+    if Effect.POLYGONS in effects:
+        chain.append(("interpolation", PLAIN_KERNEL))
+    simulated = frozenset()
+    chain.append(("implementation", simulated))
+    for name, added in STEPS:
+        if added & effects or name in ALWAYS:
+            simulated = simulated | (added & effects)
+            chain.append((name, simulated))
+    chain.append(("transport", REFERENCE))
+    return chain
+
+
+def _part(name, before, after, counted, viewing):
+    signed = after - before
+    each = signed[:, counted].mean(axis=(1, 2))
+    mean = signed.mean(axis=0)
+    distance = delta_e_2000(after.mean(axis=0), before.mean(axis=0), viewing)
+    return Part(
+        name=name,
+        mean=float(each.mean()),
+        mean_stderr=float(each.std(ddof=1) / np.sqrt(len(each))),
+        rms=float(np.sqrt(np.mean(mean[counted] ** 2))),
+        dE2000=float(distance[counted].mean()),
+        map=mean,
+    )

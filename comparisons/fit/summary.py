@@ -1,0 +1,204 @@
+"""The record of a fit: images, and the plain data that ``fit.json`` holds."""
+
+from dataclasses import dataclass
+from math import exp, sqrt
+
+import mitsuba as mi
+import numpy as np
+
+from comparisons.departure.metrics import METRICS
+from comparisons.departure.statistics import noise_floor
+from comparisons.fit.identify import AT_BOUND, COVERAGE
+from heuristic.terms import normalisation
+
+
+@dataclass(frozen=True)
+class FitImages:
+    """Linear images (H, W, 3), and the residual maps (H, W) after the fit by metric."""
+
+    before: np.ndarray
+    reference: np.ndarray
+    after: np.ndarray
+    maps: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a fit returns: the data of ``fit.json``, and the images of the best form."""
+
+    data: dict
+    images: FitImages
+
+
+def departure(before, after, reference, counted, noise, viewing):
+    """Return each metric's mean before and after, split into parameter and model error.
+
+    Returns
+    -------
+    data : dict
+        By metric: ``before``, ``after``, ``p95_after``, ``noise_floor``, ``parameter_error`` (what
+        better parameters remove) and ``model_error`` (what they leave).
+    maps : dict
+        The metric after the fit, (H, W).
+    """
+    data, maps = {}, {}
+    for name, metric in METRICS.items():
+        first, maps[name] = (metric(image, reference, viewing) for image in (before, after))
+        means = [float(values[counted].mean()) for values in (first, maps[name])]
+        data[name] = {
+            "before": means[0],
+            "after": means[1],
+            "p95_after": float(np.percentile(maps[name][counted], 95)),
+            "noise_floor": noise_floor(metric, reference, noise, counted, viewing),
+            "parameter_error": means[0] - means[1],
+            "model_error": means[1],
+        }
+    return data, maps
+
+
+def materials_data(model, solution, verdicts, covariance, normalised, physical):
+    """Return what was fitted, material by material, as plain data."""
+    names = model.surface.names
+    return [
+        {
+            "name": name,
+            "reference": physical.get(name),
+            "pixels": len(np.unique(model.surface.samples[owner].pixel)),
+            "parameters": [
+                _parameter_data(model, solution, verdicts, covariance, place, normalised)
+                for place, parameter in enumerate(model.parameters)
+                if parameter.owner == owner and parameter.name != "intensity"
+            ],
+        }
+        for owner, name in enumerate(names)
+    ]
+
+
+def lights_data(model, solution, verdicts, covariance, lights):
+    """Return the factors on the intensities of lights, by name; the first is what they refer to."""
+    fitted = [
+        {"light": lights[parameter.owner]}
+        | _parameter_data(model, solution, verdicts, covariance, place, False)
+        for place, parameter in enumerate(model.parameters)
+        if parameter.name == "intensity"
+    ]
+    first = {
+        "light": lights[0],
+        "name": "intensity",
+        "channel": "",
+        "is_factor": True,
+        "paired": 1.0,
+        "fitted": None,
+        "stopped_at": 1.0,
+        "interval": None,
+        "bounds": [1.0, 1.0],
+        "at_bound": False,
+        "identifiable": False,
+        "reason": "only products with k_d and k_s show; other lights' factors are relative to it",
+        "partners": [],
+    }
+    return [first, *fitted]
+
+
+def convergence_data(solution):
+    """Return all searches of a fit as plain data."""
+    return [
+        {
+            "n": start.n,
+            "loss": start.loss,
+            "final_loss": start.final_loss,
+            "evaluations": start.evaluations,
+            "converged": start.converged,
+        }
+        for start in solution.starts
+    ]
+
+
+def physical_materials(graph):
+    """Return the plain parameters of each BSDF of the physical half, by name."""
+    found = {}
+    for index in graph.nodes(mi.ObjectType.BSDF):
+        label = graph.label(index)
+        for _, child in graph.children(index, mi.ObjectType.BSDF):
+            index = child  # of twosided, what is inside
+        found[label] = {"plugin": graph.plugin(index)} | _plain_properties(graph.props(index))
+    return found
+
+
+def _plain_properties(props):
+    values = {}
+    for key, value in props.items():
+        if isinstance(value, bool | int | float | str):
+            values[key] = value
+        elif isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
+            colour = [float(component) for component in value]
+            values[key] = colour[0] if len(set(colour)) == 1 else colour
+    return values
+
+
+def _parameter_data(model, solution, verdicts, covariance, place, normalised):
+    """Return one parameter in the units of the chapters."""
+    parameter, verdict = model.parameters[place], verdicts[place]
+    reason, x = verdict.reason, solution.x
+    if parameter.name != "k_s" or normalised:
+        spread = COVERAGE * sqrt(covariance[place, place])
+        raw = (parameter.paired, x[place], x[place] - spread, x[place] + spread)
+        limits = (parameter.low, parameter.high)
+        turn = (lambda number: number) if parameter.is_linear else exp
+    else:
+        at_n = _place_of_exponent(model.parameters, parameter.owner)
+        if not reason and verdicts[at_n].reason and x[place] > AT_BOUND:
+            reason = "follows from its albedo and n, which is not identifiable"
+        raw = _unnormalised(model, x, covariance, place, at_n)
+        limits = (0.0, normalisation(model.form, exp(x[at_n])))
+        turn = float
+    paired, fitted, below, above = (float(turn(number)) for number in raw)
+    low, high = (float(turn(number)) for number in limits)
+    has_interval = not (reason or verdict.at_bound)
+    return {
+        "name": parameter.name,
+        "channel": parameter.channel,
+        "is_factor": parameter.is_factor or parameter.name == "intensity",
+        "paired": paired,
+        "fitted": None if reason else fitted,
+        "stopped_at": fitted,
+        "interval": [max(below, low), min(above, high)] if has_interval else None,
+        "bounds": [low, high],
+        "at_bound": verdict.at_bound,
+        "identifiable": not reason,
+        "reason": reason,
+        "partners": [_label(model, other) for other in verdict.partners],
+    }
+
+
+def _unnormalised(model, x, covariance, place, at_n):
+    """Return ``k_s`` of an albedo and ``n``: paired, fitted, and the ends of its interval."""
+
+    def k_s(albedo, log_n):
+        return albedo * normalisation(model.form, exp(log_n))
+
+    step = 1e-5
+    slopes = np.zeros(len(x))
+    slopes[place] = k_s(1, x[at_n])
+    slopes[at_n] = (k_s(x[place], x[at_n] + step) - k_s(x[place], x[at_n] - step)) / (2 * step)
+    spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
+    fitted = k_s(x[place], x[at_n])
+    parameters = model.parameters
+    paired = k_s(parameters[place].paired, parameters[at_n].paired)
+    return paired, fitted, fitted - spread, fitted + spread
+
+
+def _place_of_exponent(parameters, owner):
+    (place,) = (i for i, p in enumerate(parameters) if (p.name, p.owner) == ("n", owner))
+    return place
+
+
+def _label(model, place):
+    """Return a name of a parameter for a reader."""
+    parameter = model.parameters[place]
+    owner = (
+        f"light {parameter.owner + 1}"
+        if parameter.name == "intensity"
+        else model.surface.names[parameter.owner]
+    )
+    return f"{parameter.name}{parameter.channel and ' ' + parameter.channel} of {owner}"

@@ -1,0 +1,1 @@
+"""The two halves of a scene, each derived from the other."""

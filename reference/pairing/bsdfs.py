@@ -1,0 +1,162 @@
+"""Replacing the BSDFs of a scene by their counterparts, after the conventions of pairing."""
+
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+
+import mitsuba as mi
+
+from reference.pairing import factors
+from reference.pairing.factors import Convention, Phong
+from reference.pairing.nearest import WRAPPERS, nearest_of
+from reference.scene import values
+from reference.scene.graph import properties
+
+BSDF = mi.ObjectType.BSDF
+COLOURS = {
+    "diffuse": ("reflectance",),
+    "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
+    "phong": ("k_i", "k_a", "k_d", "k_s"),
+}
+"""Colours that are read when a scene is paired, and checked before."""
+
+
+@dataclass(frozen=True)
+class PairedBSDF:
+    """What a BSDF was replaced by, what the replacement misses, and what it has no form for."""
+
+    name: str
+    given: str
+    derived: str
+    parameters: dict
+    misses: tuple = ()
+    lost: tuple = ()
+
+
+def give_default(graph):
+    """Give shapes without a BSDF the one that Mitsuba gives them, so that it can be paired."""
+    for shape in graph.nodes(mi.ObjectType.Shape):
+        if not graph.children(shape, BSDF) and not graph.children(shape, mi.ObjectType.Shape):
+            glows = graph.children(shape, mi.ObjectType.Emitter)
+            default = properties("diffuse", reflectance=0.0 if glows else 0.5)
+            graph.attach(shape, "bsdf", graph.add(BSDF, default))
+
+
+def check(graph):
+    """Refuse coefficients that are no reflectances.
+
+    Raises
+    ------
+    InputError
+        Naming the coefficient and its value.
+    """
+    for index in graph.nodes(BSDF):
+        values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
+
+
+def to_heuristic(graph, convention):
+    """Replace the BSDFs of all shapes by the nearest ``phong`` (:mod:`reference.pairing.nearest`).
+
+    Returns
+    -------
+    list of PairedBSDF
+        One for each BSDF that was not ``phong``, nested ones included, those around them not.
+    """
+    nodes = graph.nodes(BSDF)
+    found = {}
+    for shape in graph.nodes(mi.ObjectType.Shape):
+        for _, index in graph.children(shape, BSDF):
+            nearest_of(graph, index, convention, found)
+    records = [
+        PairedBSDF(
+            graph.label(index),
+            graph.plugin(index),
+            "phong",
+            _shown(graph, index, material),
+            material.misses,
+            material.lost,
+        )
+        for index, material in sorted(found.items())
+        if graph.plugin(index) not in ("phong", *WRAPPERS)
+    ]
+    for index in nodes:
+        if index in found:
+            graph.replace(index, found[index].properties())
+    return records
+
+
+def to_physical(graph, convention):
+    """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
+    records = []
+    for index in graph.nodes(BSDF):
+        converted = _physical_properties(graph, index, convention)
+        if converted is not None:
+            props, record = converted
+            graph.replace(index, props)
+            records.append(record)
+    for index in graph.nodes(BSDF):
+        if graph.plugin(index) not in WRAPPERS:
+            _unfold_twosided(graph, index)
+    return records
+
+
+def _shown(graph, index, material):
+    if graph.plugin(index) == "diffuse":
+        return {"k_d": "reflectance"}
+    return material.parameters()
+
+
+def _unfold_twosided(graph, index):
+    """Turn the mark that a replaced phong left into Mitsuba's ``twosided``."""
+    props = graph.props(index)
+    if "twosided" in props:
+        del props["twosided"]
+        inner = mi.Properties(props)
+        inner.set_id("")
+        outer = mi.Properties("twosided")
+        graph.replace(index, outer)
+        graph.attach(index, "bsdf", graph.add(BSDF, inner))
+
+
+def _physical_properties(graph, index, convention):
+    if graph.plugin(index) != "phong":
+        return None
+    given = graph.props(index)
+    k_s = values.colour(graph, index, "k_s", 0.0)
+    if not any(k_s):
+        is_lit = "k_d" in given and values.may_be_nonzero(given["k_d"])
+        source = "k_d" if is_lit else "k_a"
+        reflectance = given.get(source, 0.0)
+        props = properties("diffuse", reflectance=reflectance)
+        record = PairedBSDF(graph.label(index), "phong", "diffuse", {"reflectance": source})
+    else:
+        plastic, misses = _roughplastic_of(phong(graph, index), convention)
+        props = properties("roughplastic", **asdict(plastic))
+        record = PairedBSDF(
+            graph.label(index), "phong", "roughplastic", asdict(plastic), tuple(misses)
+        )
+    if given.get("twosided"):
+        props["twosided"] = True
+    return props, record
+
+
+def phong(graph, index):
+    """Read the parameters of a ``phong``, with the plugin's defaults.
+
+    Raises
+    ------
+    InputError
+        When a coefficient is a texture or a tabulated spectrum, or not allowed.
+    """
+    props = graph.props(index)
+    return Phong(
+        k_d=values.colour(graph, index, "k_d", 0.0),
+        k_s=values.colour(graph, index, "k_s", 0.0),
+        n=values.number(graph, index, "n", 1.0),
+        form=props.get("form", "phong"),
+        normalised=props.get("normalised", False),
+    )
+
+
+@lru_cache(maxsize=256)
+def _roughplastic_of(phong: Phong, convention: Convention):
+    return factors.to_roughplastic(phong, convention)

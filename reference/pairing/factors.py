@@ -1,0 +1,268 @@
+"""Pairing: which heuristic value stands for which physical one. Each factor is stated here once.
+
+Lights and diffuse surfaces pair exactly (:mod:`heuristic.convention`: irradiance ``E = pi I_p``):
+
+=============================================  =====================================================
+Physical (Mitsuba)                             Heuristic
+=============================================  =====================================================
+``diffuse``, reflectance ``rho``               ``k_d = k_a = rho``, ``k_s = 0``
+``point``, intensity ``I``                     ``I_p0 = I / pi``, ``f_att = 1 / d^2``
+``directional``, irradiance ``E``              ``I_p = E / pi``, ``f_att = 1``
+``spot``, intensity ``I``                      ``I_p0 = I / pi``, ``f_att = 1 / d^2``, the same
+                                               cone, ``m`` fitted; the other way cone and beam
+                                               width are fitted (`lights.spots`)
+small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
+                                               cone 90 degrees, ``f_att = 1 / d^2``
+closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
+``constant``, radiance ``L``                   ``I_a = L``
+emission of radiance ``L``                     ``k_i = L``
+=============================================  =====================================================
+
+A point or spot of another ``f_att`` gets the intensity that gives the same mean irradiance over the
+visible surface, so that only the fall-off's shape is left as a difference.
+
+A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
+mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded
+diffuse surface: a constant environment sends it the irradiance ``pi L``, of which it returns
+``rho L``.
+
+``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cache
+from math import exp, log, sqrt
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from heuristic.terms import normalisation
+from reference.pairing import albedo
+from reference.pairing.albedo import Albedo, RoughPlastic
+
+INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
+"""``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
+
+CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
+
+LITERAL_IOR = 1.5
+SMALLEST_IOR = exp(1e-4)
+"""Reflects 2.5e-9 at normal incidence. Less is taken for that: Mitsuba refuses an IOR of 1."""
+LARGEST_IOR = 10.0
+"""No dielectric comes near it; a larger specular albedo than it gives is recorded as missed."""
+
+MATCHING_TOLERANCE = 1e-5
+"""Relative; a match that is farther off is recorded as a miss."""
+
+
+class Convention(Enum):
+    """How roughplastic and phong are paired.
+
+    ``LITERAL``
+        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))`` whatever the
+        form of the lobe, IOR 1.5. The other way the name ``specular_reflectance`` gives ``k_s``.
+    ``MATCHED``
+        By albedo at normal incidence (light along the normal, light leaving in all directions):
+        ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
+        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe has the
+        same width (:func:`alpha_of`).
+    """
+
+    LITERAL = "literal"
+    MATCHED = "matched"
+
+
+@dataclass(frozen=True)
+class Phong:
+    """Coefficients, exponent and form of a phong material; three components a coefficient."""
+
+    k_d: tuple[float, float, float]
+    k_s: tuple[float, float, float]
+    n: float
+    form: str = "phong"
+    normalised: bool = False
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A quantity that no parameter of the other model reaches, with how near it came."""
+
+    what: str
+    wanted: float
+    reached: float
+
+
+def alpha_of(n, form="phong"):
+    """Return the roughness whose microfacet lobe is as wide as a lobe of exponent ``n``.
+
+    At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
+    ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
+    chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
+    the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
+    1))``. Both forms are 1 at ``n = 0``.
+
+    >>> alpha_of(12)
+    0.2
+    >>> alpha_of(48, form="blinn")
+    0.2
+    """
+    return sqrt(2 / (n + 2)) if form == "blinn" else sqrt(1 / (2 * n + 1))
+
+
+def exponent_of(alpha, form="phong"):
+    """Return the inverse of :func:`alpha_of`; 0 from ``alpha = 1`` upwards.
+
+    >>> round(exponent_of(0.2), 9)
+    12.0
+    """
+    return max(2 / alpha**2 - 2 if form == "blinn" else (1 / alpha**2 - 1) / 2, 0.0)
+
+
+def specular_albedo(phong):
+    """Return the albedo of a phong's lobe at normal incidence, for each channel.
+
+    ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
+    irradiance, hence ``(k_s / pi) 2 pi int cos^n cos sin d(theta)``. In general it is ``k_s`` over
+    :func:`heuristic.terms.normalisation`, and ``k_s`` itself where the lobe is normalised.
+
+    >>> specular_albedo(Phong(k_d=(0.5, 0.5, 0.5), k_s=(0.6, 0.6, 0.6), n=4)).round(9).tolist()
+    [0.2, 0.2, 0.2]
+    """
+    scale = 1.0 if phong.normalised else 1 / normalisation(phong.form, phong.n)
+    return np.asarray(phong.k_s) * scale
+
+
+def to_roughplastic(phong, convention):
+    """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses.
+
+    In the current variant of Mitsuba, since its own plugin tells the albedo:
+
+    >>> grey = (0.5, 0.5, 0.5)
+    >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
+    >>> misses, round(plastic.alpha, 9)
+    ([], 0.2)
+    >>> _, misses = to_roughplastic(Phong(grey, (0.7, 0.7, 0.7), 3), Convention.MATCHED)
+    >>> [miss.what for miss in misses]
+    ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
+    """
+    if convention is Convention.LITERAL:
+        rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
+        return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
+
+    alpha = alpha_of(phong.n, phong.form)
+    strength = max(phong.k_s)
+    tint = tuple(k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
+    wanted = Albedo(np.array(phong.k_d), specular_albedo(phong))
+    int_ior = _ior_for(white, max(wanted.specular))
+    passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    if any(wanted.diffuse > passed):
+        int_ior = _nearest_ior(white, wanted, int_ior)
+        passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    rho = np.minimum(wanted.diffuse / passed, 1)  # the diffuse albedo is linear in rho
+    plastic = replace(white, int_ior=int_ior, diffuse_reflectance=tuple(map(float, rho)))
+    return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
+
+
+def to_phong(plastic, convention):
+    """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses.
+
+    By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
+
+    >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
+    >>> phong, misses = to_phong(plastic, Convention.LITERAL)
+    >>> phong.k_d, phong.n
+    ((0.5, 0.4, 0.3), 6.0)
+    """
+    if convention is Convention.LITERAL:
+        n = exponent_of(plastic.alpha, "blinn")
+        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n), []
+    n = exponent_of(plastic.alpha)
+    reflected = albedo.of_roughplastic(plastic)
+    k_s = reflected.specular * normalisation("phong", n)
+    return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
+
+
+def _ior_for(plastic, wanted):
+    """Return the IOR at which the specular albedo is ``wanted``, or the nearest one allowed.
+
+    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
+    1))^2``: its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
+    """
+
+    def reached(log_ior):
+        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(LARGEST_IOR)))
+        return max(albedo.of_roughplastic(replace(plastic, int_ior=int_ior)).specular)
+
+    if wanted <= 0:
+        return LITERAL_IOR
+    if wanted >= reached(log(LARGEST_IOR)):
+        return LARGEST_IOR
+    if wanted <= reached(log(SMALLEST_IOR)):
+        return SMALLEST_IOR
+    root = min(sqrt(wanted), 0.8)
+    guess = log((1 + root) / (1 - root))
+    found = root_scalar(
+        lambda log_ior: log(reached(log_ior) / wanted),
+        x0=guess,
+        x1=1.1 * guess,
+        method="secant",
+        xtol=1e-7,
+    )
+    return exp(found.root)
+
+
+def _nearest_ior(plastic, wanted, highest):
+    """Return the IOR whose albedos come nearest to the wanted ones, both parts taken together.
+
+    A high index reflects more, and lets less through to the diffuse base and out again: no index
+    gives both parts. Nearest is the least sum of squares over the parts and channels.
+    """
+
+    def distance(log_ior):
+        reached = albedo.of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
+        diffuse = np.minimum(wanted.diffuse, reached.diffuse)
+        return np.sum((diffuse - wanted.diffuse) ** 2 + (reached.specular - wanted.specular) ** 2)
+
+    # Where it is least is where it is level, values a step to either side being equal: the least
+    # value itself is too flat for single precision to tell its place.
+    step = 1.02
+
+    @cache
+    def slope(log_log_ior):
+        return distance(exp(log_log_ior) * step) - distance(exp(log_log_ior) / step)
+
+    smallest, high = log(log(SMALLEST_IOR) * step), log(log(highest) / step)
+    if slope(high) <= 0:
+        return exp(exp(high))
+    low = max(high - 1, smallest)
+    while slope(low) >= 0:
+        if low == smallest:
+            return exp(exp(low))
+        low, high = max(low - 1, smallest), low
+    return exp(exp(root_scalar(slope, bracket=(low, high), xtol=1e-4).root))
+
+
+def _misses(wanted, reached):
+    """List the albedos that were not reached, each value once."""
+    misses = {}
+    for part in ("diffuse", "specular"):
+        for want, value in zip(getattr(wanted, part), getattr(reached, part), strict=True):
+            if abs(value - want) > MATCHING_TOLERANCE * max(want, 1e-3):
+                misses[part, want] = Miss(
+                    f"{part} albedo at normal incidence", float(want), float(value)
+                )
+    return list(misses.values())
+
+
+def _at_most_one(what, colour):
+    """Return a colour limited to 1, and what the limit took away."""
+    limited = tuple(min(component, 1.0) for component in colour)
+    misses = [
+        Miss(what, wanted, reached)
+        for wanted, reached in dict(zip(colour, limited, strict=True)).items()
+        if wanted > reached
+    ]
+    return limited, misses

@@ -1,0 +1,1 @@
+"""Lights, paired both ways."""

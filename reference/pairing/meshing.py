@@ -1,0 +1,72 @@
+"""Replacing the shapes of a scene by triangle meshes, for flat and Gouraud shading."""
+
+import shutil
+import weakref
+from pathlib import Path
+from tempfile import mkdtemp
+
+import mitsuba as mi
+
+from heuristic import meshes
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from reference.scene.graph import Reference, properties
+
+SHAPE = mi.ObjectType.Shape
+
+
+def replace_shapes(graph, scene, resolution, interpolation):
+    """Replace every shape of a graph by a mesh of the same place, name, material and light.
+
+    Parameters
+    ----------
+    graph : reference.scene.graph.Graph
+        The graph to change. It keeps the folder that the meshes are written to until it is deleted.
+    scene : mitsuba.Scene
+        The same shapes, instantiated; they are told by their ids.
+    resolution
+        Of what is no mesh yet, as in :func:`heuristic.meshes.to_mesh`.
+    interpolation : Interpolation
+        Gouraud shading needs one normal a vertex, hence faces that share none where the mesh has
+        ``face_normals``.
+
+    Raises
+    ------
+    InputError
+        Naming a shape that cannot be made into triangles.
+    """
+    folder = _Folder()
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    for index in graph.nodes(SHAPE):
+        given = graph.props(index)
+        if given.id() not in shapes or graph.plugin(index) == "instance":
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: instances and their groups cannot be made"
+                " into meshes of their own. Use --interpolation phong."
+            )
+        mesh = meshes.to_mesh(shapes[given.id()], resolution)
+        if mesh.has_face_normals():
+            if interpolation is Interpolation.GOURAUD:
+                mesh = meshes.split_faces(mesh)
+        elif not mesh.has_vertex_normals():
+            mesh = meshes.with_vertex_normals(mesh)
+        path = folder.path / f"{index}.ply"
+        mesh.write_ply(str(path))
+        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
+        # The file holds world coordinates; flat faces are told by the lack of vertex normals.
+        derived = properties("ply", filename=str(path), **children)
+        if mesh.has_face_normals():
+            derived["face_normals"] = True
+        graph.replace(index, derived)
+    graph.folders.append(folder)
+
+
+class _Folder:
+    """A temporary folder that goes away with the last graph that names it.
+
+    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
+    """
+
+    def __init__(self):
+        self.path = Path(mkdtemp(prefix="fotismos-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

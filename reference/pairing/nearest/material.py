@@ -1,0 +1,104 @@
+"""What a rule of :mod:`reference.pairing.nearest` returns, and what it has at hand."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import mitsuba as mi
+
+from heuristic.terms import normalisation
+from reference.pairing.factors import Convention
+from reference.pairing.nearest import operations
+from reference.scene.graph import Graph, properties
+
+BSDF = mi.ObjectType.BSDF
+
+COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The phong material that stands for a BSDF; values as of `nearest.operations`.
+
+    Attributes
+    ----------
+    k_i, k_a, k_d, k_s, n, form, normalised, twosided, transmittance, tilt
+        Parameters of the plugin ``phong``.
+    lost
+        What the heuristic model has no form for, and the rule by which the rest was found; two
+        words a rule.
+    misses
+        Quantities that were not reached, :class:`reference.pairing.factors.Miss`.
+    """
+
+    k_i: object = 0.0
+    k_a: object = 0.0
+    k_d: object = 0.0
+    k_s: object = 0.0
+    n: object = 1.0
+    form: str = "phong"
+    normalised: bool = False
+    twosided: bool = False
+    transmittance: object = 0.0
+    tilt: object = None
+    lost: tuple[tuple[str, str], ...] = ()
+    misses: tuple = ()
+
+    def properties(self):
+        """Return the properties of the node ``phong``; what has its default is left out."""
+        props = properties("phong")
+        for name in (*COEFFICIENTS, "n", "transmittance"):
+            value = getattr(self, name)
+            if name in ("k_d", "n") or not operations.is_zero(value):
+                props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
+        for name in ("normalised", "twosided"):
+            if getattr(self, name):
+                props[name] = True
+        if self.form != "phong":
+            props["form"] = self.form
+        if self.tilt is not None:
+            props["tilt"] = self.tilt
+        return props
+
+    def parameters(self):
+        """Return the coefficients for records: numbers, or the word ``texture``."""
+        found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
+        if not operations.is_zero(self.transmittance):
+            found["transmittance"] = self.transmittance
+        return {
+            name: "texture" if operations.plain(value) is None else operations.plain(value)
+            for name, value in found.items()
+        }
+
+
+@dataclass(frozen=True)
+class Context:
+    """A graph that rules read and add nodes to.
+
+    ``nearest(index)`` applies the rules to a nested BSDF.
+    """
+
+    graph: Graph
+    convention: Convention
+    nearest: Callable[[int], Nearest] = field(repr=False, default=None)
+
+    def value(self, index, key, default):
+        """Return a parameter as the parser keeps it."""
+        return self.graph.props(index).get(key, default)
+
+    def plugin(self, index):
+        """Return a node's plugin."""
+        return self.graph.plugin(index)
+
+
+def alike(graph, first, second):
+    """Return two materials with their lobes scaled in one way, so that ``k_s`` can be mixed."""
+    if first.normalised == second.normalised:
+        return first, second
+    return tuple(_normalised(graph, material) for material in (first, second))
+
+
+def _normalised(graph, material):
+    if material.normalised:
+        return material
+    scale = 1 / float(normalisation(material.form, operations.plain(material.n)))
+    return replace(material, normalised=True, k_s=operations.product(graph, material.k_s, scale))

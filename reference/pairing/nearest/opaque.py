@@ -1,0 +1,164 @@
+"""Rules for BSDFs that only reflect."""
+
+from dataclasses import asdict
+from functools import lru_cache
+
+from reference.pairing import albedo, factors
+from reference.pairing.albedo import RoughPlastic
+from reference.pairing.factors import Convention, exponent_of
+from reference.pairing.nearest import operations, probed
+from reference.pairing.nearest.material import Nearest
+from reference.scene import values
+
+MIRROR = ("mirror image", "a highlight of the same albedo")
+
+
+def phong(context, index):
+    """``phong``: itself."""
+    props = context.graph.props(index)
+    names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
+    given = {name: props[name] for name in (*names, "tilt") if name in props}
+    return Nearest(**given)
+
+
+def diffuse(context, index):
+    """``diffuse``: ``k_d = k_a = rho`` (exact)."""
+    reflectance = context.value(index, "reflectance", 0.5)
+    return Nearest(k_a=reflectance, k_d=reflectance)
+
+
+def roughplastic(context, index):
+    """``roughplastic``: after the convention (:class:`reference.pairing.factors.Convention`).
+
+    A textured reflectance is matched at each point: the diffuse part's albedo is linear in ``rho``,
+    with ``nonlinear`` it is ``c rho / (1 - f rho)`` (:func:`_of_base`); the lobe's is linear in
+    ``specular_reflectance``.
+    """
+    base, coat = (
+        context.value(index, key, default)
+        for key, default in (("diffuse_reflectance", 0.5), ("specular_reflectance", 1.0))
+    )
+    textured = operations.plain(base) is None or operations.plain(coat) is None
+    if not textured:
+        found, misses = _phong_of(_roughplastic(context.graph, index), context.convention)
+        return Nearest(k_a=found.k_d, **asdict(found), misses=tuple(misses))
+    graph = context.graph
+    white = _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
+    unit, _ = _phong_of(white, context.convention)
+    k_s = operations.product(graph, coat, unit.k_s[0])
+    if context.convention is Convention.LITERAL:
+        return Nearest(k_a=base, k_d=base, k_s=k_s, n=unit.n)
+    half = _roughplastic(graph, index, (0.5,) * 3, (1.0,) * 3)
+    k_d = _of_base(graph, base, unit.k_d[0], _phong_of(half, context.convention)[0].k_d[0])
+    return Nearest(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n)
+
+
+def plastic(context, index):
+    """``plastic``: as ``roughplastic`` when ``alpha`` goes to 0.
+
+    The diffuse part is matched as there; the coat's mirror image becomes a narrow highlight of
+    Fresnel's reflectance at normal incidence.
+    """
+    graph = context.graph
+    base = context.value(index, "diffuse_reflectance", 0.5)
+    coat = context.value(index, "specular_reflectance", 1.0)
+    if context.convention is Convention.LITERAL:
+        return Nearest(k_a=base, k_d=base, k_s=coat, n=_smooth_exponent(), lost=(MIRROR,))
+    levels = [
+        albedo.of_smooth_plastic(
+            level,
+            values.index_of_refraction(graph, index, "int_ior", "polypropylene"),
+            values.index_of_refraction(graph, index, "ext_ior", "air"),
+            context.value(index, "nonlinear", False),
+        )
+        for level in (1.0, 0.5)
+    ]
+    k_d = _of_base(graph, base, *(diffuse for diffuse, _ in levels))
+    reflected = operations.product(graph, coat, levels[0][1])
+    return Nearest(k_a=k_d, k_d=k_d, **probed.lobe(context, reflected, 0.0), lost=(MIRROR,))
+
+
+def conductor(context, index):
+    """``conductor``, ``roughconductor``: ``k_d = 0``, and a lobe of the albedo at normal incidence.
+
+    The albedo is measured with a white ``specular_reflectance``, which then scales it point by
+    point; ``n`` is of the same width as ``alpha``, of the mean of ``alpha_u`` and ``alpha_v`` where
+    they differ. A constant environment is returned by the lobe: ``k_a`` is that albedo.
+    """
+    white = probed.with_values(context, index, specular_reflectance=1.0)
+    reflected = operations.product(
+        context.graph, white.reflected, context.value(index, "specular_reflectance", 1.0)
+    )
+    if context.plugin(index) == "conductor":
+        alpha, lost = 0.0, (MIRROR,)
+    else:
+        alpha, lost = context.value(index, "alpha", white.alpha), ()
+    lost += (("Fresnel reflection", "the reflectance at normal incidence, at all angles"),)
+    return Nearest(k_a=reflected, **probed.lobe(context, reflected, alpha), lost=lost)
+
+
+def principled(context, index):
+    """``principled``: ``k_d = base_color (1 - metallic) (1 - spec_trans)``; the rest is a lobe.
+
+    The lobe's albedo is measured, averaged over textures, less the diffuse part; its width is that
+    of ``alpha = roughness^2``. Light that ``spec_trans`` lets through is seen through without
+    refraction.
+    """
+    graph = context.graph
+    k_d = context.value(index, "base_color", 0.5)
+    for key in ("metallic", "spec_trans"):
+        k_d = operations.rest(graph, k_d, context.value(index, key, 0.0))
+    found = probed.with_values(context, index)
+    roughness = context.value(index, "roughness", 0.5)
+    return Nearest(
+        k_a=found.reflected if operations.plain(k_d) is not None else k_d,
+        k_d=k_d,
+        **probed.lobe(context, found.specular, operations.product(graph, roughness, roughness)),
+        transmittance=found.passed,
+        lost=(("sheen, clearcoat, Fresnel reflection", "a diffuse part and one lobe"),),
+    )
+
+
+def _of_base(graph, rho, whole, half):
+    """Return the albedo of a plastic's diffuse base at each point of a reflectance.
+
+    Light that the coat throws back is reflected by the base again, so that the albedo is ``c rho /
+    (1 - f rho)``, with ``f = 0`` where ``nonlinear`` is off; ``c`` and ``f`` follow from the
+    albedos at ``rho`` of 1 and 0.5: ``a(1) / a(0.5) = (2 - f) / (1 - f)``.
+    """
+    ratio = whole / half
+    returned = (ratio - 2) / (ratio - 1)
+    if returned < 1e-5:
+        return operations.product(graph, rho, whole)
+    scale = whole * (1 - returned)
+    if operations.plain(rho) is not None:
+        level = operations.plain(rho)
+        shares = level if isinstance(level, tuple) else (level,)
+        found = tuple(scale * share / (1 - returned * share) for share in shares)
+        return found if len(found) > 1 else found[0]
+    return operations.node(
+        graph, "heuristic_interior", rho=rho, scale=float(scale), **{"return": float(returned)}
+    )
+
+
+def _smooth_exponent():
+    return exponent_of(probed.SMOOTH_ALPHA)
+
+
+def _roughplastic(graph, index, base=None, coat=None):
+    """Read a roughplastic's parameters, with Mitsuba's defaults; reflectances where not given."""
+    props = graph.props(index)
+    return RoughPlastic(
+        diffuse_reflectance=base or values.colour(graph, index, "diffuse_reflectance", 0.5),
+        alpha=values.number(graph, index, "alpha", 0.1),
+        int_ior=values.index_of_refraction(graph, index, "int_ior", "polypropylene"),
+        ext_ior=values.index_of_refraction(graph, index, "ext_ior", "air"),
+        specular_reflectance=coat or values.colour(graph, index, "specular_reflectance", 1.0),
+        distribution=props.get("distribution", "beckmann"),
+        nonlinear=props.get("nonlinear", False),
+    )
+
+
+@lru_cache(maxsize=256)
+def _phong_of(plastic: RoughPlastic, convention: Convention):
+    return factors.to_phong(plastic, convention)

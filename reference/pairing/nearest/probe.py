@@ -1,0 +1,152 @@
+"""Measuring a BSDF by its own sampling, for plugins that no rule knows, a user's own included.
+
+At normal incidence, by a rank-1 lattice of samples that also covers the texture plane:
+
+* albedos of what is reflected and of what passes through, as ``sample`` weighs it (light as
+  particles, so that a refraction's change of solid angle does not count);
+* the diffuse part ``k_d = pi f``, with the BRDF ``f`` 60 degrees off the normal, beside the lobe;
+* the lobe's width from the median slope of what is left, over half vectors: for Beckmann's lobe
+  ``tan^2`` is distributed exponentially, with the median ``alpha^2 ln 2``. A mean would rest on the
+  tail, which is where the diffuse part is not quite even.
+
+Textures are averaged.
+"""
+
+from dataclasses import dataclass
+from math import cos, log, pi, radians, sin
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from reference.pairing.nearest import operations
+
+SAMPLES = 8192
+LATTICE = (1, 3547, 1663, 5413, 2689)
+"""Generator of the rank-1 lattice (Korobov): three numbers for the sample, two for the texture."""
+
+OFF_LOBE = radians(60.0)
+
+WAVELENGTHS = np.linspace(360.0, 830.0, 48)
+"""Where a spectral variant is probed, nanometres; as Mitsuba's own range."""
+
+
+@dataclass(frozen=True)
+class Probed:
+    """Albedos at normal incidence, one value a channel or wavelength, and the lobe's width."""
+
+    reflected: np.ndarray
+    diffuse: np.ndarray
+    passed: np.ndarray
+    scattered: np.ndarray
+    alpha: float
+
+    @property
+    def specular(self):
+        """Albedo of the lobe: what is reflected beside the diffuse part."""
+        return np.maximum(self.reflected - self.diffuse, 0)
+
+
+def probe(bsdf):
+    """Return what is :class:`Probed` of a BSDF; None where it cannot be sampled."""
+    wavelengths = WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
+    try:
+        parts = [_at(bsdf, chosen) for chosen in wavelengths]
+    except RuntimeError:
+        return None
+    albedos = [np.concatenate(column) for column in zip(*(part[:4] for part in parts), strict=True)]
+    alpha = float(np.mean([part[4] for part in parts]))
+    if not all(np.isfinite(albedo).all() for albedo in albedos) or not np.isfinite(alpha):
+        return None
+    return Probed(*albedos, alpha)
+
+
+def as_value(graph, albedo, emitted=False):
+    """Return albedos as a value of a graph: a number, a colour, or a tabulated spectrum.
+
+    What is ``emitted`` is always tabulated in spectral variants, where a number means daylight.
+    """
+    albedo = np.asarray(albedo, float)
+    tabulated = emitted and mi.is_spectral
+    if not tabulated and np.ptp(albedo) <= 1e-6 * max(albedo.max(), 1e-30):
+        return float(albedo.mean())
+    if not mi.is_spectral:
+        return tuple(albedo.tolist())
+    return operations.node(
+        graph,
+        "regular",
+        wavelength_min=float(WAVELENGTHS[0]),
+        wavelength_max=float(WAVELENGTHS[-1]),
+        values=", ".join(f"{value:.6g}" for value in albedo),
+    )
+
+
+def interaction(size, wavelengths=None):
+    """Return interactions on a plane seen head on, spread over the texture plane by a lattice."""
+    index = np.arange(size)
+    lattice = (np.outer(LATTICE, index) / size + 0.5 / size) % 1
+    points = [mi.Float(row) for row in lattice]
+    si = dr.zeros(mi.SurfaceInteraction3f, size)
+    si.t = 1.0
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.uv = mi.Point2f(points[3], points[4])
+    si.wi = mi.Vector3f(0, 0, 1)
+    if wavelengths is not None:
+        si.wavelengths = opaque_wavelengths(wavelengths)
+    return si, points[:3]
+
+
+def opaque_wavelengths(wavelengths):
+    """Return four wavelengths as one spectrum that compiles the same kernel for all."""
+    found = mi.Spectrum(*map(float, wavelengths))
+    dr.make_opaque(found)
+    return found
+
+
+def _at(bsdf, wavelengths):
+    si, points = interaction(SAMPLES, wavelengths)
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    bs, weight = bsdf.sample(context, si, points[0], mi.Point2f(*points[1:]), True)
+    weight = dr.select(dr.isfinite(weight) & (bs.pdf > 0), weight, 0)
+    up = bs.wo.z > 0
+    straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null) | ~mi.has_flag(
+        bs.sampled_type, mi.BSDFFlags.Diffuse
+    )
+    around = mi.Float(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+    sin_phi, cos_phi = dr.sincos(around)
+    beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
+    level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
+    reflected, passed, scattered, diffuse = (
+        _means(value)
+        for value in (
+            dr.select(up, weight, 0),
+            dr.select(~up & straight, weight, 0),
+            dr.select(~up & ~straight, weight, 0),
+            level,
+        )
+    )
+    diffuse = np.clip(diffuse, 0, reflected)
+    return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
+
+
+def _means(value):
+    """Return the mean of each channel of a spectrum."""
+    return np.array([np.mean(np.array(channel, float)) for channel in value])
+
+
+def _width(bs, weight, up, diffuse):
+    """Return the root mean square slope of the lobe beside the diffuse part, by its median."""
+    weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
+    cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
+    density = np.array(bs.pdf, float)
+    delta = np.array(mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta))
+    # Of each sample's weight, f cos / pdf, the diffuse part is k_d cos / (pi pdf).
+    share = np.where(delta, 0, np.mean(diffuse) * cosine / (np.pi * np.maximum(density, 1e-30)))
+    weights = np.maximum(weights - share, 0)
+    slope = np.where(delta, 0, (1 - cosine) / (1 + cosine))  # tan^2 of half the angle
+    order = np.argsort(slope)
+    reached = np.cumsum(weights[order])
+    median = slope[order][np.searchsorted(reached, reached[-1] / 2)] if reached[-1] > 0 else 0.0
+    return float(np.sqrt(median / log(2)))

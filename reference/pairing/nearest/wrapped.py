@@ -1,0 +1,95 @@
+"""Rules for BSDFs that are made of others."""
+
+from dataclasses import replace
+
+from reference.pairing.nearest import operations
+from reference.pairing.nearest.material import BSDF, COEFFICIENTS, Nearest, alike
+from reference.pairing.nearest.operations import TEXTURE
+
+
+def twosided(context, index):
+    """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
+    graph = context.graph
+    inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
+    if len(inner) == 1:
+        return replace(inner[0], twosided=True)
+    front, back = alike(graph, *inner[:2])
+    sided = {
+        name: operations.sides(graph, getattr(front, name), getattr(back, name))
+        for name in (*COEFFICIENTS, "n", "transmittance")
+    }
+    return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
+
+
+def mask(context, index):
+    """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
+    graph = context.graph
+    ((_, child),) = graph.children(index, BSDF)
+    inner = context.nearest(child)
+    opacity = context.value(index, "opacity", 0.5)
+    reflected = {
+        name: operations.share(graph, getattr(inner, name), opacity)
+        for name in ("k_a", "k_d", "k_s")
+    }
+    passed = operations.total(
+        graph,
+        operations.rest(graph, 1.0, opacity),
+        operations.share(graph, inner.transmittance, opacity),
+    )
+    return replace(inner, **reflected, transmittance=passed)
+
+
+def blend(context, index):
+    """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
+
+    Exact where only one of the two has a lobe, or where the weight is 0 or 1.
+    """
+    graph = context.graph
+    inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
+    first, second = alike(graph, *inner[:2])
+    weight = context.value(index, "weight", 0.5)
+    mixed = {
+        name: operations.blend(graph, getattr(first, name), getattr(second, name), weight)
+        for name in (*COEFFICIENTS, "transmittance")
+    }
+    lobes = [material for material in (first, second) if not operations.is_zero(material.k_s)]
+    if len(lobes) == 2:
+        mixed["n"] = operations.blend(graph, first.n, second.n, weight)
+        lost = (("two lobes", "one, of the blended exponent and coefficient"),)
+        form = first.form
+    else:
+        mixed["n"], form, lost = *((lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")), ()
+    return Nearest(
+        **mixed,
+        form=form,
+        normalised=first.normalised,
+        twosided=first.twosided or second.twosided,
+        tilt=first.tilt or second.tilt,
+        lost=first.lost + second.lost + lost,
+        misses=first.misses + second.misses,
+    )
+
+
+def normal_map(context, index):
+    """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
+    return _tilted(context, index, normals=context.graph.props(index)["normalmap"])
+
+
+def bump_map(context, index):
+    """``bumpmap``: the nested material, with the displaced surface's normal (as there)."""
+    ((key, _),) = context.graph.children(index, TEXTURE)
+    scale = float(context.value(index, "scale", 1.0))
+    return _tilted(context, index, heights=context.graph.props(index)[key], scale=scale)
+
+
+def _tilted(context, index, **values):
+    ((_, child),) = context.graph.children(index, BSDF)
+    inner = context.nearest(child)
+    lost = inner.lost
+    if context.value(index, "use_shadowing_function", True):
+        lost += (("shadows that mapped bumps cast on each other", "none"),)
+    values["flip"] = context.value(index, "flip_invalid_normals", True)
+    if inner.tilt is not None:
+        lost += (("nested normal maps", "the outer one alone"),)
+    tilt = operations.node(context.graph, "heuristic_tilt", **values)
+    return replace(inner, tilt=tilt, lost=lost)

@@ -1,0 +1,1 @@
+"""What a scene calls for, and the cheapest reference that simulates it."""

@@ -1,0 +1,1 @@
+"""Rendering in independent passes: integrators, sums, geometry."""

@@ -1,0 +1,262 @@
+"""Rendering in independent passes, with mean, standard error and times.
+
+Both halves of a pair are rendered pass by pass with the same sampler and the same seed, so that the
+camera rays of a pass are the same in both and pixel filter and edges cancel in the difference.
+Passes differ in seed alone and are independent; samples within a pass are stratified and are not,
+so that every standard error here comes from the spread of passes.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import IntEnum
+from statistics import median
+from time import perf_counter
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic.errors import InputError, NonFiniteError
+from reference.rendering import direct
+from reference.rendering.environment import AlbedoTable
+from reference.scene.preparation import PATHS
+
+
+class Stream(IntEnum):
+    """What passes are for; passes of different streams are independent at any seed."""
+
+    COMPARED = 0
+    OTHER_SIDE = 1
+    REPLICATES = 2
+
+
+def pass_seed(seed, number, stream=Stream.COMPARED):
+    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
+
+    Both halves, and all methods that are compared, take the same one for a pass. So their camera
+    rays cancel, while runs of different seeds have no pass in common.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
+    return int(sequence.generate_state(1)[0])
+
+
+@dataclass(frozen=True)
+class PassTimes:
+    """Times of the passes of one half, in seconds.
+
+    ``first`` is that of the first pass, which traces and compiles; ``compilation`` the part of it
+    that LLVM took, next to nothing for kernels that Dr.Jit finds in its cache on disk. ``median``
+    is of the passes after the first (of the first where it is alone).
+    """
+
+    median: float
+    first: float
+    total: float
+    compilation: float
+    passes: int
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An image from ``passes`` independent passes; arrays are (H, W, 3), linear.
+
+    Attributes
+    ----------
+    mean
+        Mean of the passes.
+    standard_error
+        Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
+    noise
+        An image with the distribution of ``mean``'s error: the passes summed with alternating
+        signs, divided by their number.
+    """
+
+    mean: np.ndarray
+    standard_error: np.ndarray
+    noise: np.ndarray
+    passes: int
+
+
+class Mean:
+    """The running mean of passes.
+
+    Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering.
+    """
+
+    SUMS = ("mean",)
+
+    def __init__(self):
+        self.count = 0
+
+    def add(self, image):
+        """Add a pass: a tensor (H, W, 3)."""
+        image = mi.TensorXd(image)
+        if self.count == 0:
+            for name in self.SUMS:
+                setattr(self, f"_{name}", dr.zeros_like(image))
+        self.count += 1
+        self._step(image)
+        dr.eval(*(getattr(self, f"_{name}") for name in self.SUMS))
+
+    def mean(self):
+        """Return the mean of the passes so far."""
+        return np.array(self._mean)
+
+    def state(self):
+        """Return the sums as arrays, for :meth:`restore`."""
+        sums = {name: np.array(getattr(self, f"_{name}")) for name in self.SUMS}
+        return {"count": np.array(self.count)} | sums
+
+    def restore(self, state):
+        """Go on from the :meth:`state` of another one."""
+        self.count = int(state["count"])
+        for name in self.SUMS:
+            setattr(self, f"_{name}", mi.TensorXd(state[name]))
+
+    def _step(self, image):
+        self._mean += (image - self._mean) / dr.opaque(mi.Float64, self.count)
+
+
+class Accumulator(Mean):
+    """Running sums of passes, for an :class:`Estimate`."""
+
+    SUMS = ("mean", "squares", "signed")
+
+    def _step(self, image):
+        step = image - self._mean
+        super()._step(image)
+        self._squares += step * (image - self._mean)
+        self._signed += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
+
+    def noise(self):
+        """Return the noise image of :class:`Estimate`; the number of passes should be even."""
+        return np.array(self._signed) / self.count
+
+    def estimate(self):
+        """Return what the passes so far say; their number should be even and at least 2."""
+        variance = np.array(self._squares)
+        variance /= max(self.count - 1, 1) * self.count
+        return Estimate(
+            mean=self.mean(),
+            standard_error=np.sqrt(variance, out=variance),
+            noise=self.noise(),
+            passes=self.count,
+        )
+
+
+class Renderer:
+    """One half of a pair, ready to render passes in the variant that it was made in.
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene.
+    integrator
+        A Mitsuba integrator; None takes the scene's own.
+    spp
+        Samples a pixel and pass. ``multijitter`` rounds it up to what it can lay out.
+    label
+        Name in error messages.
+    """
+
+    def __init__(self, scene, integrator, spp, label):
+        self.scene = scene
+        self.integrator = integrator or scene.integrator()
+        self.spp = spp
+        self.label = label
+        self.variant = mi.variant()
+        self.times = []
+        self.compilation = 0.0
+
+    def render(self, seed):
+        """Render one pass and return it as a tensor (H, W, 3), noting the time.
+
+        Raises
+        ------
+        InputError
+            With Mitsuba's own reason when it cannot render the scene.
+        NonFiniteError
+            Naming the first pixel that is NaN or infinite, and how many there are.
+        """
+        with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            begin = perf_counter()
+            try:
+                image = mi.render(
+                    self.scene,
+                    integrator=self.integrator,
+                    spp=self.spp,
+                    seed=dr.opaque(mi.UInt32, seed),
+                )
+                dr.eval(image)
+                dr.sync_thread()
+            except RuntimeError as error:
+                raise InputError(
+                    f"{self.label}: Mitsuba cannot render it: {_reason(error)}"
+                ) from error
+            self.times.append(perf_counter() - begin)
+            kernels = dr.kernel_history([dr.KernelType.JIT])
+        self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
+        if image.shape[2] == 1:
+            image = dr.repeat(image, 3, axis=2)
+        _require_finite(image, self.label, seed)
+        return image
+
+    def pass_times(self):
+        """Return the :class:`PassTimes` of the passes so far."""
+        steady = self.times[1:] or self.times
+        return PassTimes(
+            median=median(steady),
+            first=self.times[0],
+            total=sum(self.times),
+            compilation=self.compilation,
+            passes=len(self.times),
+        )
+
+
+@contextmanager
+def variant(name):
+    """Switch to a Mitsuba variant for the block, if it is not the current one already."""
+    if name == mi.variant():
+        yield
+        return
+    with mi.scoped_set_variant(name):
+        yield
+
+
+def physical_integrator(plan, scene, hide_emitters):
+    """Make the integrator that a plan names, for the physical half's scene."""
+    direct.register()
+    if plan.integrator in PATHS:
+        description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+        return mi.load_dict(description | {"max_depth": plan.max_depth, "rr_depth": plan.rr_depth})
+    integrator = mi.load_dict(
+        {
+            "type": plan.integrator,
+            "hide_emitters": hide_emitters,
+            "shadows": plan.shadows,
+            "max_depth": plan.max_depth,
+        }
+    )
+    if plan.tabulate_environment:
+        integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
+    return integrator
+
+
+def _reason(error):
+    """Return the message of the error that began a chain of them."""
+    while (cause := error.__cause__ or error.__context__) is not None:
+        error = cause
+    return str(error).strip()
+
+
+def _require_finite(image, label, seed):
+    if dr.all(dr.isfinite(image.array)):
+        return
+    bad = ~np.isfinite(np.array(image)).all(axis=2)
+    y, x = np.argwhere(bad)[0]
+    raise NonFiniteError(
+        f"{label}, pass with seed {seed}: {bad.sum()} pixels are NaN or infinite, the first at"
+        f" x = {x}, y = {y}. Look at the surface and the lights seen there: an infinite light or a"
+        " degenerate mesh is the usual cause."
+    )

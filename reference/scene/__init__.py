@@ -1,0 +1,1 @@
+"""Scenes as Mitsuba reads them: files, graph, sensor and film."""

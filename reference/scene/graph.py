@@ -1,0 +1,272 @@
+"""A scene as Mitsuba's parser reads it: a graph of nodes that can be edited before it is made.
+
+Both halves of a pair are derived from one such graph. It comes from an XML file or from a Python
+dictionary, and knows the file and line of each node, which is what error messages name.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from heuristic.plugins import emitters, mapped
+from reference.scene import file_checks
+
+Parser = mi.parser
+Reference = mi.Properties.ResolvedReference
+
+KINDS_OF_OWN_PLUGINS = {
+    "phong": mi.ObjectType.BSDF,
+    "heuristic": mi.ObjectType.Integrator,
+    "heuristic_glow": mi.ObjectType.Emitter,
+    "heuristic_tilt": mi.ObjectType.Texture,
+}
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(emitters.KINDS, mi.ObjectType.Emitter)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
+
+VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+
+
+def set_variant(variant):
+    """Switch Mitsuba to one of the variants that fotismos supports.
+
+    Raises
+    ------
+    InputError
+        For any other name.
+    """
+    if variant not in VARIANTS:
+        raise InputError(
+            f"variant {variant!r} is not supported: choose one of {', '.join(VARIANTS)}."
+        )
+    mi.set_variant(variant)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scene comes from: a name, and an XML file or a dictionary.
+
+    Parameters
+    ----------
+    name
+        Name in reports and of the output folder.
+    content
+        Path of a Mitsuba XML file, a dictionary as ``mitsuba.load_dict`` takes it, or a function
+        that returns one.
+    parameters
+        Values for the ``$name`` placeholders of an XML file.
+    """
+
+    name: str
+    content: str | PathLike | Mapping | Callable[[], Mapping]
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+    def parse(self):
+        """Return the scene's graph, for the current variant.
+
+        Raises
+        ------
+        InputError
+            With Mitsuba's own message, which names file, line and column, when the file is missing,
+            is not XML, or uses something that Mitsuba does not know.
+        """
+        config = Parser.ParserConfig(mi.variant())
+        try:
+            content = self.content() if callable(self.content) else self.content
+            if isinstance(content, Mapping):
+                state = Parser.parse_dict(config, dict(content))
+            else:
+                path = Path(content)
+                file_checks.check(path)
+                state = Parser.parse_file(config, str(path), **self.parameters)
+            Parser.transform_upgrade(config, state)
+            Parser.transform_resolve_references(config, state)
+        except RuntimeError as error:
+            raise InputError(f"{self.name}: {error}") from error
+        if state.root.type != mi.ObjectType.Scene:
+            raise InputError(
+                f"{self.name}: this is no scene. Its outermost element must be a scene."
+            )
+        graph = Graph(self.name, config, state)
+        if not isinstance(content, Mapping):
+            graph.folder = path.resolve().parent
+        return graph
+
+
+class Graph:
+    """The nodes of one scene, with the edits that pairing needs.
+
+    A node is named by its index. Nodes are only ever added or replaced, so that indices stay valid.
+    """
+
+    def __init__(self, name, config, state):
+        self.name = name
+        self.config = config
+        self.state = state
+        self.folders = []  # temporary ones with files that nodes refer to
+        self.kinds = {}  # of plugins written in Python
+        self.folder = None  # where relative names of files begin
+
+    def copy(self):
+        """Return a graph that can be edited apart from this one."""
+        copy = Graph(self.name, self.config, Parser.ParserState(self.state))
+        copy.folders = list(self.folders)
+        copy.kinds = self.kinds
+        copy.folder = self.folder
+        return copy
+
+    def instantiate(self, index=0):
+        """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
+
+        Raises
+        ------
+        InputError
+            With Mitsuba's own message when a plugin refuses its parameters.
+        """
+        state = Parser.ParserState(self.state)
+        if index:
+            state.nodes[0] = Parser.SceneNode(state.nodes[index])
+        for node in state.nodes:
+            for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
+                # Reading a value marks it as used, and would hide it from Mitsuba's check.
+                node.props.mark_queried(key, False)
+        # A plugin written in Python that evaluates something, made by one of several threads, would
+        # wait for ever for another that waits for Python.
+        self.config.parallel = not any(map(_is_python, state.nodes))
+        try:
+            with _files_from(self.folder):
+                made = Parser.instantiate(self.config, state)
+        except RuntimeError as error:
+            raise InputError(f"{self.name}: {_message(error)}") from error
+        return made[0] if isinstance(made, list) else made
+
+    def nodes(self, kind):
+        """Return the indices of the nodes of a kind (``mitsuba.ObjectType``) that are in use."""
+        return [index for index in self.nodes_in_use() if self.kind(index) == kind]
+
+    def kind(self, index):
+        """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
+        kind = self.state.nodes[index].type
+        if kind != mi.ObjectType.Unknown:
+            return kind
+        plugin = self.plugin(index)
+        if plugin not in self.kinds:
+            self.kinds[plugin] = KINDS_OF_OWN_PLUGINS.get(plugin) or self._kind_of_object(index)
+        return self.kinds[plugin]
+
+    def _kind_of_object(self, index):
+        """Return the kind of a user's own plugin: that of the object that it makes."""
+        made = self.instantiate(index)
+        for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
+            if isinstance(made, getattr(mi, kind)):
+                return getattr(mi.ObjectType, kind)
+        return mi.ObjectType.Unknown
+
+    def plugin(self, index):
+        """Return the name of a node's plugin."""
+        return self.props(index).plugin_name()
+
+    def props(self, index):
+        """Return a node's properties. They are its own: changing them changes the graph."""
+        return self.state.nodes[index].props
+
+    def label(self, index):
+        """Return a short name of a node for records and messages: its id, or else its place."""
+        identifier = self.props(index).id()
+        return identifier or f"{self.plugin(index)} at {self.location(index)}"
+
+    def location(self, index):
+        """Return where a node was written, as a person would look it up."""
+        return Parser.file_location(self.state, self.state.nodes[index])
+
+    def children(self, index, kind):
+        """Return ``(key, index)`` for the children of a node that are of a kind."""
+        return [
+            (key, value.index())
+            for key, value in self.props(index).items()
+            if isinstance(value, Reference) and self.kind(value.index()) == kind
+        ]
+
+    def add(self, kind, props):
+        """Add a node, and return its index."""
+        node = Parser.SceneNode()
+        node.type, node.props = kind, props
+        self.state.nodes.append(node)
+        return len(self.state.nodes) - 1
+
+    def attach(self, parent, key, child):
+        """Make a node the child of another, in place of what was under that key."""
+        self.props(parent)[key] = Reference(child)
+
+    def detach(self, parent, key):
+        """Take a child away."""
+        del self.props(parent)[key]
+
+    def remove(self, index):
+        """Take a node out of its parent, the scene."""
+        for key, value in list(self.props(0).items()):
+            if isinstance(value, Reference) and value.index() == index:
+                self.detach(0, key)
+
+    def replace(self, index, props):
+        """Give a node other properties; its id stays."""
+        props.set_id(self.props(index).id())
+        node = Parser.SceneNode(self.state.nodes[index])
+        node.type, node.props = self.kind(index), props
+        self.state.nodes[index] = node
+
+    def nodes_in_use(self):
+        """Return the indices of all nodes that the scene refers to, directly or not."""
+        seen, queue = set(), [0]
+        while queue:
+            index = queue.pop()
+            if index in seen:
+                continue
+            seen.add(index)
+            for _, value in self.props(index).items():
+                if isinstance(value, Reference):
+                    queue.append(value.index())
+        return sorted(seen)
+
+
+@contextmanager
+def _files_from(folder):
+    """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
+    if folder is None:
+        yield
+        return
+    before = mi.file_resolver()
+    widened = mi.FileResolver(before)
+    widened.prepend(str(folder))
+    mi.set_file_resolver(widened)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
+
+
+def _is_python(node):
+    """Tell whether a node's plugin is written in Python, a user's own included."""
+    is_unknown = node.type == mi.ObjectType.Unknown
+    return is_unknown or node.props.plugin_name() in KINDS_OF_OWN_PLUGINS
+
+
+def _message(error):
+    """Return Mitsuba's message; of a plugin written in Python, what it said and where it stands."""
+    text = str(error).strip()
+    if "Traceback" not in text:
+        return text
+    place, _, trace = text.partition(": failed to instantiate")
+    return f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
+
+
+def properties(plugin, **values):
+    """Make the properties of a node."""
+    props = mi.Properties(plugin)
+    for key, value in values.items():
+        props[key] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
+    return props

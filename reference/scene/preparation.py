@@ -1,0 +1,215 @@
+"""What both halves of a pair need of a scene: its sensor, film, integrator, ids and BSDFs."""
+
+from dataclasses import dataclass, field
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from reference.pairing import bsdfs
+from reference.pairing.lights import reading
+from reference.scene.graph import Reference, properties
+
+FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
+    getattr(mi.ObjectType, kind)
+    for kind in ("Film", "Integrator", "Medium", "Sampler", "Sensor", "Shape")
+)
+
+PATHS = ("path", "volpath", "volpathmis")
+"""Integrators whose light is the reference's: all paths up to a length."""
+
+FILM_SIZES = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
+
+
+@dataclass(frozen=True)
+class Overridden:
+    """Something that the scene asks for, and what is done in its place."""
+
+    what: str
+    given: str
+    used: str
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the scene's own integrator asks for.
+
+    ``integrator`` is its plugin, None where the scene has none; ``max_depth`` counts as Mitsuba's,
+    -1 for no limit; ``rr_depth`` is None where it is not given.
+    """
+
+    integrator: str | None = None
+    ambient: object = None
+    hide_emitters: bool = False
+    max_depth: int = -1
+    rr_depth: int | None = None
+    occlusion: bool = False
+    overridden: list[Overridden] = field(default_factory=list)
+
+
+def prepare(graph, resolution, sensor=0):
+    """Check the graph, fill in what both halves need, and return its :class:`Settings`.
+
+    Of several sensors one is kept, by its number among those of the Mitsuba scene. The integrator
+    is taken out: each half gets its own.
+    """
+    _open_merged(graph)
+    bsdfs.give_default(graph)
+    bsdfs.check(graph)
+    reading.check(graph)
+    for shape in graph.nodes(SHAPE):
+        if not graph.props(shape).id():
+            graph.props(shape).set_id(f"shape-{shape}")
+    overridden = []
+    kept = keep_sensor(graph, sensor)
+    _prepare_film(graph, kept, resolution, overridden)
+    _note_sampler(graph, kept, overridden)
+    return _take_integrator(graph, overridden)
+
+
+def media(graph):
+    """Return the nodes of participating media."""
+    return graph.nodes(MEDIUM)
+
+
+def _open_merged(graph):
+    """Put the shapes inside ``merge`` in its place: merging is an optimisation, and hides ids."""
+    for index in graph.nodes(SHAPE):
+        if graph.plugin(index) == "merge":
+            for _, child in graph.children(index, SHAPE):
+                graph.attach(0, f"shape_{child}", child)
+            graph.remove(index)
+
+
+def film_size(graph, sensor=0):
+    """Return the width and height that the film of a sensor is given.
+
+    Raises
+    ------
+    InputError
+        When there is no such sensor.
+    """
+    films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
+    return _size(graph.props(films[0][1]) if films else {})
+
+
+def _size(film):
+    """Return a film's width and height, or what Mitsuba takes where they are not given."""
+    return tuple(int(film.get(side, usual)) for side, usual in (("width", 768), ("height", 576)))
+
+
+def keep_sensor(graph, number):
+    """Keep one sensor of the scene, and return its index.
+
+    Raises
+    ------
+    InputError
+        When there is none of this number.
+    """
+    places = []
+    for key, value in graph.props(0).items():
+        if isinstance(value, Reference):
+            index = value.index()
+            if graph.kind(index) == SENSOR:
+                places.append((0, key, index))
+            places += [(index, inner, child) for inner, child in graph.children(index, SENSOR)
+                       if graph.kind(index) == SHAPE]  # fmt: skip
+    if not places:
+        raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
+    if not 0 <= number < len(places):
+        raise InputError(
+            f"{graph.name}: there is no sensor {number}. Its sensors have the numbers 0 to"
+            f" {len(places) - 1}."
+        )
+    for place, (parent, key, _) in enumerate(places):
+        if place != number:
+            graph.detach(parent, key)
+    return places[number][2]
+
+
+def _prepare_film(graph, sensor, resolution, overridden):
+    """Set the film to linear RGB floats, and to the resolution that was asked for."""
+    films = graph.children(sensor, FILM)
+    if not films:
+        films = [("film", graph.add(FILM, properties("hdrfilm")))]
+        graph.attach(sensor, *films[0])
+    ((_, film),) = films
+    if graph.plugin(film) != "hdrfilm":
+        overridden.append(Overridden("film", graph.plugin(film), "hdrfilm"))
+        given = graph.props(film)
+        sizes = {name: given[name] for name in FILM_SIZES if name in given}
+        filters = graph.children(film, mi.ObjectType.ReconstructionFilter)
+        graph.replace(film, properties("hdrfilm", **sizes))
+        for key, child in filters:
+            graph.attach(film, key, child)
+    props = graph.props(film)
+    pixel_format = "luminance" if mi.is_monochromatic else "rgb"
+    given = props.get("pixel_format", "rgb")
+    if given != pixel_format:
+        overridden.append(Overridden("pixel format", given, pixel_format))
+    props["pixel_format"] = pixel_format
+    props["component_format"] = "float32"
+    if resolution is not None:
+        _resize(props, resolution)
+
+
+def _resize(props, resolution):
+    """Set a film's size; a crop keeps its place in the picture."""
+    old = _size(props)
+    for side, name, new, before in zip(
+        ("width", "height"), ("x", "y"), resolution, old, strict=True
+    ):
+        if f"crop_{side}" in props:
+            begin = props.get(f"crop_offset_{name}", 0)
+            end = begin + props[f"crop_{side}"]
+            first = min(round(begin * new / before), new - 1)
+            props[f"crop_offset_{name}"] = first
+            props[f"crop_{side}"] = max(round(end * new / before) - first, 1)
+        props[side] = new
+
+
+def _note_sampler(graph, sensor, overridden):
+    """Record the scene's own samples, which those of the plan replace."""
+    for _, index in graph.children(sensor, SAMPLER):
+        count = graph.props(index).get("sample_count", 4)
+        given = f"{graph.plugin(index)}, {count} samples a pixel"
+        overridden.append(Overridden("sampler", given, "sampler and samples of the plan"))
+
+
+def _take_integrator(graph, overridden):
+    """Read the scene's integrator, inside of those that only add channels, and take it out."""
+    settings = Settings(overridden=overridden)
+    for key, index in graph.children(0, INTEGRATOR):
+        graph.detach(0, key)
+        inner = index
+        while nested := graph.children(inner, INTEGRATOR):
+            overridden.append(
+                Overridden("integrator", graph.plugin(inner), "the integrator inside it")
+            )
+            inner = nested[0][1]
+        settings = _settings(graph, inner, overridden)
+    return settings
+
+
+def _settings(graph, index, overridden):
+    plugin, props = graph.plugin(index), graph.props(index)
+    hidden = props.get("hide_emitters", None)
+    if plugin == "heuristic":
+        ambient = props.get("ambient", None)
+        # The chapters' background is black, though their ambient light fills the room.
+        return Settings(
+            integrator=plugin,
+            ambient=ambient,
+            hide_emitters=ambient is not None if hidden is None else hidden,
+            occlusion=props.get("occlusion", False),
+            overridden=overridden,
+        )
+    if plugin not in (*PATHS, "direct"):
+        used = "path: all light, which is what the comparison is with"
+        overridden.append(Overridden("integrator", plugin, used))
+    return Settings(
+        integrator=plugin,
+        hide_emitters=bool(hidden),
+        max_depth=2 if plugin == "direct" else props.get("max_depth", -1),
+        rr_depth=props.get("rr_depth", None),
+        overridden=overridden,
+    )

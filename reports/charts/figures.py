@@ -1,0 +1,182 @@
+"""Figures for print, each as SVG and PDF: a strip of pictures, histograms, and a run's departures.
+
+Maps have the fixed ranges of `METRICS`, and every figure of a kind has the same
+axis, so that the figures of different scenes compare. Text is black on white. Pictures are kept
+pixel for pixel. The files depend on what they show alone: they hold no date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from comparisons.departure.metrics import METRICS
+from comparisons.record import Comparison
+from reports.charts import error_over_time, histograms
+from reports.files import images, ownership
+from reports.terminal.printing import number
+
+FORMATS = ("svg", "pdf")
+
+#: Inches: the width of the text on a page with usual margins.
+TEXT_WIDTH = 6.9
+
+#: Inches: between panels, for the colour bar with its labels, and for the titles.
+GAP, BAR, HEADING = 0.08, 0.55, 0.22
+
+#: Points, as they are printed at that width.
+FONT_SIZE = 8
+
+#: The metric that strips and the chart of a run show.
+SHOWN = "dE2000"
+
+#: ΔE2000: departures below are drawn at the left border, since a logarithmic axis has no 0.
+LEAST, LARGEST = 1e-3, 100.0
+
+#: How charts look on paper; fonts as Vega names them.
+PRINT = {
+    "background": "white",
+    "font": "DejaVu Sans, sans-serif",
+    "axis": {"labelFontSize": 11, "titleFontSize": 11, "titleFontWeight": "normal"},
+    "view": {"stroke": None},
+}
+
+
+def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
+    """Write the strip and the histograms of a comparison as ``folder/name...`` in each format."""
+    ownership.folder(folder)
+    figure = strip(comparison)
+    for kind in FORMATS:
+        ownership.write(folder / f"{name}.{kind}", drawn(figure, kind))
+    data = comparison.data
+    for metric, histogram in data["histograms"].items():
+        if data["pixels"]["counted"]:
+            summary, counted = data["metrics"][metric], data["pixels"]["counted"]
+            spec = histograms.spec(metric, histogram, summary, counted)
+            write_chart(folder, f"{name}-histogram-{metric}", spec)
+
+
+def write_run(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+    """Write the departures of all scenes of a run as ``folder/departures`` in each format."""
+    ownership.folder(folder)
+    write_chart(folder, "departures", departures(list(records)))
+
+
+def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+    """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
+    ownership.folder(folder)
+    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(data))
+
+
+def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
+    """Write a Vega-Lite specification as ``folder/name`` in each format."""
+    import vl_convert
+
+    spec = {**spec, "config": {**PRINT, **spec.get("config", {})}}
+    ownership.write(folder / f"{name}.svg", vl_convert.vegalite_to_svg(spec))
+    ownership.write(folder / f"{name}.pdf", vl_convert.vegalite_to_pdf(spec))
+
+
+def strip(comparison: Comparison) -> Figure:
+    """Return heuristic, reference and the map of ΔE2000 with its colour bar, side by side."""
+    shown, metric = comparison.images, METRICS[SHOWN]
+    exposure = comparison.data["viewing"]["exposure"]
+    summary = comparison.data["metrics"][SHOWN]
+    high = metric.map_range[1]
+    heading = f"{metric.label}: mean {number(summary['mean'])}"
+    if summary["noise_floor"]:
+        heading += f" (noise {number(summary['noise_floor'])})"
+    panels = {
+        "heuristic": images.tonemap(shown.heuristic, exposure),
+        "reference": images.tonemap(shown.reference, exposure),
+        heading: images.error_map(shown.maps[SHOWN], high),
+    }
+    height, width = shown.counted.shape
+    side = (TEXT_WIDTH - 2 * GAP - BAR) / len(panels)
+    tall = side * height / width
+    with rc_context({"font.size": FONT_SIZE, "axes.titlesize": FONT_SIZE}):
+        figure = Figure(figsize=(TEXT_WIDTH, tall + HEADING + GAP))
+        inches = (1 / TEXT_WIDTH, 1 / (tall + HEADING + GAP))
+
+        def place(left, width):
+            box = left * inches[0], GAP * inches[1], width * inches[0], tall * inches[1]
+            return figure.add_axes(box)
+
+        for column, (title, picture) in enumerate(panels.items()):
+            axes = place(column * (side + GAP), side)
+            axes.imshow(picture.convert("RGB"), interpolation="none", aspect="auto")
+            axes.set_title(title, pad=4)
+            axes.axis("off")
+        scale = ScalarMappable(Normalize(*metric.map_range), images.ERROR_COLOURS)
+        bar = figure.colorbar(scale, cax=place(TEXT_WIDTH - BAR + GAP, 0.1))
+        bar.set_ticks((0, high / 2, high), labels=("0", f"{high / 2:g}", f"≥ {high:g}"))
+        bar.outline.set_linewidth(0.5)
+        bar.ax.tick_params(width=0.5, length=2)
+    return figure
+
+
+def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
+    """Return the file of a Matplotlib figure."""
+    # Type 42 keeps text as text, as journals ask for; the salt makes the ids of an SVG repeatable.
+    settings = {"pdf.fonttype": 42, "svg.hashsalt": "fotismos"}
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    buffer = BytesIO()
+    with rc_context(settings):
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=undated.get(kind))
+    return buffer.getvalue()
+
+
+def departures(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the chart of mean ΔE2000 by scene: as it is, its shape, and the noise floor.
+
+    The axis is logarithmic, from 0.001 to 100 whatever the scenes; values beyond take its ends.
+    """
+    rows = []
+    for record in records:
+        metric = record["metrics"][SHOWN]
+        values = {
+            "as it is": metric["mean"],
+            "after exposure": metric["after_exposure"]["mean"],
+            "noise floor": metric["noise_floor"],
+        }
+        rows += [
+            {"scene": record["scene"], "what": what, "value": min(max(value, LEAST), LARGEST)}
+            for what, value in values.items()
+        ]
+    place = {
+        "field": "value",
+        "type": "quantitative",
+        "scale": {"type": "log", "domain": [LEAST, LARGEST], "nice": False},
+        "title": "mean ΔE2000 (0.001 and less at the left border)",
+        "axis": {"values": [0.001, 0.01, 0.1, 1, 10, 100], "format": "~g"},
+    }
+    scene = {"field": "scene", "type": "nominal", "sort": None, "title": None}
+    kinds = {
+        "as it is": ("#08519c", "circle"),
+        "after exposure": ("#b3450b", "diamond"),
+        "noise floor": ("#6b6b6b", "triangle-up"),
+    }
+    scales = [
+        {"domain": list(kinds), "range": [style[i] for style in kinds.values()]} for i in range(2)
+    ]
+    legend = {"title": None, "orient": "top"}
+    return {
+        "$schema": "https://vega.github.io/schema/vega-lite/v5.json",
+        "data": {"values": rows},
+        "width": 360,
+        "height": {"step": 18},
+        "mark": {"type": "point", "size": 60, "strokeWidth": 1.6, "opacity": 1},
+        "encoding": {
+            "x": place,
+            "y": {**scene, "axis": {"grid": True, "labelLimit": 260}},
+            "color": {"field": "what", "type": "nominal", "scale": scales[0], "legend": legend},
+            "shape": {"field": "what", "type": "nominal", "scale": scales[1]},
+        },
+    }

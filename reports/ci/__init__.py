@@ -1,0 +1,1 @@
+"""Baselines, checks, and what CI services and pytest get."""

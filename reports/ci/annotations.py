@@ -1,0 +1,137 @@
+"""What CI services show beside a change: annotations, and a summary as a table.
+
+=====================  ==================  ======================================================
+Service                Known by            What is written
+=====================  ==================  ======================================================
+GitHub Actions (and    GITHUB_ACTIONS      ``::error`` lines; a table in ``GITHUB_STEP_SUMMARY``
+Forgejo, Gitea)
+GitLab                 GITLAB_CI           ``gl-code-quality-report.json`` in the results' folder
+Azure Pipelines        TF_BUILD            ``##vso[task.logissue]`` lines; the table by
+                                           ``task.uploadsummary``
+TeamCity               TEAMCITY_VERSION    ``##teamcity[buildProblem]`` lines
+=====================  ==================  ======================================================
+
+All others get the table in the log, as people do.
+"""
+
+import hashlib
+import json
+import os
+import re
+from pathlib import Path
+
+from reports.ci import junit, lines
+from reports.files import ownership
+
+
+def annotate(results, folder, level, environment=None):
+    """Write the files that the service at hand reads, and return the lines that it looks for.
+
+    Parameters
+    ----------
+    results
+        Of :mod:`reports.ci.checks`.
+    folder
+        Folder of the results.
+    level
+        Significance of the whole command.
+    environment
+        Variables of the environment; those of this process where they are not given.
+    """
+    variables = os.environ if environment is None else environment
+    bad = [result for result in results if result.exit_code]
+    if variables.get("GITHUB_ACTIONS") == "true":
+        summary = variables.get("GITHUB_STEP_SUMMARY")
+        if summary:
+            with Path(summary).open("a", encoding="utf-8") as file:
+                file.write(table(results, level))
+        return [_github(result, variables) for result in bad]
+    if variables.get("GITLAB_CI") == "true":
+        report = [_code_quality(result) for result in bad]
+        folder.mkdir(parents=True, exist_ok=True)
+        content = json.dumps(report, indent=2, ensure_ascii=False)
+        ownership.write(folder / "gl-code-quality-report.json", content)
+        return []
+    if variables.get("TF_BUILD"):
+        folder.mkdir(parents=True, exist_ok=True)
+        path = (folder / "summary.md").resolve()
+        ownership.write(path, table(results, level))
+        return [*map(_azure, bad), f"##vso[task.uploadsummary]{path}"]
+    if variables.get("TEAMCITY_VERSION"):
+        return [_teamcity(result) for result in bad]
+    return []
+
+
+def table(results, level):
+    """Return the results as a Markdown table."""
+    rows = [
+        "### fotismos check",
+        "",
+        lines.verdict(results, level),
+        "",
+        "| Baseline | Result | What moved most | Baseline | Now | Standard errors | p |",
+        "|---|---|---|---:|---:|---:|---:|",
+    ]
+    for result in results:
+        cells = [result.name, result.status]
+        if result.check is not None and result.check.moved:
+            move = result.check.moved[0]
+            errors = move.standard_errors
+            cells += [
+                f"{move.before.name} ({len(result.check.moved)} in all)",
+                f"{move.before.value:.6g}",
+                f"{move.after.value:.6g}",
+                "no noise" if errors is None else f"{errors:+.1f}",
+                f"{move.corrected:.1g}",
+            ]
+        else:
+            cells += [result.message, "", "", "", ""]
+        rows.append("| " + " | ".join(map(_cell, cells)) + " |")
+    return "\n".join(rows) + "\n\n"
+
+
+def _cell(text):
+    text = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
+    return re.sub(r"([\\`*_\[\]|])", r"\\\1", text)
+
+
+def _github(result, variables):
+    place = os.path.relpath(result.path, variables.get("GITHUB_WORKSPACE") or ".")
+    escaped = {"file": Path(place).as_posix(), "title": f"fotismos check: {result.name}"}
+    properties = ",".join(f"{key}={_github_property(text)}" for key, text in escaped.items())
+    return f"::error {properties}::{_github_text(junit.headline(result))}"
+
+
+def _github_text(text):
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _github_property(text):
+    return _github_text(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def _azure(result):
+    place = os.path.relpath(result.path).replace("%", "%AZP25").replace(";", "%3B")
+    place = place.replace("]", "%5D")
+    text = junit.headline(result).replace("%", "%AZP25")
+    text = text.replace("\r", "%0D").replace("\n", "%0A")
+    return f"##vso[task.logissue type=error;sourcepath={place}]{result.name}: {text}"
+
+
+def _teamcity(result):
+    text = f"fotismos check: {result.name}: {junit.headline(result)}"
+    text = re.sub(r"(['|\[\]])", r"|\1", text).replace("\n", "|n").replace("\r", "|r")
+    text = "".join(c if ord(c) < 128 else f"|0x{ord(c):04X}" for c in text)
+    return f"##teamcity[buildProblem description='{text}']"
+
+
+def _code_quality(result):
+    path = Path(os.path.relpath(result.path)).as_posix()
+    return {
+        "description": f"{result.name}: {junit.headline(result)}",
+        "check_name": "fotismos check",
+        # One finding for one baseline, however its numbers move: GitLab compares branches by it.
+        "fingerprint": hashlib.sha256(path.encode()).hexdigest(),
+        "severity": "major",
+        "location": {"path": path, "lines": {"begin": 1}},
+    }

@@ -1,0 +1,152 @@
+"""Baselines as files: finding them, reading and writing them, and the scenes that they name."""
+
+import os
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import click
+import numpy as np
+
+from comparisons import atomic
+from comparisons.check import baseline as format
+from comparisons.check.baseline import Baseline
+from heuristic.errors import InputError
+from reports.asked import jobs
+from reports.files import exr
+
+
+@dataclass(frozen=True)
+class BaselineFile:
+    """A baseline and the file that it is in."""
+
+    path: Path
+    baseline: Baseline
+
+    def job(self, seed=None):
+        """Find the scene, and complete the options, as :func:`reports.asked.jobs.job`.
+
+        Parameters
+        ----------
+        seed
+            In place of the baseline's own.
+        """
+        asked = default_rendering() | dict(self.baseline.options)
+        if asked["resolution"] is not None:
+            asked["resolution"] = tuple(asked["resolution"])
+        if seed is not None:
+            asked["seed"] = seed
+        return jobs.job(scene_from(self.baseline.scene, self.path), asked)
+
+    def pictures(self):
+        """Return the halves' small pictures by name, or None where the baseline has none."""
+        if not self.baseline.images:
+            return None
+        return _read_pictures(self.path.parent / Path(self.baseline.images).name)
+
+
+@lru_cache(maxsize=1)
+def _at_rest():
+    command = click.command()(jobs.rendering_options(jobs.scene_options(lambda **_: None)))
+    return command.make_context("check", []).params
+
+
+def default_rendering():
+    """Return the rendering options of the command line where none is given."""
+    return dict(_at_rest())
+
+
+def recorded(chosen):
+    """Return the options of a job as a baseline keeps them: plain, without those at rest."""
+    plain = {k: list(v) if isinstance(v, tuple) else v for k, v in chosen.items()}
+    plain["define"] = jobs.defined(chosen) or None
+    return {k: v for k, v in plain.items() if v is not None and v is not False}
+
+
+def find(path):
+    """Return the files that ``path`` stands for: itself, or the baselines in a folder, by name.
+
+    Raises
+    ------
+    InputError
+        When there is nothing.
+    """
+    path = Path(path)
+    if path.is_dir():
+        found = sorted(path.glob("*.json"))
+        if not found:
+            raise InputError(f"{path}: no baseline (*.json) is in this folder. {_HOW}")
+        return found
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such baseline. {_HOW}")
+    return [path]
+
+
+_HOW = "Make one with `fotismos check BASELINE --update --scene SCENE`."
+
+
+def read(path):
+    """Read a baseline.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
+    return BaselineFile(path, format.parse(text, str(path)))
+
+
+def write(path, baseline, pictures=None):
+    """Write a baseline atomically, with small pictures of both halves where given.
+
+    Raises
+    ------
+    InputError
+        When the place cannot be written to.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if pictures is not None:
+            images = path.with_suffix(".exr")
+            # "baseline." keeps the layers at half precision, which pictures are fine with.
+            layers = {f"baseline.{half}": image for half, image in pictures.items()}
+            exr.write(images, layers, {"scene": baseline.scene})
+            baseline = replace(baseline, images=images.name)
+        atomic.write(path, baseline.text())
+    except OSError as error:
+        raise InputError(f"baseline {path}: {error.strerror or error}.") from error
+
+
+def scene_from(scene, path):
+    """Return the scene of a baseline as a name for :func:`reports.asked.jobs.job`."""
+    return str(path.parent / scene) if Path(scene).suffix == ".xml" else scene
+
+
+def scene_for(scene, path):
+    """Return how a baseline at ``path`` names a scene: files relative to its own folder."""
+    if Path(scene).suffix != ".xml" and not Path(scene).exists():
+        return scene
+    return Path(os.path.relpath(scene, path.parent)).as_posix()
+
+
+def _read_pictures(path):
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = file.channels()
+            return {
+                half: np.stack(
+                    [channels[f"baseline.{half}.{c}"].pixels.astype(float) for c in "RGB"], axis=-1
+                )
+                for half in ("heuristic", "reference")
+            }
+    except (RuntimeError, KeyError) as error:
+        raise InputError(
+            f"{path}: the baseline's pictures cannot be read: {error}. Write them anew with"
+            " `fotismos check BASELINE --update --images`."
+        ) from error

@@ -1,0 +1,188 @@
+"""Checking scenes against baselines, and writing baselines and the pictures of what failed."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+
+from comparisons import atomic
+from comparisons.check import check as checking
+from comparisons.check.check import Check
+from comparisons.check.moved import LEVEL
+from heuristic.errors import FotismosError
+from reference.scene.graph import set_variant
+from reports.asked import jobs
+from reports.ci import baselines, check_pictures, check_record
+from reports.ci.baselines import BaselineFile
+from reports.files import ownership
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of one baseline.
+
+    Attributes
+    ----------
+    path, scene
+        The baseline's file, and the scene that it names.
+    status
+        ``passed``, ``failed``, ``error``; of an update ``created``, ``updated`` or ``unchanged``.
+    seconds
+        Time that it took.
+    check
+        The comparison with the baseline; None where there was none to compare with.
+    message
+        Of an error, or on an update.
+    exit_code
+        0, 1 for a failure, 2 for bad input or installation.
+    folder
+        Where the pictures of a failure are.
+    versions
+        Those of the baseline that are other than today's, as ``name: (then, now)``.
+    """
+
+    path: Path
+    scene: str
+    status: str
+    seconds: float = 0.0
+    check: Check | None = None
+    message: str = ""
+    exit_code: int = 0
+    folder: Path | None = None
+    versions: dict | None = None
+
+    @property
+    def name(self):
+        """Return the baseline's name."""
+        return self.path.stem
+
+
+def failed_to(path, error, scene=""):
+    """Return the result of a baseline that could not be checked."""
+    return Result(path, scene, "error", message=str(error), exit_code=error.exit_code)
+
+
+def examine(file, job, level=LEVEL, folder=None, progress=None):
+    """Check a scene against its baseline, and write pictures of what failed.
+
+    Parameters
+    ----------
+    file : BaselineFile
+        The baseline.
+    job
+        The scene and its options, as of :meth:`BaselineFile.job`.
+    level
+        Chance of an alarm though nothing changed.
+    folder
+        For the pictures, which are written only if something moved; those of an earlier failure
+        are deleted.
+    progress
+        As of :func:`comparisons.compare.compare`.
+
+    Raises
+    ------
+    FotismosError
+        When the scene cannot be measured.
+    """
+    begin = perf_counter()
+    check = _checked(file, job, level, progress)
+    result = Result(
+        file.path,
+        file.baseline.scene,
+        "passed" if check.passed else "failed",
+        check=check,
+        exit_code=0 if check.passed else 1,
+        folder=None if check.passed else folder,
+        versions=check_record.other_versions(file.baseline),
+    )
+    if folder is not None:
+        _clear(folder)
+    result = replace(result, seconds=perf_counter() - begin)
+    if result.folder is not None:
+        _write_failure(file, result)
+    return result
+
+
+def update(file, job, level=LEVEL, images=False, progress=None):
+    """Measure anew, and write the baseline if anything moved; else its file stays as it is."""
+    begin = perf_counter()
+    check = _checked(file, job, level, progress)
+    status = "unchanged" if check.passed else "updated"
+    old = file.baseline
+    if not check.passed:
+        new = checking.new_baseline(old.scene, old.options, check.after)
+        baselines.write(file.path, new, _small(check.pictures) if images or old.images else None)
+    images_missing = check.passed and images and not old.images
+    if images_missing:
+        baselines.write(file.path, old, _small(check.pictures))
+    message = "the pictures were added" if images_missing else ""
+    seconds = perf_counter() - begin
+    return Result(file.path, file.baseline.scene, status, seconds, check, message)
+
+
+def create(path, scene, job, images=False, progress=None):
+    """Measure a scene, and write a baseline of it, in place of any that is there.
+
+    Parameters
+    ----------
+    path
+        The baseline's file.
+    scene
+        How the baseline names the scene.
+    job
+        The scene and its options; the resolution is a small one unless it is given.
+    images
+        Write pictures beside it.
+    progress
+        As of :func:`comparisons.compare.compare`.
+    """
+    begin = perf_counter()
+    source, chosen = job
+    set_variant(chosen["variant"])
+    if chosen["resolution"] is None:
+        chosen = chosen | {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
+    measured = checking.measure_scene(source, jobs.options(chosen), progress=progress)
+    options = baselines.recorded(chosen | {"spp": measured.spp})
+    status = "updated" if path.exists() else "created"
+    new = checking.new_baseline(scene, options, measured.measurement)
+    baselines.write(path, new, _small(measured.pictures) if images else None)
+    return Result(path, scene, status, perf_counter() - begin)
+
+
+def guarded(path, run, scene=""):
+    """Run one of the above; an error that fotismos raises on purpose becomes its result."""
+    try:
+        return run()
+    except FotismosError as error:
+        return failed_to(path, error, scene)
+
+
+def _checked(file: BaselineFile, job, level, progress):
+    source, chosen = job
+    set_variant(chosen["variant"])
+    options = jobs.options(chosen)
+    return checking.check(source, options, file.baseline.measured, level, progress)
+
+
+def _small(pictures):
+    return check_pictures.reduced(pictures)
+
+
+def _clear(folder):
+    """Delete the files of an earlier failure, and the folder unless it holds others."""
+    ours = ownership.made(folder)
+    for name in ("check.json", *(f"{name}.png" for name in check_pictures.NAMES)):
+        if name in ours:
+            (folder / name).unlink(missing_ok=True)
+    if folder.is_dir() and {path.name for path in folder.iterdir()} <= {ownership.MARK}:
+        atomic.remove(folder)
+
+
+def _write_failure(file, result):
+    """Write pictures and the record."""
+    folder = result.folder
+    ownership.folder(folder)
+    for name, png in check_pictures.pictures(result.check, file.pictures()).items():
+        ownership.write(folder / f"{name}.png", png)
+    data = json.dumps(check_record.data(result), indent=2, ensure_ascii=False, allow_nan=False)
+    ownership.write(folder / "check.json", data + "\n")

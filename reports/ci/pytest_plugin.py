@@ -1,0 +1,86 @@
+"""The pytest plugin: departures and baselines of scenes in a test suite of anyone's.
+
+::
+
+    def test_textbook_shading_is_close(fotismos):
+        assert fotismos.departure("scenes/lamp.xml") <= 5.0
+
+    def test_nothing_moved(fotismos):
+        assert fotismos.unchanged("scenes/lamp.xml")
+
+A mark renders a test in other variants, one test for each::
+
+    @pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_spectral")
+
+Baselines are in ``baselines/`` beside the test's file; ``pytest --fotismos-update`` writes them.
+Where there is no usable LLVM the tests are skipped, with the reason. Nothing of Mitsuba is imported
+before a test asks for the fixture.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+MARK = "fotismos_variant"
+
+
+def pytest_addoption(parser):
+    """Add the option that writes baselines."""
+    parser.getgroup("fotismos").addoption(
+        "--fotismos-update",
+        action="store_true",
+        help="write the baselines of `fotismos.unchanged` that are missing or moved",
+    )
+
+
+def pytest_configure(config):
+    """Make the mark known."""
+    config.addinivalue_line(
+        "markers",
+        f"{MARK}(*names): render in these Mitsuba variants, one test for each",
+    )
+
+
+def pytest_generate_tests(metafunc):
+    """Make one test for each variant of the mark."""
+    mark = metafunc.definition.get_closest_marker(MARK)
+    if mark is not None and "fotismos" in metafunc.fixturenames:
+        metafunc.parametrize("fotismos", mark.args, indirect=True)
+
+
+@pytest.fixture
+def fotismos(request):
+    """Departures and baselines of scenes: see :class:`reports.ci.testing.Fotismos`."""
+    import heuristic  # noqa: F401 it tells Dr.Jit where LLVM is
+    from heuristic.errors import InstallationError
+    from reports.asked import jobs
+
+    try:
+        jobs.check_installation()
+    except InstallationError as error:
+        pytest.skip(f"fotismos cannot render here. {error}")
+    import mitsuba as mi
+
+    from reference.scene.graph import set_variant
+    from reports.ci.testing import Fotismos
+
+    before, variant = mi.variant(), getattr(request, "param", None)
+    # A test may make a scene of Mitsuba's types, which needs a variant.
+    set_variant(variant or before or "llvm_ad_rgb")
+    yield Fotismos(
+        folder=request.path.parent / "baselines",
+        pictures=lambda: request.getfixturevalue("tmp_path"),
+        variant=variant,
+        update=request.config.getoption("--fotismos-update"),
+    )
+    if before is not None:
+        mi.set_variant(before)
+
+
+def pytest_assertrepr_compare(op, left, right):
+    """Explain a departure that is not what a test wants."""
+    for one in (left, right):
+        explain = getattr(type(one), "fotismos_explanation", None)
+        if explain is not None:
+            return [f"{left} {op} {right}", *explain(one)]
+    return None

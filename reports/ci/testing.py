@@ -1,0 +1,247 @@
+"""What a test says about a scene: how far it departs from physics, and that nothing moved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import total_ordering
+from pathlib import Path
+
+import mitsuba as mi
+
+from comparisons.check import check as checking
+from comparisons.check.measurement import PASSES
+from comparisons.check.moved import LEVEL
+from heuristic.errors import InputError
+from reference.scene.graph import Source, set_variant
+from reports.asked import jobs
+from reports.ci import baselines, checks
+from reports.ci import lines as lines
+
+CONFIDENCE = 0.95
+
+
+@total_ordering
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """A departure metric of a scene: it compares with numbers by its value.
+
+    Attributes
+    ----------
+    scene, metric
+        Of what.
+    value, error
+        The metric, and its standard error over ``passes`` independent passes.
+    noise_floor
+        What the noise alone would give; None where it gives nothing.
+    """
+
+    scene: str
+    metric: str
+    value: float
+    error: float
+    noise_floor: float | None
+    passes: int
+
+    def __float__(self):
+        return self.value
+
+    def __eq__(self, other):
+        return self.value == float(other)
+
+    def __lt__(self, other):
+        return self.value < float(other)
+
+    __hash__ = None  # it compares with numbers, whose hash it has not
+
+    def __repr__(self):
+        return f"{self.metric} {self.value:.4g}"
+
+    @property
+    def interval(self):
+        """Return the 95 % interval of Student's t."""
+        from scipy.special import stdtrit
+
+        half = self.error * float(stdtrit(self.passes - 1, (1 + CONFIDENCE) / 2))
+        return self.value - half, self.value + half
+
+    def fotismos_explanation(self):
+        """Return the lines that an assertion's message gets."""
+        low, high = self.interval
+        floor = "" if self.noise_floor is None else f"; noise alone: {self.noise_floor:.4g}"
+        return [
+            f"{self.scene}: mean {self.metric} {self.value:.6g}, standard error {self.error:.2g}",
+            f"95 % interval: {low:.6g} to {high:.6g}{floor}",
+        ]
+
+
+@dataclass(frozen=True)
+class Fotismos:
+    """The fixture ``fotismos``.
+
+    Attributes
+    ----------
+    folder
+        Where baselines are that are named after their scene.
+    pictures
+        Called for the folder of a failure's pictures.
+    variant
+        Mitsuba variant in place of the scenes' own.
+    update
+        Whether to write baselines.
+    """
+
+    folder: Path
+    pictures: Callable[[], Path]
+    variant: str | None = None
+    update: bool = False
+
+    def departure(self, scene, metric="dE2000", **options):
+        """Measure how far textbook shading is from physics.
+
+        Parameters
+        ----------
+        scene
+            A built-in name, the path of a Mitsuba file, from the test's own folder or else from the
+            current one, a dictionary as ``mitsuba.load_dict`` takes it, or a function that returns
+            one.
+        metric
+            ``dE2000``, ``dE_ITP``, ``dE_CAM16UCS``, ``rmse`` or ``log2_luminance``.
+        options
+            Those of the command line: ``resolution``, ``spp``, ``seed``, ``pairing``, ... The
+            longer side is 64 pixels where no resolution is given.
+
+        Returns
+        -------
+        Departure
+        """
+        source, chosen = self._job(self._found(scene), options, "scene")
+        set_variant(chosen["variant"])
+        if chosen["resolution"] is None:
+            chosen |= {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
+        found = checking.measure_scene(source, jobs.options(chosen)).measurement
+        if metric not in found.metrics:
+            raise InputError(f"metric {metric!r}: choose one of {', '.join(found.metrics)}.")
+        measured = found.metrics[metric]
+        return Departure(
+            source.name, metric, measured.value, measured.error, measured.noise_floor, PASSES
+        )
+
+    def unchanged(self, scene, name=None, significance=LEVEL, **options):
+        """Fail the test unless a scene is as its baseline says.
+
+        Parameters
+        ----------
+        scene
+            As of :meth:`departure`, or the path of a baseline (.json) that is there.
+        name
+            Of the baseline, in place of the scene's own; a dictionary needs one.
+        significance
+            Chance of a failure though nothing changed.
+        options
+            As of :meth:`departure`. Those of a baseline that is there are its own; only other ones
+            given here count, and with ``--fotismos-update`` they are written.
+
+        Returns
+        -------
+        bool
+            True.
+
+        Raises
+        ------
+        AssertionError
+            With the table of what moved, or for a baseline that is missing.
+        """
+        scene = self._found(scene)
+        given = options | ({"variant": self.variant} if self.variant else {})
+        path = self._path(scene, name)
+        if not path.exists():
+            if not self.update:
+                raise AssertionError(
+                    f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
+                )
+            checks.create(path, self._scene_name(scene, path, name), self._job(scene, given, name))
+            return True
+        file = baselines.read(path)
+        job = self._job_of(file, scene, given, name)
+        others = _other_options(file.baseline.options, given)
+        if others:
+            if not self.update:
+                raise AssertionError(
+                    f"{path}: the baseline has other options than the test: {others}."
+                    " `pytest --fotismos-update` writes it anew."
+                )
+            checks.create(path, file.baseline.scene, job)
+        elif self.update:
+            checks.update(file, job, significance)
+        else:
+            _require_passed(checks.examine(file, job, significance, self.pictures() / path.stem))
+        return True
+
+    def _found(self, scene):
+        """Return a scene; a path from the test's own folder, where there is such a file."""
+        if _in_python(scene):
+            return scene
+        place = self.folder.parent / scene
+        return place if place.is_file() else scene
+
+    def _path(self, scene, name):
+        if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
+            return Path(scene)
+        suffix = f"-{self.variant}" if self.variant else ""
+        return self.folder / f"{name or _name(scene)}{suffix}.json"
+
+    def _scene_name(self, scene, path, name):
+        return (
+            (name or _name(scene)) if _in_python(scene) else baselines.scene_for(str(scene), path)
+        )
+
+    def _job(self, scene, options, name=None):
+        """Return source and options as :func:`reports.asked.jobs.job`, of a dictionary too."""
+        asked = baselines.default_rendering() | {"variant": self.variant} | options
+        if not _in_python(scene):
+            return jobs.job(str(scene), asked)
+        own = {"variant": mi.variant(), "interpolation": "phong"}
+        chosen = {key: value for key, value in asked.items() if value is not None}
+        return Source(name or _name(scene), scene), dict.fromkeys(asked) | own | chosen
+
+    def _job_of(self, file, scene, given, name):
+        """Return the job of a baseline that is there, with what the test gives in its place."""
+        if not _in_python(scene):
+            source, chosen = file.job()
+        else:
+            source, chosen = self._job(scene, file.baseline.options, name)
+            chosen["resolution"] = tuple(chosen["resolution"])
+        return source, chosen | given
+
+
+def _in_python(scene):
+    return isinstance(scene, Mapping) or callable(scene)
+
+
+def _other_options(recorded, given):
+    """Return ``{name: (baseline's, test's)}`` of the options in which they differ."""
+    plain = dict.fromkeys(given) | baselines.recorded(given)
+    return {
+        name: (recorded.get(name), value)
+        for name, value in plain.items()
+        if recorded.get(name) != value
+    }
+
+
+def _name(scene):
+    if callable(scene):
+        return scene.__name__
+    if isinstance(scene, Mapping):
+        raise InputError("a scene that is a dictionary needs a name: unchanged(scene, name=...).")
+    path = Path(scene)
+    return path.stem if path.suffix == ".xml" else str(scene)
+
+
+def _require_passed(result):
+    if result.status == "passed":
+        return
+    text = [f"{result.path}: {len(result.check.moved)} of {len(result.check.moves)} moved"]
+    text += lines.moved_lines(result.check)
+    text += [line for line in (lines.versions_line(result), f"pictures: {result.folder}") if line]
+    raise AssertionError("\n".join(text))

@@ -1,0 +1,1 @@
+"""Files: who made them, layers, pictures."""

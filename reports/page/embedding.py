@@ -1,0 +1,154 @@
+"""A comparison's images inside the page, as numbers: exact to the digits that the page prints.
+
+Every value is rounded to three significant decimal digits, the standard error to two, and kept as
+a 16-bit code. Half floats would need more bits for their noise and still print another last digit
+now and then; this way what the page prints is the EXR's own value, rounded once. Steps between
+codes are at most 1 %, one 8-bit level near white.
+
+A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
+to the left neighbour, and split into low and high bytes; all planes are deflated together. What
+this does not say in words, ``templates/viewer/decoding.js`` says in reverse.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from comparisons.departure.metrics import METRICS
+
+#: Significant digits of values, and of the standard error.
+DIGITS, ERROR_DIGITS = 3, 2
+
+#: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
+EXPONENTS = (-18, 16)
+
+#: Added to the code of a magnitude where the value is negative.
+NEGATIVE = 0x8000
+
+#: Pixels; longer images are averaged over square blocks inside the page, never in the files.
+LONGEST = 1024
+
+#: Bits of the plane "flags".
+SIGNIFICANT, COUNTED = 1, 2
+
+Codes = NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """One channel: its name, its digits (0: the codes are the values), and its base plane."""
+
+    name: str
+    digits: int
+    base: str | None = None
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """The images of a comparison, for the page.
+
+    width, height
+        Of the planes. `block` pixels of the image in each direction are averaged to one of theirs.
+    planes
+        What `data` holds, in order.
+    data
+        The planes, deflated (RFC 1950), in base64.
+    """
+
+    width: int
+    height: int
+    block: int
+    planes: tuple[Plane, ...]
+    data: str
+
+    def manifest(self) -> dict:
+        """What is needed to read `data`, as plain data."""
+        return {key: value for key, value in asdict(self).items() if key != "data"}
+
+
+def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
+    """Encode the images of a comparison.
+
+    channels
+        As `exr.channels` gives them, (H, W) each: what the page shows is what the file
+        holds. Of the standard error, the largest of the three channels is kept.
+    counted
+        Boolean (H, W): the pixels that the statistics are over.
+    """
+    height, width = np.shape(counted)
+    block = -(-max(height, width) // LONGEST)
+    planes, codes = [], {}
+
+    def add(name: str, values: NDArray, digits: int, base: str | None = None) -> None:
+        planes.append(Plane(name, digits, base))
+        codes[name] = encode(values, digits) if digits else values
+
+    for layer in ("heuristic", "reference"):
+        for colour in "GRB":
+            name, base = f"{layer}.{colour}", None if colour == "G" else f"{layer}.G"
+            add(name, _means(channels[name], block), DIGITS, base)
+    for name in METRICS:
+        add(name, _means(channels[f"{name}.Y"], block), DIGITS)
+    deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
+    add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)
+    significant = _means(channels["significant.Y"], block) > 0.0
+    flags = SIGNIFICANT * significant + COUNTED * (_means(counted, block) > 0.0)
+    add("flags", flags.astype(np.uint16), 0)
+
+    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)
+    height, width = flags.shape
+    data = base64.b64encode(zlib.compress(raw, 6)).decode("ascii")
+    return Embedded(width, height, block, tuple(planes), data)
+
+
+def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:
+    """The codes of finite values: 0 for 0, rising with the magnitude, + `NEGATIVE` for the sign.
+
+    A magnitude m · 10^(e − digits + 1), with m of `digits` digits, has the code
+    9 · 10^(digits−1) · (e − lowest) + m − 10^(digits−1) + 1. Ties are rounded to even, as
+    Python prints them. Magnitudes beyond `EXPONENTS` are clipped.
+    """
+    values = np.asarray(values, np.float64)
+    lowest, highest = EXPONENTS
+    unit = 10 ** (digits - 1)
+    size = np.clip(np.abs(values), 0.0, (10.0 - 5.0 / unit) * 10.0**highest)
+    exponent = np.floor(np.log10(np.maximum(size, 10.0**lowest))).astype(int)
+    mantissa = np.rint(_scaled(size, digits - 1 - exponent)).astype(int)
+    carried = mantissa == 10 * unit  # 9.996 is 10.0
+    exponent, mantissa = exponent + carried, np.where(carried, unit, mantissa)
+    code = np.where(mantissa < unit, 0, 9 * unit * (exponent - lowest) + mantissa - unit + 1)
+    return np.where((values < 0) & (code > 0), code + NEGATIVE, code).astype(np.uint16)
+
+
+def _scaled(size: NDArray, power: NDArray) -> NDArray:
+    # By powers of ten that are exact, so that a tie stays one.
+    return np.where(
+        power >= 0, size * 10.0 ** np.maximum(power, 0), size / 10.0 ** -np.minimum(power, 0)
+    )
+
+
+def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:
+    """Means over square blocks; those at the right and at the bottom may be smaller."""
+    image = np.asarray(image, np.float64)
+    if block == 1:
+        return image
+    sums, areas = image, np.ones(image.shape)
+    for axis in (0, 1):
+        places = np.arange(0, image.shape[axis], block)
+        sums, areas = (np.add.reduceat(part, places, axis=axis) for part in (sums, areas))
+    return sums / areas
+
+
+def _bytes(codes: Codes, base: Codes | None) -> bytes:
+    """Differences, zigzagged so that small ones have a high byte of 0; low bytes, then high."""
+    differences = codes.copy() if base is None else codes - base
+    differences[:, 1:] -= differences[:, :-1].copy()
+    signed = differences.view(np.int16)
+    zigzag = ((signed << 1) ^ (signed >> 15)).view(np.uint16)
+    return (zigzag & 0xFF).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes()

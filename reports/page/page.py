@@ -1,0 +1,235 @@
+"""The report: one offline HTML file with the pictures, maps and numbers of a run.
+
+`render` reads the records of `comparison.json` (schema: ``reports/comparison.schema.json``) and
+images that are encoded already; it computes nothing that is not in them but how to print a number.
+Names and messages come from users' files, so everything is escaped, and the page may load nothing:
+a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
+
+The page is whole without JavaScript: pictures, numbers and charts, one scene after another. With
+it, ``templates/viewer`` shows one scene at a time, by its embedded numbers.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from comparisons.departure.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
+from comparisons.departure.spaces import luminance
+from heuristic.equations import Entry
+from reports.charts import histograms, price_chart, vega
+from reports.files import images
+from reports.page import cost_overview, overview
+from reports.page.legends import legends
+from reports.run.stages import Run
+from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
+
+#: The page's heading.
+TITLE = "Textbook shading against physically based rendering"
+
+#: Pictures narrower than this are enlarged without smoothing.
+PIXELATED_BELOW = 400
+
+#: A region that is opened from its link gets about so many screen pixels.
+REGION_SIZE = 420
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+#: The parts of the page's style and of its script, in their order.
+STYLES = ("base", "overview", "scene", "viewer", "print")
+SCRIPTS = (
+    "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address", "viewport",
+    "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts", "main",
+)  # fmt: skip
+
+#: Run before anything is drawn: what is for scripts alone is shown only where they run.
+EARLY = 'document.documentElement.className = "js";'
+
+
+def render(
+    comparisons: Sequence[Mapping[str, Any]],
+    title: str = TITLE,
+    equations: Sequence[Entry] = (),
+    verifications: Sequence[Mapping[str, Any]] = (),
+    hard_cases: Mapping[str, Any] | None = None,
+    failures: Sequence[tuple[str, str]] = (),
+    run: Run | None = None,
+) -> str:
+    """One HTML page of all scenes, in the order given.
+
+    Each comparison is a mapping with
+
+    record
+        The scene's record, as in ``comparison.json``.
+    images
+        PNG bytes by name: "heuristic", "reference", the metrics' names, "log2_luminance" and
+        "significant". `reports.files.images.pictures` makes them. A missing one is left out.
+    thumbnails (optional)
+        Small PNG bytes by name: "heuristic", "reference" and "dE2000".
+    embedded (optional)
+        The scene's `reports.page.embedding.Embedded`, without which it has no viewer.
+    charts (optional)
+        `reports.charts.vega.Figure` records of what accuracy costs.
+    cost (optional)
+        What `reports.run.cost_files.view` returns, where the cost of accuracy was studied.
+    files (optional)
+        Paths relative to the page by label, shown as links.
+
+    `equations` is the index of `heuristic.equations`, `verifications` the data of
+    `comparisons.verification`, `hard_cases` what `reports.page.hard_cases.view` returns; each is a
+    section of its own, left out where it is empty. `failures` are the scenes that could not be
+    compared, each with its message. `run` says where the time went.
+    """
+    taken: set[str] = set()
+    scenes = [_scene(comparison, taken) for comparison in comparisons]
+    failed = [
+        {"id": overview.identifier(name, taken), "name": name, "message": message}
+        for name, message in failures
+    ]
+    charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
+    code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
+    scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
+            scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
+            page_data=_page_data(scenes, failed),
+            scenes=scenes,
+            failures=failed,
+            metrics=METRICS,
+            columns=overview.COLUMNS,
+            legends=legends(),
+            equations=equations,
+            hard_cases=hard_cases,
+            verifications=verifications,
+            cost_methods=cost_overview.METHODS,
+            cost_rows=cost_overview.rows(s["cost"]["record"] for s in scenes if s["cost"]),
+            run=run,
+        )
+    )
+
+
+def _scene(comparison: Mapping[str, Any], taken: set[str]) -> dict[str, Any]:
+    """What the templates show of a comparison."""
+    record = comparison["record"]
+    return {
+        "id": overview.identifier(record["scene"], taken),
+        "record": record,
+        "images": {name: _data_uri(png) for name, png in comparison["images"].items()},
+        "thumbnails": {
+            name: _data_uri(png) for name, png in comparison.get("thumbnails", {}).items()
+        },
+        "embedded": comparison.get("embedded"),
+        "histograms": histograms.figures(record),
+        "charts": comparison.get("charts", ()),
+        "cost": _cost(comparison.get("cost")),
+        "files": {
+            label: "./" + quote(str(path)) for label, path in comparison.get("files", {}).items()
+        },
+    }
+
+
+def _cost(view: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    if view is None:
+        return None
+    return {**view, "images": {name: _data_uri(png) for name, png in view["images"].items()}}
+
+
+def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
+    """What the page's script needs: the scenes, and how maps are drawn."""
+    return {
+        "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
+        "titles": {legend.name: legend.title for legend in legends()}
+        | {"effects": price_chart.TITLE},
+        "noEffect": price_chart.NO_EFFECT,
+        "ranges": {name: metric.map_range[1] for name, metric in METRICS.items()}
+        | {"log2_luminance": LOG2_RANGE},
+        "colours": {
+            "error": images.colour_table(images.ERROR_COLOURS),
+            "signed": images.colour_table(images.SIGNED_COLOURS),
+            "value": images.colour_table(images.VALUE_COLOURS),
+        },
+        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED],
+        "luminance": luminance(np.eye(3)).tolist(),
+        "epsilon": LOG2_EPSILON,
+    }
+
+
+def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
+    record, embedded = scene["record"], scene["embedded"]
+    return {
+        "id": scene["id"],
+        "name": record["scene"],
+        "width": record["resolution"][0],
+        "height": record["resolution"][1],
+        "exposure": record["viewing"]["exposure"],
+        "regions": record.get("regions", []),
+        "images": embedded.manifest() if embedded else None,
+        "effects": scene["cost"]["effects"] if scene["cost"] else None,
+        "keys": overview.keys(record),
+        "significant": overview.is_significant(record),
+        "failed": False,
+    }
+
+
+def _failed_data(failure: Mapping[str, str]) -> dict[str, Any]:
+    return {"id": failure["id"], "name": failure["name"], "significant": False, "failed": True}
+
+
+def _zoom_to(region: Mapping[str, int]) -> float:
+    """Screen pixels for one of the image, where a region is looked at."""
+    return round(min(16.0, REGION_SIZE / max(region["width"], region["height"])), 2)
+
+
+def _data_uri(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+
+
+def _hash(script: str) -> Markup:
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return Markup(f"'sha256-{digest}'")
+
+
+def _source(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters.update(
+        number=number,
+        parameter=parameter,
+        seconds=seconds,
+        percent=percent,
+        code_spans=code_spans,
+        zoom_to=_zoom_to,
+    )
+    environment.tests["about_noise"] = about_noise
+    environment.globals.update(
+        marked=images.css_colour(images.MARKED),
+        unmarked=images.css_colour(images.UNMARKED),
+        uncounted=images.css_colour(images.UNCOUNTED),
+        effects_title=price_chart.TITLE,
+        value_bar=images.colour_bar(images.VALUE_COLOURS),
+        pixelated_below=PIXELATED_BELOW,
+    )
+    return environment

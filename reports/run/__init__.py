@@ -1,0 +1,1 @@
+"""One run on disk: scenes, their results, what is kept and found again."""

@@ -1,0 +1,114 @@
+"""Comparing scenes one after another, and writing their results and the page.
+
+A scene that cannot be compared does not keep the others from it: the page names it with its error,
+and the command ends with that error's exit code. Several scenes are compared in a process apart,
+which one of them may kill; a single one is compared in this process.
+"""
+
+import shlex
+import sys
+from contextlib import nullcontext
+
+from heuristic.errors import FotismosError
+from reports.asked import jobs
+from reports.run import single
+from reports.run.single import Wanted
+from reports.run.stages import Run
+from reports.run.worker import Worker
+from reports.terminal import verbosity
+
+
+def start():
+    """Load what renders, and begin the record of a run.
+
+    Raises
+    ------
+    InstallationError
+        When LLVM cannot be used.
+    """
+    single.load()
+    return Run(shlex.join(["fotismos", *sys.argv[1:]]))
+
+
+def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
+    """Compare the scenes of a run, and write the results of each, then page and tables of all.
+
+    ``shown`` is what else the page shows.
+    """
+    from reports.page import hard_cases
+    from reports.run import output
+
+    places = _places(names)
+    folder = output.prepare(folder)
+    output.require_free(folder, places, wanted.figures)
+    views, failures = {}, {}
+    try:
+        _compare(run, places, folder, wanted, views, failures)
+    except KeyboardInterrupt:
+        if views or failures:
+            _write(run, folder, views, failures, wanted.figures, shown)
+        raise
+    if with_hard_cases:
+        from comparisons.hard import collection
+
+        with run.timing("hard cases"):
+            shown["hard_cases"] = hard_cases.view(collection.collect())
+    _write(run, folder, views, failures, wanted.figures, shown)
+    if failures:
+        error = max(failures.values(), key=lambda error: error.exit_code)
+        count = f"{len(failures)} of {len(places)} scenes failed, "
+        raise type(error)(f"{count}among them: {error}") from error
+
+
+def _places(names):
+    """Return the names of the scenes' folders, with the words that name the scenes."""
+    from reports.run import output
+
+    places = {}
+    for name in jobs.expand(names):
+        places[output.folder_name(jobs.find(name), places)] = name
+    return places
+
+
+def _compare(run, places, folder, wanted, views, failures):
+    """Collect the views of the scenes that are compared, and the errors of the others."""
+    from reports.terminal import progress
+
+    alone = len(places) == 1
+    with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
+        for place, name in places.items():
+            try:
+                done = worker.compare(name, folder, place, wanted, bar.of(jobs.find(name)))
+            except FotismosError as error:
+                if alone:
+                    raise
+                failures[place] = error
+                continue
+            views[place] = done.view
+            run.did(done)
+            verbosity.remark(progress.details(done.view["record"]))
+
+
+def _write(run, folder, views, failures, with_figures, shown):
+    """Write what is about all scenes, and say what came of them."""
+    from reports.charts import figures
+    from reports.run import output
+    from reports.terminal import progress, tables
+
+    run.failures = [{"scene": name, "error": str(error)} for name, error in failures.items()]
+    run.begin_page()
+    output.write_page(
+        folder,
+        list(views.values()),
+        failures=[(failure["scene"], failure["error"]) for failure in run.failures],
+        run=run,
+        **shown,
+    )
+    output.write_run(folder, run.data())
+    if views:
+        records = [view["record"] for view in views.values()]
+        tables.write(folder / output.TABLES, records)
+        if with_figures:
+            figures.write_run(folder / output.FIGURES, records)
+        verbosity.tell(progress.summary(records))
+    verbosity.tell_where(folder / "index.html")

@@ -1,0 +1,193 @@
+"""Fits as tables for a terminal and in Markdown, and the files of one fit."""
+
+import json
+from io import BytesIO
+from pathlib import Path
+
+import matplotlib
+from PIL import Image, ImageDraw, ImageFont
+
+from comparisons.departure.metrics import METRICS
+from reports.files import images, ownership
+from reports.terminal.tables import printed, ruled
+
+SHOWN = "dE2000"
+"""The metric of the residual map in the picture."""
+
+SMALLEST_TILE = 256
+"""Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
+
+GAP, CAPTION = 8, 22
+FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
+"""Matplotlib's own; that of Pillow has no Greek."""
+
+
+def write(folder, fit):
+    """Write ``fit.json`` and ``fit.png`` to a folder."""
+    ownership.folder(folder)
+    ownership.write(folder / "fit.png", picture(fit))
+    text = json.dumps(fit.data, indent=2, ensure_ascii=False, allow_nan=False)
+    ownership.write(folder / "fit.json", text + "\n")
+
+
+def picture(fit):
+    """Return the PNG of a fit: paired parameters, reference, fitted parameters, and what is left.
+
+    Pictures as a display shows them; the map is over the metric's fixed range.
+    """
+    exposure = fit.data["viewing"]["exposure"]
+    metric = METRICS[SHOWN]
+    high = metric.map_range[1]
+    tiles = {
+        "paired": images.tonemap(fit.images.before, exposure),
+        "reference": images.tonemap(fit.images.reference, exposure),
+        f"fitted ({_form(_best(fit.data))})": images.tonemap(fit.images.after, exposure),
+        f"{metric.label} left, 0 to {high:g}": images.error_map(fit.images.maps[SHOWN], high),
+    }
+    width, height = next(iter(tiles.values())).size
+    factor = max(1, -(-SMALLEST_TILE // min(width, height)))
+    width, height = width * factor, height * factor
+    sheet = Image.new("RGB", (4 * width + 5 * GAP, height + CAPTION + 2 * GAP), "white")
+    draw, font = ImageDraw.Draw(sheet), ImageFont.truetype(FONT, 14)
+    for place, (caption, tile) in enumerate(tiles.items()):
+        left = GAP + place * (width + GAP)
+        draw.text((left, GAP), caption, "black", font)
+        enlarged = tile.convert("RGB").resize((width, height), Image.Resampling.NEAREST)
+        sheet.paste(enlarged, (left, GAP + CAPTION))
+    buffer = BytesIO()
+    sheet.save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def lines(data):
+    """Yield the lines of a fit: departures by form, then the parameters of the best form."""
+    best = _best(data)
+    yield f"{data['scene']}: {data['loss']['name']} loss, {_form(best)} comes nearest"
+    yield ""
+    yield from printed(_departures(data))
+    yield ""
+    yield from printed(_parameters(best))
+    for material in best["materials"]:
+        if material["reference"]:
+            yield f"reference of {material['name']}: {_described(material['reference'])}"
+    yield ""
+
+
+def markdown(records, scenes):
+    """Yield the lines of a Markdown page: departures of scenes before and after their fits."""
+    names = " ".join(scenes)
+    yield "# Fits: departure before and after"
+    yield ""
+    yield f"Made by `./run fit {names} --markdown docs/fit-figures.md`."
+    yield ""
+    yield (
+        "Mean colour difference from the reference with the paired parameters (*before*) and with"
+        " the best ones of the best form (*after*), and what the reference's noise alone would"
+        " give (*floor*). *Parameter error* is before less after, *model error* is after."
+    )
+    yield ""
+    labels = [metric.label for metric in METRICS.values()]
+    heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
+    yield from _row([*heading, "parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"])
+    yield from _row(["---"] * 2 + ["---:"] * (len(labels) + 3))
+    for data in records:
+        best, seconds = _best(data), sum(data["time"].values())
+        departures = [best["departure"][name] for name in METRICS]
+        cells = [
+            f"{d['before']:.3f} → {d['after']:.3f} ({d['noise_floor']:.3f})" for d in departures
+        ]
+        parts = [_three(departures[0][key]) for key in ("parameter_error", "model_error")]
+        yield from _row([data["scene"], best["form"], *cells, *parts, f"{seconds:.1f}"])
+    yield ""
+    yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
+    yield ""
+    yield from _row(["scene", "form", "k_a", "k_d", "k_s", "n", "reference"])
+    yield from _row(["---"] * 7)
+    for data in records:
+        for record in (fit for fit in data["fits"] if not fit["normalised"]):
+            for material in record["materials"]:
+                found = {
+                    p["name"]: f"{p['paired']:.3g} → {_value(p)}" for p in material["parameters"]
+                }
+                cells = [found.get(name, "") for name in ("k_a", "k_d", "k_s", "n")]
+                reference = _described(material["reference"] or {"plugin": ""})
+                yield from _row([data["scene"], record["form"], *cells, reference])
+
+
+def _row(cells):
+    yield f"| {' | '.join(cells)} |"
+
+
+def _best(data):
+    return data["fits"][data["best"]]
+
+
+def _form(fit):
+    return fit["form"] + (" (normalised)" if fit["normalised"] else "")
+
+
+def _departures(data):
+    table = ruled("mean of", *(metric.label for metric in METRICS.values()), "loss")
+    first = data["fits"][0]["departure"]
+    table.add_row("paired", *(f"{first[name]['before']:.3f}" for name in METRICS), "")
+    for fit in data["fits"]:
+        means = [f"{fit['departure'][name]['after']:.3f}" for name in METRICS]
+        table.add_row(_form(fit), *means, f"{fit['loss']:.4g}")
+    table.add_row("noise floor", *(f"{first[name]['noise_floor']:.3f}" for name in METRICS), "")
+    best = _best(data)["departure"]
+    for key in ("parameter_error", "model_error"):
+        means = [_three(best[name][key]) for name in METRICS]
+        table.add_row(key.replace("_", " "), *means, "")
+    return table
+
+
+def _parameters(fit):
+    table = ruled("material or light", "parameter", "paired", "fitted", "95 %, by noise", "")
+    for owner in fit["materials"]:
+        for parameter in owner["parameters"]:
+            _add_parameter(table, owner["name"], parameter)
+    for light in fit["lights"]:
+        _add_parameter(table, light["light"], light)
+    return table
+
+
+def _add_parameter(table, owner, parameter):
+    interval = parameter["interval"]
+    note = parameter["reason"] and f"not identifiable: {parameter['reason']}"
+    if parameter["partners"]:
+        note += f" ({', '.join(parameter['partners'])})"
+    if parameter["at_bound"] and not note:
+        note = "at its bound"
+    table.add_row(
+        owner,
+        f"{parameter['name']} {parameter['channel']}".strip()
+        + (" (factor)" if parameter["is_factor"] else ""),
+        f"{parameter['paired']:.4g}",
+        _value(parameter),
+        f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
+        note,
+    )
+
+
+def _value(parameter):
+    return "–" if parameter["fitted"] is None else f"{parameter['fitted']:.4g}"
+
+
+def _described(reference):
+    words = [
+        f"{key} {_number(value)}"
+        for key, value in reference.items()
+        if key in ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
+    ]
+    return " ".join([reference["plugin"], ", ".join(words)]).strip()
+
+
+def _three(value):
+    """Three decimals, and no sign where they are all 0."""
+    return f"{value:.3f}".replace("-0.000", "0.000")
+
+
+def _number(value):
+    if isinstance(value, list):
+        return "(" + ", ".join(f"{component:.3g}" for component in value) + ")"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

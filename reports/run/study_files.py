@@ -1,0 +1,137 @@
+"""What a study leaves behind: the dataset, its figures, lines for the terminal, and findings."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+import vl_convert
+
+from comparisons import atomic
+from comparisons.study import dataset, query
+from heuristic.errors import InputError
+from reports.charts import study_charts
+from reports.files import ownership
+
+VEGALITE = "5.21"
+FIGURES = "figures"
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of findings that is asked for: its template, its file, and the dataset's file."""
+
+    template: Path
+    file: Path
+    dataset: Path
+
+
+def page(study, file, findings):
+    """Check a study's figures, and find the template of its findings if it is asked for.
+
+    Raises
+    ------
+    InputError
+        Before anything is rendered: for a figure that cannot be drawn, or no template.
+    """
+    for figure in study.figures:
+        try:
+            study_charts.check(figure, study)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from error
+    if findings is None:
+        return None
+    template = file.with_suffix(".md.j2")
+    if not template.is_file():
+        raise InputError(
+            f"{template}: there is no such file. A page of findings needs a template there; leave"
+            " --findings out to have dataset and figures alone."
+        )
+    return Page(template, findings, file.with_suffix(".parquet"))
+
+
+def write(study, outcome, folder, page=None):
+    """Write dataset, figures, and the page of findings if there is one; yields where they are."""
+    place, figures = folder / f"{study.name}.parquet", folder / FIGURES
+    ownership.claim(folder, place.name)
+    dataset.write(place, outcome.table)
+    for name, svg in drawn(study, outcome.table):
+        ownership.write(ownership.folder(figures) / name, svg)
+    yield str(place)
+    yield str(figures)
+    if page is not None:
+        dataset.write(page.dataset, outcome.table)
+        page.file.with_suffix("").mkdir(exist_ok=True)
+        for name, svg in drawn(study, outcome.table):
+            atomic.write(page.file.with_suffix("") / name, svg)
+        atomic.write(page.file, findings(study, outcome.table, page))
+        yield str(page.file)
+
+
+def require_free(study, folder):
+    """Ensure, before anything is rendered, that a study will replace nothing but its own results.
+
+    Raises
+    ------
+    InputError
+        Naming what is not fotismos's.
+    """
+    ownership.require_free(folder / f"{study.name}.parquet")
+    for name in (FIGURES, study.POINTS):
+        ownership.require_free_folder(folder / name)
+    ownership.folder(folder / study.POINTS)
+
+
+def drawn(study, table):
+    """Yield the names and contents of a study's figures; parts without a result are left out."""
+    with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
+    for figure in (*study.figures, *study_charts.default_figures(study)):
+        if figure["part"] in with_result:
+            spec = study_charts.chart(figure, table, study)
+            svg = vl_convert.vegalite_to_svg(spec, vl_version=VEGALITE)
+            yield f"{figure['name']}.svg", svg
+
+
+def findings(study, table, page):
+    """Return the page of findings.
+
+    The template asks the dataset through the functions of :class:`comparisons.study.query.Facts`,
+    so that no number is written by hand. ``figure(name)`` is the number of a figure, and
+    ``picture(name, text)`` the picture itself.
+    """
+    names = [figure["name"] for figure in study.figures]
+    folder = page.file.stem
+
+    def number(name):
+        if name not in names:
+            raise InputError(f"{page.template}: there is no figure {name!r}.")
+        return f"figure {names.index(name) + 1}"
+
+    def picture(name, text):
+        return f"![{number(name).capitalize()}: {text}]({folder}/{name}.svg)"
+
+    environment = jinja2.Environment(
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, autoescape=False,
+    )  # fmt: skip
+    facts = query.Facts(table)
+    functions = {name: getattr(facts, name) for name in dir(facts) if not name.startswith("_")}
+    template = environment.from_string(page.template.read_text(encoding="utf-8"))
+    return template.render(**functions, figure=number, picture=picture, study=study)
+
+
+def summary(study, outcome):
+    """Yield a line for each part: points, failures, and the range of the departure."""
+    width = max(4, *(len(part.name) for part in study.parts))
+    yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
+    rows = outcome.table.to_pylist()
+    for part in study.parts:
+        own = [row for row in rows if row["part"] == part.name]
+        good = sorted(row["dE2000"] for row in own if row["error"] is None)
+        line = f"{part.name:<{width}}  {len(own):>6}  {len(own) - len(good):>6}"
+        if good:
+            line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
+        yield line
+    if outcome.at_hand:
+        yield f"{outcome.at_hand} points were at hand from an earlier run."
+    for row in [row for row in rows if row["error"] is not None][:3]:
+        yield f"failed: {row['part']}, point {row['point']}: {row['error']}"

@@ -1,0 +1,102 @@
+"""What a person sees while a command runs and when it has ended."""
+
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from reports.terminal import verbosity
+from reports.terminal.printing import seconds
+from reports.terminal.tables import printed, ruled
+
+
+class Bar:
+    """A progress bar on standard error, one task a scene; silent where no person is watching."""
+
+    def __init__(self, progress):
+        self._progress = progress
+
+    def of(self, scene):
+        """Return the callback ``(stage, done, total)`` for one scene."""
+        task = self._progress.add_task(scene, total=None)
+
+        def update(stage, done, total):
+            self._progress.update(task, completed=done, total=total)
+
+        return update
+
+
+@contextmanager
+def shown(unit="passes"):
+    """Show progress on standard error while the block runs, if that is a terminal."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn(unit),
+        TimeRemainingColumn(),
+    )
+    with Progress(
+        *columns,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal or verbosity.level() < 0,
+    ) as progress:
+        yield Bar(progress)
+
+
+def summary(records):
+    """Yield a line for each scene: departure, noise, shape, and times."""
+    records = list(records)
+    headings = ("mean ΔE2000", "noise", "shape", "significant", "heuristic", "reference")
+    table = ruled("scene", *headings)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for record in records:
+        metric, time = record["metrics"]["dE2000"], record["time"]
+        table.add_row(
+            record["scene"],
+            f"{metric['mean']:.3f}",
+            f"{metric['noise_floor']:.3f}",
+            f"{metric['after_exposure']['mean']:.3f}",
+            f"{record['metrics']['significant']['fraction']:.1%}",
+            f"{time['heuristic']['total_s']:.2f} s",
+            f"{time['reference']['total_s']:.2f} s",
+        )
+    yield from printed(table)
+    for record in records:
+        if "noise_target" in record:
+            yield _noise(record)
+
+
+def details(record):
+    """Yield what a verbose command says of a scene: simulation, pairing, warnings, times."""
+    plan, pairing = record["plan"], record["pairing"]
+    shadows = "" if plan["shadows"] else ", no shadow rays"
+    yield (
+        f"{record['scene']}: {plan['integrator']}{shadows}, {plan['spp']} samples a pixel in"
+        f" {plan['passes']} passes, {plan['sampler']}"
+    )
+    for light in pairing["emitters"]:
+        note = f" ({light['note']})" if light["note"] else ""
+        yield f"  {light['name']}: {light['given']} as {light['derived']}{note}"
+    for miss in pairing["misses"]:
+        wanted, reached = (f"{miss[key]:.3g} {key}" for key in ("wanted", "reached"))
+        yield f"  missed: {miss['what']}, {wanted}, {reached}"
+    for warning in record["warnings"]:
+        yield f"  warning: {warning}"
+    stages = record["time"]["stages"]
+    yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
+
+
+def _noise(record):
+    """Say what a noise target came to, and what stopped the run."""
+    stop, plan = record["noise_target"], record["plan"]
+    asked = f"target {stop['target']:g}"
+    if stop["stopped_by"] == "samples":
+        asked += f" not reached: stopped by the limit of {stop['limit_spp']} samples a pixel"
+    return (
+        f"{record['scene']}: 95 % of pixels have noise under ΔE2000 = {stop['reached']:.3g}"
+        f" after {plan['spp']} samples a pixel ({asked})"
+    )

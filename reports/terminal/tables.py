@@ -1,0 +1,160 @@
+"""Tables that every command prints alike, and a run's metrics as CSV and Markdown."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from comparisons.departure.metrics import METRICS
+from reports.files import ownership
+from reports.terminal.printing import number, percent
+
+#: Characters to a line of a printed table; longer cells are folded.
+WIDTH = 120
+
+
+def ruled(*headings: str) -> Table:
+    """Return an empty table with these headings, without lines."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    return table
+
+
+def printed(table: Table) -> Iterator[str]:
+    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen."""
+    console = Console(width=WIDTH, color_system=None)
+    with console.capture() as capture:
+        console.print(table)
+    return (line.rstrip() for line in capture.get().splitlines())
+
+
+def markdown(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], right: bool = True
+) -> Iterator[str]:
+    """Yield the lines of a table in Markdown, all columns but the first set to the right."""
+    yield _row(headings)
+    yield _row(["---"] + ["---:" if right else "---"] * (len(headings) - 1))
+    for row in rows:
+        yield _row([cell.replace("|", "\\|") for cell in row])
+
+
+def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+    """Write ``metrics.csv`` and ``metrics.md`` of the records of a run to a folder."""
+    ownership.folder(folder)
+    records = list(records)
+    ownership.write(folder / "metrics.csv", metrics_csv(records))
+    ownership.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
+
+
+def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+    """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
+    ownership.folder(folder)
+    for part, (headings, rows) in {"cost": methods(data), "prices": prices(data)}.items():
+        ownership.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
+        shown = [[_shown(cell) for cell in row] for row in rows]
+        ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(headings, shown)) + "\n")
+
+
+def methods(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+    """Return headings and rows of a study's methods: seconds for one image, and mean ΔE2000."""
+    headings = ("method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front")
+    rows = [
+        [
+            point["rung"],
+            point["spp"],
+            *(point["seconds"][key] for key in ("median", "low", "high")),
+            point["error"],
+            point["error_stderr"],
+            "yes" if point["pareto"] else "no",
+        ]
+        for point in data["points"]
+    ]
+    return headings, rows
+
+
+def prices(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+    """Return headings and rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
+    headings = ("effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s")
+    rows = [
+        [
+            price["effect"],
+            *(price["removes"][key] for key in ("value", "low", "high")),
+            price["alone"],
+            price["last"],
+            price["adds_s"]["value"],
+        ]
+        for price in data["prices"]["effects"]
+    ]
+    return headings, rows
+
+
+def metrics_csv(records: Iterable[Mapping[str, Any]]) -> str:
+    """Return a line for each scene and metric, with every number of the record in full.
+
+    Columns are named as in ``comparison.json``; ``after_exposure.`` begins those of the shape.
+    The root mean square error in linear light has ``value`` as its mean and no percentiles.
+    """
+    columns = ("mean", "p50", "p95", "max", "noise_floor")
+    after = ("exposure", "mean", "p50", "p95", "max")
+    headings = (*columns, *(f"after_exposure.{name}" for name in after), "significant")
+    rows = []
+    for record in records:
+        significant = record["metrics"]["significant"]["fraction"]
+        for name in (*METRICS, "rmse"):
+            metric = record["metrics"][name]
+            exposed = metric["after_exposure"]
+            whole = {"mean": metric.get("value")} | metric
+            shape = {"mean": exposed.get("value")} | exposed
+            cells = [whole.get(key, "") for key in columns] + [shape.get(key, "") for key in after]
+            rows.append([record["scene"], name, *cells, significant])
+    return comma_separated(("scene", "metric", *headings), rows)
+
+
+def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full."""
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(headings)
+    table.writerows(rows)
+    return text.getvalue()
+
+
+def metrics_markdown(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the lines of a table of a run: each metric's mean, its shape and its noise floor."""
+    labels = [metric.label for metric in METRICS.values()]
+    rows = []
+    for record in records:
+        metrics = record["metrics"]
+        cells = [
+            f"{number(m['mean'])} ({number(m['after_exposure']['mean'])};"
+            f" {number(m['noise_floor'])})"
+            for m in (metrics[name] for name in METRICS)
+        ]
+        rows.append(
+            [
+                record["scene"],
+                *cells,
+                number(metrics["rmse"]["value"]),
+                percent(metrics["significant"]["fraction"]),
+                f"{record['plan']['spp']}",
+            ]
+        )
+    yield from markdown(["scene", *labels, "RMSE", "significant", "samples a pixel"], rows)
+    yield ""
+    yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
+    yield "that makes it smallest, and what the reference's noise alone would give."
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _shown(cell: Any) -> str:
+    return number(cell) if isinstance(cell, float) else str(cell)
