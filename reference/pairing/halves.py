@@ -60,7 +60,7 @@ class Pair:
     max_depth: int
     convention: Convention
     bsdfs: tuple
-    reading: tuple
+    emitters: tuple
     misses: tuple[Miss, ...]
     warnings: tuple[str, ...]
     integrator: str | None = None

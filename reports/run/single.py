@@ -55,14 +55,14 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     set_variant(chosen["variant"])
     options, done = jobs.options(chosen), Done()
     with done.timing("finished scenes"):
-        kept = kept.of_scene(folder, place, source, options, chosen["variant"])
-        key = finished.key_of(kept.key, options, wanted.with_cost, wanted.figures)
+        passes = kept.of_scene(folder, place, source, options, chosen["variant"])
+        key = finished.key_of(passes.key, options, wanted.with_cost, wanted.figures)
         found = None if wanted.fresh else finished.load(folder / place, key)
     if found is not None:
         done.view = found
         return done
     begin = perf_counter()
-    result = compare(source, options, progress, jobs.command(source, chosen), kept)
+    result = compare(source, options, progress, jobs.command(source, chosen), passes)
     done.compared = perf_counter() - begin
     study = None
     if wanted.with_cost:
@@ -72,7 +72,7 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
         if wanted.figures:  # first, since a scene with its folder is finished
             prints.write_scene(folder / output.FIGURES, place, result)
         done.view = output.write_scene(folder, place, result, study, key)
-    kept.remove()
+    passes.remove()
     return done
 
 
