@@ -87,7 +87,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
 
     Parameters
     ----------
-    source : reference.scene.graph.Source
+    source : reference.scene.source.Source
         The scene.
     options : Options, optional
         What is rendered, and how it is judged.

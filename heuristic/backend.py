@@ -19,6 +19,9 @@ from typing import Literal
 
 from heuristic.errors import InstallationError
 
+VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+"""Mitsuba's variants that are supported."""
+
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 WHEEL = "karellen-llvm-core"
 OLDEST_USABLE = 17

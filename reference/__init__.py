@@ -11,6 +11,6 @@ from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair
 from reference.planning.planner import Plan, plan
 from reference.rendering.renderer import Estimate, PassTimes
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 __all__ = ["Convention", "Estimate", "Pair", "PassTimes", "Plan", "Source", "pair", "plan"]

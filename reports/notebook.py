@@ -9,17 +9,15 @@
 
 import heuristic  # noqa: F401  isort: skip  finds LLVM before Mitsuba is imported
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from comparisons.compare import compare as compare_halves
-from comparisons.options import Options
+import comparisons.compare
+from comparisons.case import Request, Scene, open_case
 from comparisons.record import Comparison
-from reference.scene.graph import Source, set_variant
 from reports.page import page
 from reports.run import output
 
@@ -45,23 +43,28 @@ class Shown:
         )
 
 
-def compare(
-    scene: Mapping[str, Any] | str | Path,
-    name: str = "scene",
-    variant: str = "llvm_ad_rgb",
-    **options: Any,
-) -> Shown:
-    """Compare a scene as `comparisons.compare.compare` does.
+def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:
+    """Compare a scene as ``fotismos compare`` does.
 
+    Parameters
+    ----------
     scene
-        A dictionary as ``mitsuba.load_dict`` takes it, or the path of a Mitsuba file.
+        A dictionary as ``mitsuba.load_dict`` takes it, a function that returns one, a built-in
+        name, or the path of a scene.
+    name
+        The scene's name, in place of its own.
     options
-        Those of `comparisons.options.Options`.
+        By the names of the command line, such as ``spp=64`` or ``resolution=(128, 128)``.
 
-    Raises what `comparisons.compare.compare` raises.
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired, or an option is not known.
+    NonFiniteError
+        When a rendering holds a NaN or an infinity.
     """
-    set_variant(variant)
-    comparison = compare_halves(Source(name, scene), Options(**options))
+    case = open_case(scene, Request.of(options), name)
+    comparison = comparisons.compare.compare(case.source, case.options, command=case.command())
     with TemporaryDirectory() as folder:
         view = output.write_scene(Path(folder), "scene", comparison)
     return Shown(comparison, page.render([view | {"files": {}}]))

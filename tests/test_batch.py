@@ -79,7 +79,7 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
 
 def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
     from comparisons.options import Options
-    from reference.scene.graph import Source
+    from reference.scene.source import Source
     from reports.run.kept import key_of
 
     texture = (

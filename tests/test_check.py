@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from comparisons.case import open_case
 from comparisons.check import baseline, check
 from comparisons.check.measurement import measure
 from comparisons.check.moved import differences, moved
@@ -15,7 +16,7 @@ from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 SMALL = Options(resolution=(64, 64))
 
@@ -188,7 +189,7 @@ def test_other_blocks_are_refused(rgb):
 
 
 def test_a_small_film_keeps_its_size_and_a_large_one_its_proportions(rgb):
-    assert check.small_resolution(SCENES["narrow-band-lamp"].source()) == (64, 20)
+    assert check.made_small(open_case("narrow-band-lamp")).options.resolution == (64, 20)
     film = {"type": "hdrfilm", "width": 30, "height": 50}
     scene = {"type": "scene", "sensor": {"type": "perspective", "film": film}}
-    assert check.small_resolution(Source("small", scene)) == (30, 50)
+    assert check.made_small(open_case(scene, name="small")).options.resolution == (30, 50)

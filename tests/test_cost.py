@@ -23,7 +23,8 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.planning.effects import Effect
 from reference.rendering.renderer import Accumulator
-from reference.scene.graph import Source, set_variant
+from reference.scene.graph import set_variant
+from reference.scene.source import Source
 from reports import cli
 from reports.run import cost_files as results
 from reports.terminal import cost_tables

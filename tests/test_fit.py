@@ -21,7 +21,7 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.terms import normalisation
 from reference.rendering.renderer import Renderer
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 SIZE = 40
 RED = {"k_a": (0.3, 0.1, 0.1), "k_d": (0.6, 0.2, 0.1), "k_s": 0.4, "n": 12.0}

@@ -12,7 +12,7 @@ from reference.planning.effects import Effect
 from reference.planning.planner import wants_spectra
 from reference.planning.structure import examine
 from reference.rendering.environment import AlbedoTable
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 WHITE = {"type": "diffuse", "reflectance": 0.7}
 BLACK = {"type": "diffuse", "reflectance": 0.0}

@@ -5,7 +5,7 @@ import pytest
 
 from reference.pairing.halves import pair
 from reference.pairing.lights import spots
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 
 def solid_angle_error(cutoff, exponent, beam_width, edge=None):

@@ -14,7 +14,7 @@ from comparisons.study import cluster, dataset, design, editing, point, processe
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError
 from reference.pairing import halves
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 SMALL = "spp = 16\nresolution = [12, 12]"
 

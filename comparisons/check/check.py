@@ -75,7 +75,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
 
     Parameters
     ----------
-    source : reference.scene.graph.Source
+    source : reference.scene.source.Source
         The scene.
     options : comparisons.options.Options
         What is rendered; ``spp`` is over all passes, and the plan's where it is not given.
@@ -136,8 +136,10 @@ def new_baseline(scene, options, measured, images=None):
     return Baseline(scene, options, record.versions(), measured, images)
 
 
-def small_resolution(source, sensor=0):
-    """Return ``(width, height)`` of a sensor's film reduced to `LONGEST`, in its proportions."""
-    sides = film_size(source.parse(), sensor)
+def made_small(case):
+    """Return a case whose film is reduced to `LONGEST`, unless it asks for a resolution."""
+    if case.request.resolution is not None:
+        return case
+    sides = film_size(case.source.parse(), case.options.sensor)
     scale = min(1.0, LONGEST / max(sides))
-    return tuple(max(1, round(side * scale)) for side in sides)
+    return case.asking(resolution=tuple(max(1, round(side * scale)) for side in sides))

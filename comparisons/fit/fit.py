@@ -17,7 +17,7 @@ from comparisons.fit.loss import LOSSES
 from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
 from comparisons.fit.parameters import parameters
-from comparisons.fit.rendering import BoxFiltered, render
+from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Fit, FitImages
 from comparisons.options import Options
 from heuristic.errors import InputError
@@ -64,7 +64,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
 
     Parameters
     ----------
-    source : reference.scene.graph.Source
+    source : reference.scene.source.Source
         The scene.
     options : comparisons.options.Options, optional
         What is rendered; :data:`RESOLUTION` and :data:`SPP` where it does not say. Films get a box
@@ -92,7 +92,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     begin = perf_counter()
     chosen = chosen or FitOptions()
     options = _completed(options or Options())
-    ready = prepare(BoxFiltered(source.name, source.content, source.parameters), options)
+    ready = prepare(source.edited(filter_by_box), options)
     rendered = render(ready, options, progress or (lambda *_: None))
     rendering = perf_counter() - begin
     if not rendered.counted.any():

@@ -9,28 +9,23 @@ from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Accumulator, pass_seed, variant
-from reference.scene.graph import Source, properties
+from reference.scene.graph import properties
 
 VARIANT = "llvm_ad_rgb"
 
 
-@dataclass(frozen=True)
-class BoxFiltered(Source):
-    """A scene whose films have a box filter."""
-
-    def parse(self):
-        graph = super().parse()
-        for film in graph.nodes(mi.ObjectType.Film):
-            for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
-                graph.detach(film, key)
-        for sensor in graph.nodes(mi.ObjectType.Sensor):
-            if not graph.children(sensor, mi.ObjectType.Film):
-                film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
-                graph.attach(sensor, "film", film)
-        for film in graph.nodes(mi.ObjectType.Film):
-            box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
-            graph.attach(film, "rfilter", box)
-        return graph
+def filter_by_box(graph):
+    """Give the films of a scene a box filter."""
+    for film in graph.nodes(mi.ObjectType.Film):
+        for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
+            graph.detach(film, key)
+    for sensor in graph.nodes(mi.ObjectType.Sensor):
+        if not graph.children(sensor, mi.ObjectType.Film):
+            film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
+            graph.attach(sensor, "film", film)
+    for film in graph.nodes(mi.ObjectType.Film):
+        box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
+        graph.attach(film, "rfilter", box)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import mitsuba as mi
 
 from comparisons.gallery import chapter_six, spectral
 from heuristic.errors import InputError
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 RESOLUTION = 512
 FIELD_OF_VIEW = 40.0

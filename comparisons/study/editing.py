@@ -144,39 +144,24 @@ def _places(graph):
     return places
 
 
-@dataclass(frozen=True)
-class EditedSource:
-    """A user's scene with other values at some places.
+def set_values(graph, values):
+    """Put other values at some places of a user's scene.
 
     Parameters
     ----------
-    source : reference.scene.graph.Source
+    graph : reference.scene.graph.Graph
         The scene.
     values
         Numbers by path, ``<id of the element>.<parameter>``, such as ``"red.reflectance"``. The
         scene must state the parameter, as a number or as RGB, which becomes a grey.
+
+    Raises
+    ------
+    InputError
+        When a path leads nowhere or to something that is not a number.
     """
-
-    source: object
-    values: dict
-
-    @property
-    def name(self):
-        """Name of the scene."""
-        return self.source.name
-
-    def parse(self):
-        """Return the scene's graph with the values in place.
-
-        Raises
-        ------
-        InputError
-            When a path leads nowhere or to something that is no number.
-        """
-        graph = self.source.parse()
-        for path, value in self.values.items():
-            _set(graph, path, value)
-        return graph
+    for path, value in values.items():
+        _set(graph, path, value)
 
 
 def _set(graph, path, value):

@@ -1,14 +1,13 @@
 """A point that is rendered: both halves with the same camera rays, and the steps between them."""
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
-from comparisons.gallery.builtin import builtin
-from comparisons.study.editing import EditedSource, Kept
+from comparisons.case import RGB, open_case
+from comparisons.study.editing import Kept, set_values
 from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
@@ -16,7 +15,7 @@ from reference.pairing import halves
 from reference.planning.planner import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Accumulator, Renderer, pass_seed, physical_integrator
-from reference.scene.graph import Source
+from reference.scene.source import Source
 
 PASSES = 4
 """Few passes of many samples: small images cost a launch each, and the samples of one pass are
@@ -78,12 +77,16 @@ def source(part, point):
     """
     if part.scene in SCENES:
         return Source(part.scene, lambda: SCENES[part.scene].make(point, bsdf(point)))
-    if part.scene.endswith(".xml"):
-        return EditedSource(Source(Path(part.scene).stem, part.scene), point)
-    scene = builtin(part.scene)
-    if scene.variant != "llvm_ad_rgb":
-        raise InputError(f"{part.scene} needs {scene.variant}: studies are in RGB so far.")
-    return EditedSource(scene.source(), point)
+    return _opened(part.scene).edited(partial(set_values, values=point))
+
+
+@lru_cache(maxsize=4)
+def _opened(scene):
+    """Open a user's scene or a built-in one, once for all points in this process."""
+    case = open_case(scene)
+    if case.variant != RGB:
+        raise InputError(f"{scene} needs {case.variant}: studies are in RGB so far.")
+    return case.source
 
 
 @lru_cache(maxsize=4)

@@ -82,7 +82,7 @@ def pair(
 
     Parameters
     ----------
-    source : reference.scene.graph.Source
+    source : reference.scene.source.Source
         The scene.
     convention : Convention
         How roughplastic and phong are paired.

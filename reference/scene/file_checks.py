@@ -16,23 +16,26 @@ INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
 COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 
 
-def check(path):
-    """See that a scene file and those that it includes can be read to an end.
+def included(path: Path) -> list[Path]:
+    """Return a scene file and those that it includes, after ensuring that all can be read.
 
     Raises
     ------
     InputError
-        When one is no file or cannot be read, has a NUL, includes itself, or is too deep.
+        When one is not a file or cannot be read, has a NUL, includes itself, or is too deep.
     """
-    _check(Path(path), ())
+    found: list[Path] = []
+    _check(path, (), found)
+    return found
 
 
-def _check(path, outer):
+def _check(path: Path, outer: tuple[Path, ...], found: list[Path]) -> None:
     if path.resolve() in outer:
         raise InputError(f"{path}: it includes itself. Take the <include> out that leads back.")
     if len(outer) >= DEEPEST:
         raise InputError(f"{path}: more than {DEEPEST} files include each other.")
     text = _text(path)
+    found.append(path.resolve())
     depth = 0
     for end, empty in TAG.findall(text):
         depth += -1 if end else 0 if empty else 1
@@ -43,10 +46,10 @@ def _check(path, outer):
     for name in INCLUDE.findall(text):
         inner = path.parent / name
         if inner.is_file():  # else Mitsuba looks elsewhere, or says what is missing
-            _check(inner, (*outer, path.resolve()))
+            _check(inner, (*outer, path.resolve()), found)
 
 
-def _text(path):
+def _text(path: Path) -> str:
     """Return a file's text without its comments."""
     if not path.is_file():
         raise InputError(

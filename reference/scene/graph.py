@@ -4,17 +4,13 @@ Both halves of a pair are derived from one such graph. It comes from an XML file
 dictionary, and knows the file and line of each node, which is what error messages name.
 """
 
-from collections.abc import Callable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from os import PathLike
-from pathlib import Path
 
 import mitsuba as mi
 
+from heuristic.backend import VARIANTS
 from heuristic.errors import InputError
 from heuristic.plugins import emitters, mapped
-from reference.scene import file_checks
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -27,8 +23,6 @@ KINDS_OF_OWN_PLUGINS = {
 }
 KINDS_OF_OWN_PLUGINS |= dict.fromkeys(emitters.KINDS, mi.ObjectType.Emitter)
 KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
-
-VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
 
 def set_variant(variant):
@@ -44,57 +38,6 @@ def set_variant(variant):
             f"variant {variant!r} is not supported: choose one of {', '.join(VARIANTS)}."
         )
     mi.set_variant(variant)
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a scene comes from: a name, and an XML file or a dictionary.
-
-    Parameters
-    ----------
-    name
-        Name in reports and of the output folder.
-    content
-        Path of a Mitsuba XML file, a dictionary as ``mitsuba.load_dict`` takes it, or a function
-        that returns one.
-    parameters
-        Values for the ``$name`` placeholders of an XML file.
-    """
-
-    name: str
-    content: str | PathLike | Mapping | Callable[[], Mapping]
-    parameters: Mapping[str, str] = field(default_factory=dict)
-
-    def parse(self):
-        """Return the scene's graph, for the current variant.
-
-        Raises
-        ------
-        InputError
-            With Mitsuba's own message, which names file, line and column, when the file is missing,
-            is not XML, or uses something that Mitsuba does not know.
-        """
-        config = Parser.ParserConfig(mi.variant())
-        try:
-            content = self.content() if callable(self.content) else self.content
-            if isinstance(content, Mapping):
-                state = Parser.parse_dict(config, dict(content))
-            else:
-                path = Path(content)
-                file_checks.check(path)
-                state = Parser.parse_file(config, str(path), **self.parameters)
-            Parser.transform_upgrade(config, state)
-            Parser.transform_resolve_references(config, state)
-        except RuntimeError as error:
-            raise InputError(f"{self.name}: {error}") from error
-        if state.root.type != mi.ObjectType.Scene:
-            raise InputError(
-                f"{self.name}: this is no scene. Its outermost element must be a scene."
-            )
-        graph = Graph(self.name, config, state)
-        if not isinstance(content, Mapping):
-            graph.folder = path.resolve().parent
-        return graph
 
 
 class Graph:
@@ -138,7 +81,7 @@ class Graph:
         # wait for ever for another that waits for Python.
         self.config.parallel = not any(map(_is_python, state.nodes))
         try:
-            with _files_from(self.folder):
+            with files_from(self.folder):
                 made = Parser.instantiate(self.config, state)
         except RuntimeError as error:
             raise InputError(f"{self.name}: {_message(error)}") from error
@@ -234,7 +177,7 @@ class Graph:
 
 
 @contextmanager
-def _files_from(folder):
+def files_from(folder):
     """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
     if folder is None:
         yield

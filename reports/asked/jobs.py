@@ -1,14 +1,17 @@
-"""From the words of a command to scenes and options."""
+"""The options that commands share, and what their words ask for."""
 
-import shlex
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from heuristic.errors import InputError
-from reports.asked.scripts import Script, scenes_in
+from heuristic.backend import VARIANTS
 
-VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+if TYPE_CHECKING:
+    from comparisons.case import Request
 
 
 class Resolution(click.ParamType):
@@ -129,8 +132,10 @@ def check_installation():
     backend.check()
 
 
-def expand(names):
+def expand(names: Iterable[str]) -> list[str]:
     """Return the names of scenes, with the scenes in it in place of each folder."""
+    from reference.scene.script import scenes_in
+
     return [
         scene
         for name in names
@@ -138,102 +143,8 @@ def expand(names):
     ]
 
 
-def find(name):
-    """Return the name that a scene goes by, without reading it.
+def request(words: Mapping[str, Any]) -> Request:
+    """Return what the words of a command ask for about the rendering of its scenes."""
+    from comparisons.case import Request
 
-    All scenes of a command are found before anything is rendered: a typing mistake costs nothing.
-    """
-    from comparisons.gallery.builtin import builtin
-
-    path = _file(name)
-    return builtin(name).name if path is None else path.stem
-
-
-def _file(name):
-    """Return the path of a scene that is a file, None for a built-in one."""
-    path = Path(name)
-    if path.suffix not in (".xml", ".py") and not path.exists():
-        return None
-    if not path.is_file():
-        raise InputError(
-            f"{name}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
-            " that makes one (.py), a folder of such, or the name of a built-in scene;"
-            " `fotismos scenes` lists them."
-        )
-    return path
-
-
-def defined(rendering):
-    """Return the values for the placeholders of a scene file, by name, as text."""
-    return {name: str(value) for name, value in dict(rendering.get("define") or ()).items()}
-
-
-def job(name, rendering):
-    """Find a scene, and complete the options with what it asks for."""
-    from comparisons.gallery.builtin import Scene, builtin
-    from reference.planning.planner import wants_spectra
-    from reference.scene.graph import Source
-
-    path = _file(name)
-    if path is not None:
-        content = Script(path) if path.suffix == ".py" else path
-        source = Source(path.stem, content, defined(rendering))
-        spectral = rendering["variant"] is None and wants_spectra(source.parse())
-        scene = Scene(path.stem, "", dict, "llvm_ad_spectral" if spectral else "llvm_ad_rgb")
-    else:
-        scene = builtin(name)
-        source = scene.source()
-    own = {
-        "variant": scene.variant,
-        "heuristic_variant": scene.heuristic_variant,
-        "interpolation": scene.interpolation,
-        "tessellation": scene.tessellation,
-    }
-    if rendering["variant"] is not None:
-        own["heuristic_variant"] = None  # who names the variant means both halves
-    chosen = {key: value for key, value in rendering.items() if value is not None}
-    return source, dict.fromkeys(rendering) | own | chosen
-
-
-def options(rendering):
-    """Turn the command's options into those of a comparison."""
-    from comparisons.compare import Options
-    from heuristic.interpolation import Interpolation
-    from reference.pairing.factors import Convention
-
-    return Options(
-        seed=rendering["seed"],
-        spp=rendering["spp"],
-        noise=rendering.get("noise"),
-        resolution=rendering["resolution"],
-        convention=Convention(rendering["pairing"]),
-        heuristic_variant=rendering["heuristic_variant"],
-        interpolation=Interpolation(rendering["interpolation"]),
-        tessellation=rendering["tessellation"],
-        everything=rendering["everything"],
-        sensor=rendering.get("sensor") or 0,
-    )
-
-
-def _word(source):
-    """Return the word that names a scene in a command."""
-    if isinstance(source.content, Script):
-        return str(source.content.path)
-    return source.name if callable(source.content) else str(source.content)
-
-
-def command(source, rendering, verb="compare"):
-    """Return the command that repeats what was done with one scene."""
-    scene = _word(source)
-    words = ["fotismos", verb, scene]
-    for name, value in source.parameters.items():
-        words += ["-D", f"{name}={value}"]
-    for key, value in rendering.items():
-        if key == "define":
-            continue
-        if value is True:
-            words.append(f"--{key.replace('_', '-')}")
-        elif value not in (None, False):
-            text = "x".join(map(str, value)) if key == "resolution" else str(value)
-            words += [f"--{key.replace('_', '-')}", text]
-    return shlex.join(words)
+    return Request.of({**words, "define": dict(words.get("define") or ())})

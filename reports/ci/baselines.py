@@ -2,17 +2,15 @@
 
 import os
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
-import click
 import numpy as np
 
 from comparisons import atomic
+from comparisons.case import Request, open_case
 from comparisons.check import baseline as format
 from comparisons.check.baseline import Baseline
 from heuristic.errors import InputError
-from reports.asked import jobs
 from reports.files import exr
 
 
@@ -23,44 +21,22 @@ class BaselineFile:
     path: Path
     baseline: Baseline
 
-    def job(self, seed=None):
-        """Find the scene, and complete the options, as :func:`reports.asked.jobs.job`.
+    def open(self, seed=None):
+        """Open the scene, as :func:`comparisons.case.open_case`.
 
         Parameters
         ----------
         seed
             In place of the baseline's own.
         """
-        asked = default_rendering() | dict(self.baseline.options)
-        if asked["resolution"] is not None:
-            asked["resolution"] = tuple(asked["resolution"])
-        if seed is not None:
-            asked["seed"] = seed
-        return jobs.job(scene_from(self.baseline.scene, self.path), asked)
+        options = dict(self.baseline.options) | ({} if seed is None else {"seed": seed})
+        return open_case(scene_from(self.baseline.scene, self.path), Request.of(options))
 
     def pictures(self):
         """Return the halves' small pictures by name, or None where the baseline has none."""
         if not self.baseline.images:
             return None
         return _read_pictures(self.path.parent / Path(self.baseline.images).name)
-
-
-@lru_cache(maxsize=1)
-def _at_rest():
-    command = click.command()(jobs.rendering_options(jobs.scene_options(lambda **_: None)))
-    return command.make_context("check", []).params
-
-
-def default_rendering():
-    """Return the rendering options of the command line where none is given."""
-    return dict(_at_rest())
-
-
-def recorded(chosen):
-    """Return the options of a job as a baseline keeps them: plain, without those at rest."""
-    plain = {k: list(v) if isinstance(v, tuple) else v for k, v in chosen.items()}
-    plain["define"] = jobs.defined(chosen) or None
-    return {k: v for k, v in plain.items() if v is not None and v is not False}
 
 
 def find(path):
@@ -122,7 +98,7 @@ def write(path, baseline, pictures=None):
 
 
 def scene_from(scene, path):
-    """Return the scene of a baseline as a name for :func:`reports.asked.jobs.job`."""
+    """Return the scene of a baseline as a name for :func:`comparisons.case.open_case`."""
     return str(path.parent / scene) if Path(scene).suffix == ".xml" else scene
 
 

@@ -11,7 +11,6 @@ from comparisons.check.check import Check
 from comparisons.check.moved import LEVEL
 from heuristic.errors import FotismosError
 from reference.scene.graph import set_variant
-from reports.asked import jobs
 from reports.ci import baselines, check_pictures, check_record
 from reports.ci.baselines import BaselineFile
 from reports.files import ownership
@@ -62,15 +61,15 @@ def failed_to(path, error, scene=""):
     return Result(path, scene, "error", message=str(error), exit_code=error.exit_code)
 
 
-def examine(file, job, level=LEVEL, folder=None, progress=None):
+def examine(file, case, level=LEVEL, folder=None, progress=None):
     """Check a scene against its baseline, and write pictures of what failed.
 
     Parameters
     ----------
     file : BaselineFile
         The baseline.
-    job
-        The scene and its options, as of :meth:`BaselineFile.job`.
+    case
+        The scene, see :meth:`BaselineFile.open`.
     level
         Chance of an alarm though nothing changed.
     folder
@@ -85,7 +84,7 @@ def examine(file, job, level=LEVEL, folder=None, progress=None):
         When the scene cannot be measured.
     """
     begin = perf_counter()
-    check = _checked(file, job, level, progress)
+    check = _checked(file, case, level, progress)
     result = Result(
         file.path,
         file.baseline.scene,
@@ -103,10 +102,10 @@ def examine(file, job, level=LEVEL, folder=None, progress=None):
     return result
 
 
-def update(file, job, level=LEVEL, images=False, progress=None):
+def update(file, case, level=LEVEL, images=False, progress=None):
     """Measure anew, and write the baseline if anything moved; else its file stays as it is."""
     begin = perf_counter()
-    check = _checked(file, job, level, progress)
+    check = _checked(file, case, level, progress)
     status = "unchanged" if check.passed else "updated"
     old = file.baseline
     if not check.passed:
@@ -120,7 +119,7 @@ def update(file, job, level=LEVEL, images=False, progress=None):
     return Result(file.path, file.baseline.scene, status, seconds, check, message)
 
 
-def create(path, scene, job, images=False, progress=None):
+def create(path, scene, case, images=False, progress=None):
     """Measure a scene, and write a baseline of it, in place of any that is there.
 
     Parameters
@@ -129,20 +128,17 @@ def create(path, scene, job, images=False, progress=None):
         The baseline's file.
     scene
         How the baseline names the scene.
-    job
-        The scene and its options; the resolution is a small one unless it is given.
+    case
+        The scene; the resolution is a small one unless it is given.
     images
         Write pictures beside it.
     progress
         As of :func:`comparisons.compare.compare`.
     """
     begin = perf_counter()
-    source, chosen = job
-    set_variant(chosen["variant"])
-    if chosen["resolution"] is None:
-        chosen = chosen | {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
-    measured = checking.measure_scene(source, jobs.options(chosen), progress=progress)
-    options = baselines.recorded(chosen | {"spp": measured.spp})
+    case = checking.made_small(case)
+    measured = checking.measure_scene(case.source, case.options, progress=progress)
+    options = case.asking(spp=measured.spp).request.stated()
     status = "updated" if path.exists() else "created"
     new = checking.new_baseline(scene, options, measured.measurement)
     baselines.write(path, new, _small(measured.pictures) if images else None)
@@ -157,11 +153,9 @@ def guarded(path, run, scene=""):
         return failed_to(path, error, scene)
 
 
-def _checked(file: BaselineFile, job, level, progress):
-    source, chosen = job
-    set_variant(chosen["variant"])
-    options = jobs.options(chosen)
-    return checking.check(source, options, file.baseline.measured, level, progress)
+def _checked(file: BaselineFile, case, level, progress):
+    set_variant(case.variant)
+    return checking.check(case.source, case.options, file.baseline.measured, level, progress)
 
 
 def _small(pictures):

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from functools import total_ordering
 from pathlib import Path
 
-import mitsuba as mi
-
+from comparisons.case import Request, open_case
 from comparisons.check import check as checking
 from comparisons.check.measurement import PASSES
 from comparisons.check.moved import LEVEL
 from heuristic.errors import InputError
-from reference.scene.graph import Source, set_variant
-from reports.asked import jobs
 from reports.ci import baselines, checks
 from reports.ci import lines as lines
 
@@ -115,16 +112,13 @@ class Fotismos:
         -------
         Departure
         """
-        source, chosen = self._job(self._found(scene), options, "scene")
-        set_variant(chosen["variant"])
-        if chosen["resolution"] is None:
-            chosen |= {"resolution": checking.small_resolution(source, chosen["sensor"] or 0)}
-        found = checking.measure_scene(source, jobs.options(chosen)).measurement
+        case = checking.made_small(self._open(self._found(scene), options, "scene"))
+        found = checking.measure_scene(case.source, case.options).measurement
         if metric not in found.metrics:
             raise InputError(f"metric {metric!r}: choose one of {', '.join(found.metrics)}.")
         measured = found.metrics[metric]
         return Departure(
-            source.name, metric, measured.value, measured.error, measured.noise_floor, PASSES
+            case.name, metric, measured.value, measured.error, measured.noise_floor, PASSES
         )
 
     def unchanged(self, scene, name=None, significance=LEVEL, **options):
@@ -160,10 +154,11 @@ class Fotismos:
                 raise AssertionError(
                     f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
                 )
-            checks.create(path, self._scene_name(scene, path, name), self._job(scene, given, name))
+            case = self._open(scene, given, name)
+            checks.create(path, self._scene_name(scene, path, name), case)
             return True
         file = baselines.read(path)
-        job = self._job_of(file, scene, given, name)
+        case = self._open(scene, dict(file.baseline.options) | given, name, path)
         others = _other_options(file.baseline.options, given)
         if others:
             if not self.update:
@@ -171,11 +166,11 @@ class Fotismos:
                     f"{path}: the baseline has other options than the test: {others}."
                     " `pytest --fotismos-update` writes it anew."
                 )
-            checks.create(path, file.baseline.scene, job)
+            checks.create(path, file.baseline.scene, case)
         elif self.update:
-            checks.update(file, job, significance)
+            checks.update(file, case, significance)
         else:
-            _require_passed(checks.examine(file, job, significance, self.pictures() / path.stem))
+            _require_passed(checks.examine(file, case, significance, self.pictures() / path.stem))
         return True
 
     def _found(self, scene):
@@ -196,23 +191,14 @@ class Fotismos:
             (name or _name(scene)) if _in_python(scene) else baselines.scene_for(str(scene), path)
         )
 
-    def _job(self, scene, options, name=None):
-        """Return source and options as :func:`reports.asked.jobs.job`, of a dictionary too."""
-        asked = baselines.default_rendering() | {"variant": self.variant} | options
-        if not _in_python(scene):
-            return jobs.job(str(scene), asked)
-        own = {"variant": mi.variant(), "interpolation": "phong"}
-        chosen = {key: value for key, value in asked.items() if value is not None}
-        return Source(name or _name(scene), scene), dict.fromkeys(asked) | own | chosen
-
-    def _job_of(self, file, scene, given, name):
-        """Return the job of a baseline that is there, with what the test gives in its place."""
-        if not _in_python(scene):
-            source, chosen = file.job()
-        else:
-            source, chosen = self._job(scene, file.baseline.options, name)
-            chosen["resolution"] = tuple(chosen["resolution"])
-        return source, chosen | given
+    def _open(self, scene, options, name=None, baseline=None):
+        """Open a scene with some options; one that a baseline names, from the baseline's folder."""
+        request = Request.of(({"variant": self.variant} if self.variant else {}) | options)
+        if _in_python(scene):
+            return open_case(scene, request, name or _name(scene))
+        if baseline is not None:
+            scene = baselines.scene_from(baselines.read(baseline).baseline.scene, baseline)
+        return open_case(scene, request)
 
 
 def _in_python(scene):
@@ -221,11 +207,11 @@ def _in_python(scene):
 
 def _other_options(recorded, given):
     """Return ``{name: (baseline's, test's)}`` of the options in which they differ."""
-    plain = dict.fromkeys(given) | baselines.recorded(given)
+    stated = Request.of(given).stated()
     return {
-        name: (recorded.get(name), value)
-        for name, value in plain.items()
-        if recorded.get(name) != value
+        name: (recorded.get(name), stated.get(name))
+        for name in given
+        if recorded.get(name) != stated.get(name)
     }
 
 

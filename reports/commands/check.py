@@ -118,7 +118,7 @@ def _examine(path, significance, seed, output):
             def run(path=one):
                 file = baselines.read(path)
                 return checks.examine(
-                    file, file.job(seed), level, output / path.stem, bar.of(path.stem)
+                    file, file.open(seed), level, output / path.stem, bar.of(path.stem)
                 )
 
             results.append(checks.guarded(one, run))
@@ -137,6 +137,7 @@ def _update(path, scenes, images, significance, given):
 
 def _update_one(path, scene, images, significance, given, bar):
     """Write one baseline, unless it is there with the same options and nothing moved."""
+    from comparisons.case import Request, open_case
     from reports.ci import baselines, checks
 
     def run():
@@ -146,13 +147,11 @@ def _update_one(path, scene, images, significance, given, bar):
             if scene is None or baselines.scene_for(scene, path) == file.baseline.scene:
                 named = baselines.scene_from(file.baseline.scene, path)
                 options = dict(file.baseline.options) | options
-                if baselines.recorded(options) == file.baseline.options:
-                    return checks.update(file, file.job(), significance, images, bar.of(path.stem))
-        if options.get("resolution") is not None:
-            options["resolution"] = tuple(options["resolution"])
-        job = jobs.job(named, baselines.default_rendering() | options)
+                if Request.of(options).stated() == file.baseline.options:
+                    return checks.update(file, file.open(), significance, images, bar.of(path.stem))
+        case = open_case(named, Request.of(options))
         scene_name = baselines.scene_for(named, path)
-        return checks.create(path, scene_name, job, pictures, bar.of(path.stem))
+        return checks.create(path, scene_name, case, pictures, bar.of(path.stem))
 
     return checks.guarded(path, run)
 

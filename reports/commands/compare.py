@@ -50,5 +50,6 @@ def compare(scenes, output, figures, fresh, with_cost, **rendering):
       fotismos compare plastic-spheres --cost
       fotismos compare my_scenes/
     """  # noqa: D301 click reads the \b as: keep these lines
-    wanted = batch.Wanted(rendering, figures, with_cost, fresh)
-    batch.finish(batch.start(), scenes, output, wanted)
+    run = batch.start()
+    wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh)
+    batch.finish(run, scenes, output, wanted)

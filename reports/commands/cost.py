@@ -32,9 +32,9 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
+    from comparisons.case import open_case
     from comparisons.cost.cost import Effort
     from comparisons.cost.cost import cost as run
-    from reference.scene.graph import set_variant
     from reports.charts import figures as prints
     from reports.files import ownership
     from reports.run import cost_files as results
@@ -42,15 +42,14 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     from reports.terminal import cost_tables, progress, tables
 
     folder = folders.prepare(output)
-    source, chosen = jobs.job(scene, rendering)
-    place = folder / folders.folder_name(source.name, ())
+    case = open_case(scene, jobs.request(rendering))
+    place = folder / folders.folder_name(case.name, ())
     for used in (place, folder / folders.TABLES, *([folder / folders.FIGURES] if figures else ())):
         ownership.require_free_folder(used)
-    set_variant(chosen["variant"])
     effort = Effort() if rounds is None else Effort(rounds=rounds)
-    words = jobs.command(source, chosen, "cost") + (f" --rounds {rounds}" if rounds else "")
+    words = case.command("cost", rounds=rounds)
     with progress.shown() as bar:
-        study = run(source, jobs.options(chosen), effort, bar.of(source.name), words)
+        study = run(case.source, case.options, effort, bar.of(case.name), words)
     results.write(place, study)
     tables.write_cost(folder / folders.TABLES, place.name, study.data)
     if figures:

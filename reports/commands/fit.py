@@ -60,6 +60,7 @@ def fit(scenes, output, form, as_json, markdown, **words):
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
     from comparisons import atomic
+    from comparisons.case import open_case
     from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit import fit as run
     from heuristic.materials import FORMS
@@ -72,16 +73,16 @@ def fit(scenes, output, form, as_json, markdown, **words):
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
     folder = folders.prepare(output)
-    wanted = [jobs.job(name, words) for name in scenes]
+    wanted = [open_case(name, jobs.request(words)) for name in scenes]
     records, places = [], []
-    for source, _ in wanted:
-        places.append(folders.folder_name(source.name, places))
+    for case in wanted:
+        places.append(folders.folder_name(case.name, places))
         ownership.require_free_folder(folder / places[-1])
     with progress.shown() as bar:
-        for source, rendering in wanted:
-            set_variant(rendering["variant"])
-            command = jobs.command(source, rendering | fitting_words | {"form": form}, "fit")
-            result = run(source, jobs.options(rendering), chosen, bar.of(source.name), command)
+        for case in wanted:
+            set_variant(case.variant)
+            command = case.command("fit", **fitting_words, form=form)
+            result = run(case.source, case.options, chosen, bar.of(case.name), command)
             fit_files.write(folder / places.pop(0), result)
             records.append(result.data)
     if markdown:

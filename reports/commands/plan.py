@@ -23,22 +23,20 @@ def plan(scene, as_json, verify, **rendering):
       fotismos plan --verify fig-8-9 --resolution 128x128
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
-    from reference.scene.graph import set_variant
+    from comparisons.case import open_case
     from reports.terminal import plan_lines, progress
 
-    source, chosen = jobs.job(scene, rendering)
-    set_variant(chosen["variant"])
-    options = jobs.options(chosen)
+    case = open_case(scene, jobs.request(rendering))
     if verify:
         from comparisons.verification import verify as run
 
         with progress.shown() as bar:
-            data = run(source, options, bar.of(source.name)).data()
+            data = run(case.source, case.options, bar.of(case.name)).data()
         lines = plan_lines.verification_lines([data])
     else:
         from comparisons.compare import prepare
 
-        data = plan_lines.data(source.name, prepare(source, options), chosen["variant"])
+        data = plan_lines.data(case.name, prepare(case.source, case.options), case.variant)
         lines = plan_lines.lines(data)
     if as_json:
         lines = [json.dumps(data, indent=2, ensure_ascii=False)]

@@ -1,5 +1,7 @@
 """``fotismos report``: all built-in scenes in one report."""
 
+from dataclasses import replace
+
 import click
 
 from reports.asked import jobs
@@ -33,36 +35,37 @@ def report(output, figures, fresh, **rendering):
 
     names = tuple(SCENES)
     run = batch.start()
+    request = jobs.request(rendering)
     import mitsuba as mi
 
     # Of these scenes its warnings are known: RGB cannot hold a spectral lamp, said at each loading.
     mi.set_log_level(mi.LogLevel.Error)
     with run.timing("verification"):
-        verifications = [] if rendering["everything"] else _verify(names, rendering)
+        verifications = [] if request.everything else _verify(names, request)
     batch.finish(
         run,
         names,
         output,
-        batch.Wanted(rendering, figures, with_cost=True, fresh=fresh),
+        batch.Wanted(request, figures, with_cost=True, fresh=fresh),
         with_hard_cases=True,
         equations=equations.index(),
         verifications=verifications,
     )
 
 
-def _verify(names, rendering):
+def _verify(names, request):
     """Hold the plan of each scene against everything simulated, at a small size."""
+    from comparisons.case import open_case
     from comparisons.check.moved import level_of_each
     from comparisons.compare import LEVEL
     from comparisons.verification import verify
-    from reference.scene.graph import set_variant
     from reports.terminal import progress
 
     level = level_of_each(LEVEL, len(names))
     with progress.shown() as bar:
         results = []
-        for source, chosen in (jobs.job(name, rendering) for name in names):
-            set_variant(chosen["variant"])
-            options = jobs.options(chosen | {"resolution": VERIFIED_AT, "spp": None})
-            results.append(verify(source, options, bar.of(source.name), level).data())
+        for name in names:
+            case = open_case(name, replace(request, resolution=VERIFIED_AT, spp=None))
+            found = verify(case.source, case.options, bar.of(case.name), level)
+            results.append(found.data())
     return results

@@ -62,23 +62,25 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
 
 def _places(names):
     """Return the names of the scenes' folders, with the words that name the scenes."""
+    from comparisons.case import name_of
     from reports.run import output
 
     places = {}
     for name in jobs.expand(names):
-        places[output.folder_name(jobs.find(name), places)] = name
+        places[output.folder_name(name_of(name), places)] = name
     return places
 
 
 def _compare(run, places, folder, wanted, views, failures):
     """Collect the views of the scenes that are compared, and the errors of the others."""
+    from comparisons.case import name_of
     from reports.terminal import progress
 
     alone = len(places) == 1
     with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
         for place, name in places.items():
             try:
-                done = worker.compare(name, folder, place, wanted, bar.of(jobs.find(name)))
+                done = worker.compare(name, folder, place, wanted, bar.of(name_of(name)))
             except FotismosError as error:
                 if alone:
                     raise

@@ -64,21 +64,21 @@ class KeptPasses:
         self.path.unlink(missing_ok=True)
 
 
-def of_scene(folder, name, source, options, variant):
+def of_scene(folder, name, case):
     """Return the :class:`KeptPasses` of a comparison whose results go to ``folder/name``.
 
     The file lies beside that folder, which a finished result replaces as a whole.
     """
     from comparisons import record
 
-    key = key_of(source, options, variant, record.versions())
+    key = key_of(case.source, case.options, case.variant, record.versions())
     return KeptPasses(folder / f".{name}.fotismos-passes.npz", key)
 
 
 def key_of(source, options, variant, versions):
     """Return a digest of all that the passes of a comparison depend on.
 
-    These are the scene as Mitsuba reads it, the content of every file that it names, the options
+    These are the scene as Mitsuba reads it, the content of every file that it reads, the options
     but for the ones that only say how long to go on, variant and versions.
     """
     digest = hashlib.sha256()
@@ -86,14 +86,11 @@ def key_of(source, options, variant, versions):
     for index in graph.nodes_in_use():
         props = graph.props(index)
         digest.update(str(props).encode())
-        for name, value in props.items():
+        for _, value in props.items():
             if hasattr(value, "__array__") or hasattr(value, "__array_interface__"):
                 digest.update(np.array(value).tobytes())  # printed, large arrays are shortened
-            if not isinstance(value, str) or name != "filename":
-                continue
-            path = (graph.folder or Path()) / value
-            if path.is_file():
-                digest.update(hashlib.sha256(path.read_bytes()).digest())
+    for path in source.files():
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
     told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
     digest.update(json.dumps(told, sort_keys=True).encode())

@@ -1,24 +1,27 @@
 """One scene of a command: compared, its files written, or found finished."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING
 
 from reports.asked import jobs
 from reports.run.stages import Done
+
+if TYPE_CHECKING:
+    from comparisons.case import Request
 
 
 @dataclass(frozen=True)
 class Wanted:
     """What a command wants of each of its scenes.
 
-    ``rendering`` holds the options of `jobs.rendering_options`; ``fresh`` renders what is
-    finished, too.
+    ``request`` says how; ``fresh`` renders what is finished, too.
     """
 
-    rendering: Mapping[str, Any]
+    request: Request
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
@@ -46,28 +49,27 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     progress : callable
         ``progress(stage, done, total)``, called after each pass.
     """
+    from comparisons.case import open_case
     from comparisons.compare import compare
-    from reference.scene.graph import set_variant
     from reports.charts import figures as prints
     from reports.run import finished, kept, output
 
-    source, chosen = jobs.job(name, wanted.rendering)
-    set_variant(chosen["variant"])
-    options, done = jobs.options(chosen), Done()
+    done = Done()
+    case = open_case(name, wanted.request)
     with done.timing("finished scenes"):
-        passes = kept.of_scene(folder, place, source, options, chosen["variant"])
-        key = finished.key_of(passes.key, options, wanted.with_cost, wanted.figures)
+        passes = kept.of_scene(folder, place, case)
+        key = finished.key_of(passes.key, case.options, wanted.with_cost, wanted.figures)
         found = None if wanted.fresh else finished.load(folder / place, key)
     if found is not None:
         done.view = found
         return done
     begin = perf_counter()
-    result = compare(source, options, progress, jobs.command(source, chosen), passes)
+    result = compare(case.source, case.options, progress, case.command(), passes)
     done.compared = perf_counter() - begin
     study = None
     if wanted.with_cost:
         with done.timing("cost"):
-            study = _cost(source, chosen, options, progress, result.data)
+            study = _cost(case, progress, result.data)
     with done.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
             prints.write_scene(folder / output.FIGURES, place, result)
@@ -76,12 +78,12 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     return done
 
 
-def _cost(source, chosen, options, progress, data):
+def _cost(case, progress, data):
     """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
     from comparisons.cost.cost import quick
     from comparisons.effects.dominance import in_region
 
-    study = quick(source, options, progress, jobs.command(source, chosen) + " --cost")
+    study = quick(case.source, case.options, progress, case.command() + " --cost")
     for region in data["regions"]:
         effect = in_region(region, data["resolution"], study.effects)
         if effect is not None:

@@ -76,7 +76,7 @@ def _cornell_box(side, spp):
 
 
 def _lit_floor(count):
-    from reference.scene.graph import Source
+    from reference.scene.source import Source
 
     return _halves(Source("lit floor", lambda: _floor(count)), (256, 256), 4)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from heuristic.errors import InputError
+from reference.scene.file_checks import INCLUDE
 
 NAME = "scene"
 """What a Python file calls its dictionary, or the function that returns it."""
@@ -59,13 +60,11 @@ def scenes_in(folder):
     InputError
         When there is none.
     """
-    from reference.scene import file_checks
-
     files = [path for path in sorted(folder.iterdir()) if path.is_file()]
     written = [path for path in files if path.suffix == ".xml"]
     parts = set()
     for path in written:
-        for name in file_checks.INCLUDE.findall(_text(path)):
+        for name in INCLUDE.findall(_text(path)):
             inner = (folder / name).resolve()
             if inner != path.resolve():
                 parts.add(inner)

@@ -1,0 +1,229 @@
+"""What the user gave: the one door through which every command, test and notebook opens a scene."""
+
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from comparisons.gallery.builtin import builtin
+from comparisons.options import Options
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from reference.pairing.factors import Convention
+from reference.planning.planner import wants_spectra
+from reference.scene.graph import VARIANTS, set_variant
+from reference.scene.script import Script
+from reference.scene.source import Source
+
+RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
+
+Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What can be asked for about the rendering of a scene, by the names of the command line.
+
+    What is None is the scene's own, or else what :class:`comparisons.options.Options` has.
+
+    Parameters
+    ----------
+    define
+        Values for the placeholders of a scene file, by name.
+    """
+
+    variant: str | None = None
+    heuristic_variant: str | None = None
+    seed: int = 0
+    spp: int | None = None
+    noise: float | None = None
+    resolution: tuple[int, int] | None = None
+    interpolation: str | None = None
+    tessellation: int | None = None
+    everything: bool = False
+    pairing: str = "matched"
+    define: Mapping[str, str] = field(default_factory=dict)
+    sensor: int | None = None
+
+    def __post_init__(self) -> None:
+        values = {key: str(value) for key, value in dict(self.define or ()).items()}
+        object.__setattr__(self, "define", values)
+        if self.resolution is not None:
+            object.__setattr__(self, "resolution", tuple(self.resolution))
+        for name in (self.variant, self.heuristic_variant):
+            if name not in (None, *VARIANTS):
+                raise InputError(
+                    f"variant {name!r} is not supported: choose one of {', '.join(VARIANTS)}."
+                )
+
+    @classmethod
+    def of(cls, words: Mapping[str, Any]) -> "Request":
+        """Return the request that some words make, by name.
+
+        Raises
+        ------
+        InputError
+            For a name that is not known, or a value that is not allowed.
+        """
+        known = {each.name for each in fields(cls)}
+        if unknown := sorted(set(words) - known):
+            raise InputError(
+                f"options {', '.join(unknown)} are not known: choose of {', '.join(sorted(known))}."
+            )
+        return cls(**words)
+
+    def stated(self) -> dict[str, Any]:
+        """Return what is asked for as plain data, without what is None, False or empty."""
+        plain = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+        return {k: v for k, v in plain.items() if v is not None and v is not False and v != {}}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene that was opened, with all that was asked for.
+
+    Attributes
+    ----------
+    source
+        The scene, read once.
+    request
+        What was asked for, completed with what the scene itself says.
+    word
+        What names the scene in a command.
+    """
+
+    source: Source
+    request: Request
+    word: str
+
+    @property
+    def name(self) -> str:
+        """The scene's name."""
+        return self.source.name
+
+    @property
+    def variant(self) -> str:
+        """Mitsuba's variant for the scene."""
+        return self.request.variant or RGB
+
+    @cached_property
+    def options(self) -> Options:
+        """The options of a comparison."""
+        asked = self.request
+        return Options(
+            seed=asked.seed,
+            spp=asked.spp,
+            noise=asked.noise,
+            resolution=asked.resolution,
+            convention=Convention(asked.pairing),
+            heuristic_variant=asked.heuristic_variant,
+            interpolation=Interpolation(asked.interpolation or "phong"),
+            tessellation=asked.tessellation,
+            everything=asked.everything,
+            sensor=asked.sensor or 0,
+        )
+
+    def asking(self, **changes: Any) -> "Case":
+        """Return the same scene, not opened again, with something else asked for."""
+        return replace(self, request=replace(self.request, **changes))
+
+    def command(self, verb: str = "compare", **more: Any) -> str:
+        """Return the command that repeats what is done with the scene."""
+        words = ["fotismos", verb, self.word]
+        for name, value in self.request.define.items():
+            words += ["-D", f"{name}={value}"]
+        stated = {key: value for key, value in asdict(self.request).items() if key != "define"}
+        for key, value in (stated | more).items():
+            option = f"--{key.replace('_', '-')}"
+            if value is True:
+                words.append(option)
+            elif value not in (None, False):
+                text = "x".join(map(str, value)) if key == "resolution" else str(value)
+                words += [option, text]
+        return shlex.join(words)
+
+
+def open_case(scene: Scene, request: Request | None = None, name: str | None = None) -> Case:
+    """Open a scene: read it, run its script, choose its variant, and switch Mitsuba to that.
+
+    Parameters
+    ----------
+    scene
+        A built-in name, the path of a Mitsuba file (.xml) or of a Python file (.py) in which
+        ``scene`` is a dictionary or returns one, a dictionary as ``mitsuba.load_dict`` takes it,
+        or a function that returns one.
+    request
+        What is asked for.
+    name
+        The scene's name, in place of the file's or function's.
+
+    Raises
+    ------
+    InputError
+        When there is no such scene, or it cannot be read.
+    """
+    asked = request or Request()
+    if isinstance(scene, Mapping) or callable(scene):
+        own = name or getattr(scene, "__name__", "scene")
+        return _opened(Source(own, scene), asked, own)
+    path = file_of(scene)
+    if path is not None:
+        content = Script(path) if path.suffix == ".py" else path
+        return _opened(Source(name or path.stem, content, asked.define), asked, str(path))
+    known = builtin(str(scene))
+    # Who names the variant means both halves.
+    both = known.heuristic_variant if asked.variant is None else None
+    completed = replace(
+        asked,
+        variant=asked.variant or known.variant,
+        heuristic_variant=asked.heuristic_variant or both,
+        interpolation=asked.interpolation or known.interpolation,
+        tessellation=asked.tessellation or known.tessellation,
+    )
+    set_variant(completed.variant)
+    return Case(known.source(), completed, known.name)
+
+
+def file_of(scene: str | Path) -> Path | None:
+    """Return the path of a scene that is a file, None for a built-in one.
+
+    Raises
+    ------
+    InputError
+        When the file is not there.
+    """
+    path = Path(scene)
+    if path.suffix not in (".xml", ".py") and not path.exists():
+        return None
+    if not path.is_file():
+        raise InputError(
+            f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
+            " that makes one (.py), a folder of such, or the name of a built-in scene;"
+            " `fotismos scenes` lists them."
+        )
+    return path
+
+
+def name_of(scene: str | Path) -> str:
+    """Return the name that a scene goes by, without reading it.
+
+    Raises
+    ------
+    InputError
+        When there is no such scene.
+    """
+    path = file_of(scene)
+    return builtin(str(scene)).name if path is None else path.stem
+
+
+def _opened(source: Source, asked: Request, word: str) -> Case:
+    """Complete a request with what a scene of the user's own wants."""
+    variant = asked.variant
+    set_variant(variant or RGB)
+    if variant is None:
+        variant = SPECTRAL if wants_spectra(source.parse()) else RGB
+        set_variant(variant)
+    interpolation = asked.interpolation or Interpolation.PHONG.value
+    return Case(source, replace(asked, variant=variant, interpolation=interpolation), word)

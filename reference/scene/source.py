@@ -1,0 +1,129 @@
+"""Where a scene comes from, read once: the file parsed, the script run, its files named."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from reference.scene import file_checks
+from reference.scene.graph import Graph, files_from
+
+Parser = mi.parser
+Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+Edit = Callable[[Graph], None]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scene comes from: a name, and an XML file or a dictionary.
+
+    Parameters
+    ----------
+    name
+        Name in reports and of the output folder.
+    content
+        Path of a Mitsuba XML file, a dictionary as ``mitsuba.load_dict`` takes it, or a function
+        that returns one.
+    parameters
+        Values for the ``$name`` placeholders of an XML file.
+    edits
+        Functions that change the graph, in order.
+    """
+
+    name: str
+    content: Content
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    edits: tuple[Edit, ...] = ()
+    _read: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def edited(self, edit: Edit) -> "Source":
+        """Return the same scene with one more change to its graph; it is not read again."""
+        other = replace(self, edits=(*self.edits, edit))
+        object.__setattr__(other, "_read", self._read)
+        return other
+
+    def parse(self) -> Graph:
+        """Return the scene's graph for the current variant, to be edited freely.
+
+        A file is parsed once for each variant; a function is called once.
+
+        Raises
+        ------
+        InputError
+            With Mitsuba's own message, which names file, line and column, when the file is missing,
+            is not XML, or uses something that Mitsuba does not know.
+        """
+        variant = mi.variant()
+        if variant not in self._read:
+            self._read[variant] = self._parsed(variant)
+        graph = self._read[variant].copy()
+        for edit in self.edits:
+            edit(graph)
+        return graph
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that the scene reads, each where Mitsuba finds it, sorted.
+
+        These are the scene's own file, what it includes, and every file that an element names.
+
+        Raises
+        ------
+        InputError
+            See :meth:`parse`.
+        """
+        graph = self.parse()
+        found = set()
+        if isinstance(self.content, (str, PathLike)):
+            found |= set(file_checks.included(Path(self.content)))
+        with files_from(graph.folder):
+            resolver = mi.file_resolver()
+            for index in graph.nodes_in_use():
+                for _, value in graph.props(index).items():
+                    if isinstance(value, str) and (path := _file(resolver, value)):
+                        found.add(path)
+        return tuple(sorted(found))
+
+    def _content(self) -> str | PathLike | Mapping[str, Any]:
+        if not callable(self.content):
+            return self.content
+        if "content" not in self._read:
+            self._read["content"] = self.content()
+        return self._read["content"]
+
+    def _parsed(self, variant: str) -> Graph:
+        config = Parser.ParserConfig(variant)
+        content, folder = self._content(), None
+        try:
+            if isinstance(content, Mapping):
+                state = Parser.parse_dict(config, dict(content))
+            else:
+                path = Path(content)
+                file_checks.included(path)
+                state = Parser.parse_file(config, str(path), **self.parameters)
+                folder = path.resolve().parent
+            Parser.transform_upgrade(config, state)
+            Parser.transform_resolve_references(config, state)
+        except RuntimeError as error:
+            raise InputError(f"{self.name}: {error}") from error
+        if state.root.type != mi.ObjectType.Scene:
+            raise InputError(
+                f"{self.name}: this is not a scene. Its outermost element must be a scene."
+            )
+        graph = Graph(self.name, config, state)
+        graph.folder = folder
+        return graph
+
+
+def _file(resolver: mi.FileResolver, value: str) -> Path | None:
+    """Return the file that a text names, if it names one."""
+    if not value or len(value) > 4096 or "\0" in value or "\n" in value:
+        return None
+    path = Path(str(resolver.resolve(value)))
+    try:
+        return path.resolve() if path.is_file() else None
+    except OSError:
+        return None
