@@ -8,7 +8,7 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 
-from comparisons import passes, record
+from comparisons import record, render
 from comparisons.departure import limits, regions, statistics
 from comparisons.departure.histogram import histogram
 from comparisons.departure.marks import significance
@@ -70,7 +70,7 @@ def prepare(source, options=None):
     planning = perf_counter() - begin
     # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
     gc.collect()
-    planned = passes.schedule(chosen, width * height, options.spp, options.noise)
+    planned = render.schedule(chosen, width * height, options.spp, options.noise)
     return Prepared(
         pair=pair,
         plan=chosen,
@@ -97,7 +97,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         How to repeat the comparison, for the record.
     kept : optional
         Where the passes of an interrupted run are, and those of this one go
-        (:func:`comparisons.passes.render`).
+        (:func:`comparisons.render.render`).
 
     Returns
     -------
@@ -119,7 +119,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     width, height = image_size(ready.scene)
     surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
-    estimates = passes.render(ready, options, surface.hit, progress or _silent, kept)
+    estimates = render.render(ready, options, surface.hit, progress or _silent, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)

@@ -22,7 +22,7 @@ class Options:
         most that are taken.
     noise
         Go on until the 95th percentile of the noise in ΔE2000 is no more than this
-        (:mod:`comparisons.passes`).
+        (:mod:`comparisons.render`).
     resolution
         ``(width, height)`` in place of the film's own.
     convention

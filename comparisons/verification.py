@@ -13,7 +13,8 @@ from comparisons.compare import LEVEL, Options, prepare
 from comparisons.departure.marks import significance
 from reference.pairing import halves
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.renderer import Accumulator, Renderer, Stream, pass_seed
+from reference.rendering.passes import Stream, pass_seed, passes
+from reference.rendering.renderer import Accumulator, Renderer
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
@@ -90,17 +91,21 @@ def verify(source, options=None, progress=None, level=LEVEL):
     """
     options = options or Options()
     sides = [prepare(source, replace(options, everything=choice)) for choice in (False, True)]
-    passes = max(side.passes for side in sides)
+    count = max(side.passes for side in sides)
     if sides[0].plan.max_depth != 2:
-        passes *= PASSES_WITH_PATHS
+        count *= PASSES_WITH_PATHS
     sums = [Accumulator() for _ in sides]
-    for number in range(passes):
-        if progress:
-            progress("verifying", number, passes)
-        for side, total in zip(sides, sums, strict=True):
-            # Other seeds for the other side: equal ones would hide noise that both share.
-            stream = Stream.COMPARED if side is sides[0] else Stream.OTHER_SIDE
-            total.add(side.reference.render(pass_seed(options.seed, number, stream)))
+    # Other seeds for the other side: equal ones would hide noise that both share.
+    streams = {Stream.COMPARED: progress, Stream.OTHER_SIDE: None}
+    loops = [
+        passes(
+            [side.reference], options.seed, count, stream=stream, progress=told, stage="verifying"
+        )
+        for side, (stream, told) in zip(sides, streams.items(), strict=True)
+    ]
+    for both in zip(*loops, strict=True):
+        for total, one in zip(sums, both, strict=True):
+            total.add(one.images[0])
     estimates = [total.estimate() for total in sums]
     return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed), level)
 

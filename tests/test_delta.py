@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reference.rendering.renderer import Accumulator, Renderer, Stream, pass_seed
+from reference.rendering.passes import Stream, pass_seed
+from reference.rendering.renderer import Accumulator, Renderer
 from tests.test_physics import look_at
 
 SIDE, SPP, PASSES = 24, 256, 8

@@ -13,7 +13,7 @@ from comparisons.compare import compare, prepare
 from comparisons.departure.metrics import METRICS
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from comparisons.passes import LIMIT_SPP, WAVEFRONT, is_checked, schedule
+from comparisons.render import LIMIT_SPP, WAVEFRONT, is_checked, schedule
 from heuristic.errors import InputError
 from reports.run.kept import KeptPasses, key_of
 

@@ -11,7 +11,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import NonFiniteError
 from reference.pairing import halves
-from reference.rendering import renderer
+from reference.rendering import passes, renderer
 from tests import checks
 from tests.test_physics import look_at
 
@@ -138,9 +138,9 @@ def test_another_seed_gives_other_camera_rays(rgb):
 
 def test_no_two_runs_have_a_pass_in_common():
     """Seeds of runs next to each other, of 64 passes each and of every stream."""
-    streams = list(renderer.Stream)
+    streams = list(passes.Stream)
     seeds = [
-        renderer.pass_seed(seed, number, stream)
+        passes.pass_seed(seed, number, stream)
         for seed in range(50)
         for number in range(64)
         for stream in streams

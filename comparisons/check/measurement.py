@@ -15,7 +15,7 @@ from comparisons.departure.metrics import METRICS, Array, log2_luminance_ratio, 
 from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import noise_floor
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.renderer import pass_seed
+from reference.rendering.passes import passes
 
 PASSES = 16
 """Enough for a t-test corrected for a hundred quantities to see five standard errors."""
@@ -114,7 +114,7 @@ class Pictures:
     reference: Array
 
 
-def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, Pictures]:
+def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pictures]:
     """Render both halves of a prepared scene, and measure.
 
     Parameters
@@ -123,7 +123,7 @@ def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, P
         The scene; its renderers say how many samples a pass has.
     seed
         Of the run; each pass hashes its own from it (`pass_seed`).
-    passes
+    count
         Independent passes, 2 or more.
     viewing
         How linear values are looked at.
@@ -135,15 +135,8 @@ def measure(ready, seed, passes, viewing, progress=None) -> tuple[Measurement, P
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
-    images = []
-    for number in range(passes):
-        if progress:
-            progress("rendering", number, passes)
-        own = pass_seed(seed, number)
-        images.append([np.array(half.render(own)) for half in (ready.heuristic, ready.reference)])
-    if progress:
-        progress("rendering", passes, passes)
-    images = np.array(images, np.float64)
+    loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
+    images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)
     height, width = images.shape[2:4]
     counted = gbuffer(ready.scene, width, height).hit
     measured = measurement(images, counted, viewing)

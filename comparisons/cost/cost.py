@@ -16,7 +16,8 @@ from comparisons.effects.prices import prices
 from comparisons.effects.split import split
 from comparisons.options import Options
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.renderer import Accumulator, Renderer, Stream, pass_seed
+from reference.rendering.passes import Stream, passes
+from reference.rendering.renderer import Accumulator, Renderer
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,9 @@ def _converged(ready, effort, seed, progress):
         ready.scene, ready.reference.integrator, effort.reference_spp, "reference image"
     )
     total = Accumulator()
-    for number in range(ready.plan.passes):
-        progress("reference", number, ready.plan.passes)
-        total.add(renderer.render(pass_seed(seed, number, Stream.OTHER_SIDE)))
+    count, stream = ready.plan.passes, Stream.OTHER_SIDE
+    for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
+        total.add(one.images[0])
     return total.estimate()
 
 

@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 
 from comparisons.departure.metrics import METRICS
-from reference.rendering.renderer import pass_seed, variant
+from reference.rendering.passes import passes
 
 LEVEL = 0.95
 
@@ -157,27 +157,15 @@ def measure(renderers, judge, rounds, seed, progress):
     """
     errors = {key: [] for key in renderers}
     images = {}
-    for number in range(rounds + 2):
-        progress("timing", number, rounds + 2)
-        own = pass_seed(seed, number)
-        for name, group in by_variant(renderers).items():
-            with variant(name):
-                for key, renderer in group.items():
-                    images[key] = np.array(renderer.render(own))
-        if number > 1:
+    loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage="timing")
+    for one in loop:
+        images = dict(zip(renderers, map(np.array, one.images), strict=True))
+        if one.number > 1:
             for key, image in images.items():
                 errors[key].append(judge.errors(image))
     return tuple(
         _summarise(key, renderer, errors[key], images[key]) for key, renderer in renderers.items()
     )
-
-
-def by_variant(renderers):
-    """Group renderers by their variant: changing it takes Mitsuba as long as a small rendering."""
-    groups = {}
-    for key, renderer in renderers.items():
-        groups.setdefault(renderer.variant, {})[key] = renderer
-    return groups
 
 
 def _summarise(key, renderer, errors, image):

@@ -14,7 +14,8 @@ from comparisons.effects.between import Between
 from heuristic.interpolation import Interpolation
 from reference.pairing.halves import with_sampler
 from reference.planning.effects import Effect
-from reference.rendering.renderer import Renderer, Stream, pass_seed, variant
+from reference.rendering.passes import Stream, passes
+from reference.rendering.renderer import Renderer, variant
 
 KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
 
@@ -165,8 +166,8 @@ class Lattice:
         return self._glows[glow]
 
     def _passes(self, renderer):
-        seeds = [pass_seed(self.seed, i, Stream.REPLICATES) for i in range(self.replicates)]
-        images = [np.array(renderer.render(seed)) for seed in seeds]
+        loop = passes([renderer], self.seed, self.replicates, stream=Stream.REPLICATES)
+        images = [np.array(one.images[0]) for one in loop]
         return np.stack(images), np.array(renderer.times[1:])
 
     def _between_here(self):

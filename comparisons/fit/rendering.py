@@ -8,7 +8,8 @@ import numpy as np
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.renderer import Accumulator, pass_seed, variant
+from reference.rendering.passes import passes
+from reference.rendering.renderer import Accumulator, add_difference, variant
 from reference.scene.graph import properties
 
 VARIANT = "llvm_ad_rgb"
@@ -56,15 +57,10 @@ def render(ready, options, progress):
         )
     recorder = Recorder(ready.heuristic)
     sums = [Accumulator() for _ in range(3)]
-    for number in range(ready.passes):
-        progress("rendering", number, ready.passes)
-        seed = pass_seed(options.seed, number)
-        images = [half.render(seed) for half in (ready.heuristic, ready.reference)]
-        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
-        for total, image in zip(sums, images, strict=True):
-            total.add(image)
-        recorder.render(seed)
-    progress("rendering", ready.passes, ready.passes)
+    halves = (ready.heuristic, ready.reference)
+    for one in passes(halves, options.seed, ready.passes, progress=progress):
+        add_difference(sums, one.images)
+        recorder.render(one.seed)
     before, reference, difference = (total.estimate() for total in sums)
     seen = gbuffer(ready.scene, *image_size(ready.scene))
     with variant(VARIANT):

@@ -14,7 +14,8 @@ from heuristic.errors import InputError
 from reference.pairing import halves
 from reference.planning.planner import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.renderer import Accumulator, Renderer, pass_seed, physical_integrator
+from reference.rendering.passes import passes
+from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
 from reference.scene.source import Source
 
 PASSES = 4
@@ -99,11 +100,10 @@ def _render(renderers, seed):
     """Render all in turn; return their mean images, and the noise of first less last."""
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
-    for number in range(PASSES):
-        passes = [renderer.render(pass_seed(seed, number)) for renderer in renderers]
-        for total, image in zip(sums, passes, strict=True):
+    for one in passes(renderers, seed, PASSES):
+        for total, image in zip(sums, one.images, strict=True):
             total.add(image)
-        difference.add(passes[0] - passes[-1])
+        difference.add(one.images[0] - one.images[-1])
     return [total.estimate().mean for total in sums], difference.estimate().noise
 
 

@@ -8,7 +8,6 @@ so that every standard error here comes from the spread of passes.
 
 from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import IntEnum
 from statistics import median
 from time import perf_counter
 
@@ -20,24 +19,6 @@ from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
 from reference.rendering.environment import AlbedoTable
 from reference.scene.preparation import PATHS
-
-
-class Stream(IntEnum):
-    """What passes are for; passes of different streams are independent at any seed."""
-
-    COMPARED = 0
-    OTHER_SIDE = 1
-    REPLICATES = 2
-
-
-def pass_seed(seed, number, stream=Stream.COMPARED):
-    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
-
-    Both halves, and all methods that are compared, take the same one for a pass. So their camera
-    rays cancel, while runs of different seeds have no pass in common.
-    """
-    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
-    return int(sequence.generate_state(1)[0])
 
 
 @dataclass(frozen=True)
@@ -142,6 +123,14 @@ class Accumulator(Mean):
             noise=self.noise(),
             passes=self.count,
         )
+
+
+def add_difference(sums, images):
+    """Add the images of both halves, and their difference, to three sums."""
+    heuristic, reference = images
+    difference = mi.TensorXd(heuristic) - mi.TensorXd(reference)
+    for total, image in zip(sums, (heuristic, reference, difference), strict=True):
+        total.add(image)
 
 
 class Renderer:

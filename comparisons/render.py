@@ -12,11 +12,11 @@ same order, interrupted or not: the result is the same bit for bit.
 from dataclasses import dataclass
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from comparisons.departure.metrics import METRICS
-from reference.rendering.renderer import Accumulator, Estimate, Mean, pass_seed
+from reference.rendering.passes import passes
+from reference.rendering.renderer import Accumulator, Estimate, Mean, add_difference
 
 WAVEFRONT = 2**24
 """Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
@@ -125,21 +125,17 @@ def render(ready, options, counted, progress, kept=None):
     sums = [Mean(), Accumulator(), Accumulator()]
     done = before = _restore(kept.load() if kept else None, sums, halves)
     reached = None
-    while done < ready.passes:
-        progress("rendering", done, ready.passes)
-        seed = pass_seed(options.seed, done)
-        images = [half.render(seed) for half in halves]
-        images.append(mi.TensorXd(images[0]) - mi.TensorXd(images[1]))
-        for total, image in zip(sums, images, strict=True):
-            total.add(image)
-        done += 1
+    loop = passes(halves, options.seed, ready.passes, first=before, progress=progress)
+    for one in loop:
+        add_difference(sums, one.images)
+        done = one.number + 1
         if kept:
             kept.offer(done, lambda: _state(sums, halves))
         if options.noise is not None and is_checked(done, ready.passes):
             reached = noise_percentile(sums, counted, options.viewing)
             if reached <= options.noise:
                 break
-    progress("rendering", done, done)
+    loop.close()
     stop = None
     if options.noise is not None:
         if reached is None:

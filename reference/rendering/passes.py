@@ -1,0 +1,100 @@
+"""The one loop that renders: passes of several renderers in turn.
+
+In turn, so that a drift of the machine hits all alike. All renderers take the same seed for a pass:
+their camera rays are the same, and pixel filter and edges cancel in a difference.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from reference.rendering.renderer import Renderer, variant
+
+Progress = Callable[[str, int, int], None]
+"""Called as ``progress(stage, done, total)``."""
+
+
+class Stream(IntEnum):
+    """What passes are for; passes of different streams are independent at any seed."""
+
+    COMPARED = 0
+    OTHER_SIDE = 1
+    REPLICATES = 2
+
+
+def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
+    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
+
+    Both halves, and all methods that are compared, take the same one for a pass. So their camera
+    rays cancel, while runs of different seeds have no pass in common.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
+    return int(sequence.generate_state(1)[0])
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass: its number from 0, its seed, and an image (H, W, 3) of each renderer."""
+
+    number: int
+    seed: int
+    images: tuple
+
+
+def passes(
+    renderers: Sequence[Renderer],
+    seed: int,
+    count: int,
+    *,
+    first: int = 0,
+    stream: Stream = Stream.COMPARED,
+    progress: Progress | None = None,
+    stage: str = "rendering",
+) -> Iterator[Pass]:
+    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each as it is done.
+
+    Parameters
+    ----------
+    renderers
+        Each renders in its own variant.
+    seed
+        Of the run.
+    count
+        Number of passes in all.
+    first
+        Passes that were rendered before.
+    stream
+        What the passes are for.
+    progress, stage
+        Told before each pass, and once more when all are done or the caller has seen enough.
+
+    Raises
+    ------
+    NonFiniteError
+        When an image holds a NaN or an infinity.
+    """
+    done = first
+    try:
+        for number in range(first, count):
+            if progress:
+                progress(stage, number, count)
+            own = pass_seed(seed, number, stream)
+            images = _images(renderers, own)
+            done = number + 1
+            yield Pass(number, own, images)
+    finally:
+        if progress:
+            progress(stage, done, done)
+
+
+def _images(renderers: Sequence[Renderer], seed: int) -> tuple:
+    """Render one pass, those of one variant together: a change takes as long as a small image."""
+    images: dict[int, object] = {}
+    for name in dict.fromkeys(renderer.variant for renderer in renderers):
+        with variant(name):
+            for place, renderer in enumerate(renderers):
+                if renderer.variant == name:
+                    images[place] = renderer.render(seed)
+    return tuple(images[place] for place in range(len(renderers)))
