@@ -1,0 +1,112 @@
+"""One door: whatever names a scene is read once, in the same way by all who open it."""
+
+import mitsuba as mi
+import pytest
+
+from comparisons.case import Request, open_case
+from heuristic.errors import InputError
+from reference.scene import source
+from tests.small_scene import SCENE
+
+SMALL = ("--spp", 4, "--resolution", "12x12")
+
+SCRIPT = """
+from pathlib import Path
+import mitsuba as mi
+
+with Path(__file__).with_suffix(".runs").open("a") as file:
+    file.write("x")
+
+def scene():
+    return mi.cornell_box()
+"""
+
+LAMP = {"type": "spectrum", "value": [(580.0, 0.0), (590.0, 50.0), (600.0, 0.0)]}
+
+
+def spectral_scene():
+    """A sphere under a lamp that three numbers cannot stand for."""
+    return {
+        "type": "scene",
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+        "ball": {"type": "sphere", "center": (0, 0, 4), "bsdf": {"type": "diffuse"}},
+        "lamp": {"type": "point", "position": (0, 2, 0), "intensity": LAMP},
+    }
+
+
+@pytest.fixture
+def parses(monkeypatch):
+    """The files that Mitsuba's parser reads."""
+    read = []
+    parse = source.Parser.parse_file
+
+    def counted(config, path, **parameters):
+        read.append(path)
+        return parse(config, path, **parameters)
+
+    monkeypatch.setattr(source.Parser, "parse_file", counted)
+    return read
+
+
+@pytest.mark.parametrize("command", ["compare", "plan", "cost", "fit"])
+def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses, command):
+    words = {"plan": (), "cost": ("--rounds", 2)}.get(command, ())
+    folder = () if command == "plan" else ("-o", tmp_path / "out")
+    assert run(command, scene_file, *words, *folder, *SMALL)[0] == 0
+    assert parses == [str(scene_file)]
+
+
+def test_a_script_runs_once_in_each_attempt(run, tmp_path):
+    """Also where the result is found finished."""
+    script, runs = tmp_path / "s.py", tmp_path / "s.runs"
+    script.write_text(SCRIPT, encoding="utf-8")
+    for attempt in (1, 2):
+        assert run("compare", script, "-o", tmp_path / "out", *SMALL)[0] == 0
+        assert runs.read_text() == "x" * attempt
+
+
+def test_notebook_and_command_line_choose_one_variant(rgb):
+    from reports import notebook
+
+    shown = notebook.compare(spectral_scene, spp=4)
+    assert open_case(spectral_scene).variant == "llvm_ad_spectral"
+    assert "--variant llvm_ad_spectral" in shown.comparison.data["command"]
+    assert open_case(mi.cornell_box(), name="box").variant == "llvm_ad_rgb"
+
+
+def test_every_file_is_named_where_mitsuba_finds_it(rgb, tmp_path, monkeypatch):
+    """What is included, beside the scene or in the current folder; not what has a like name."""
+    scenes, current = tmp_path / "scenes", tmp_path / "current"
+    for folder in (scenes, current):
+        folder.mkdir()
+    texture = (
+        '<texture type="bitmap" name="diffuse_reflectance">'
+        '<string name="filename" value="{}"/></texture>'
+    )
+    colour = '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>'
+    part = '<scene version="3.0.0"><bsdf type="diffuse" id="unused"/></scene>'
+    (scenes / "part.xml").write_text(part, encoding="utf-8")
+    include = '<include filename="part.xml"/></scene>'
+    monkeypatch.chdir(current)
+    for name, folder in (("beside.png", scenes), ("current.png", current)):
+        (folder / name).write_bytes(b"one")
+        (tmp_path / name).write_bytes(b"not this one")
+        text = SCENE.replace(colour, texture.format(name)).replace("</scene>", include)
+        (scenes / "s.xml").write_text(text, encoding="utf-8")
+        found = open_case(scenes / "s.xml").source.files()
+        assert set(found) == {scenes / "part.xml", scenes / "s.xml", folder / name}
+
+
+def test_options_that_are_not_known_are_refused_with_those_that_are():
+    with pytest.raises(InputError, match=r"samples are not known.*spp"):
+        Request.of({"samples": 4})
+    with pytest.raises(InputError, match=r"llvm_mono.*llvm_ad_rgb"):
+        Request(variant="llvm_mono")
+
+
+def test_a_command_repeats_what_was_asked_for(rgb):
+    case = open_case("fig-6-10", Request(resolution=(12, 10), define={"a": 1}))
+    assert case.command() == (
+        "fotismos compare fig-6-10 -D a=1 --variant llvm_ad_rgb --resolution 12x10"
+        " --interpolation flat --tessellation 4 --pairing matched"
+    )
