@@ -30,7 +30,7 @@ def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
         assert record["resolution"] == size
         assert (out / name / "comparison.exr").stat().st_size > 0
         assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
-    expected = ["fig-8-9", "index.html", "my-scene", "run.json", "tables"]
+    expected = [".fotismos", "fig-8-9", "index.html", "my-scene", "run.json", "tables"]
     assert sorted(path.name for path in out.iterdir()) == expected
 
 
@@ -123,7 +123,7 @@ def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypat
         run("compare", scene_file, "-o", out, "--spp", 4, "--seed", 1)
     assert (out / "my-scene/comparison.json").read_bytes() == before
     names = sorted(path.name for path in out.iterdir())
-    assert names == ["index.html", "my-scene", "run.json", "tables"]
+    assert names == [".fotismos", "index.html", "my-scene", "run.json", "tables"]
 
 
 def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):

@@ -10,6 +10,7 @@ import pytest
 
 from comparisons import atomic
 from heuristic.errors import InputError
+from reports.ci.checks import FILES
 from reports.files import ownership
 from reports.run import output
 
@@ -122,17 +123,15 @@ def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
 
 
 def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
-    from reports.ci.checks import _clear
-
     ownership.folder(tmp_path / "a")
     for name in ("check.json", "heuristic.png"):
         ownership.write(tmp_path / "a" / name, b"ours")
     (tmp_path / "a/reference.png").write_bytes(b"mine")
-    _clear(tmp_path / "a")
-    assert {path.name for path in (tmp_path / "a").iterdir()} == {"reference.png", ownership.MARK}
+    ownership.clear(tmp_path / "a", FILES)
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["reference.png"]
     (tmp_path / "a/reference.png").unlink()
-    _clear(tmp_path / "a")
-    assert not (tmp_path / "a").exists()
+    ownership.clear(tmp_path / "a", FILES)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("seed", range(8))

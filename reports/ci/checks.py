@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from comparisons import atomic
 from comparisons.check import check as checking
 from comparisons.check.check import Check
 from comparisons.check.moved import LEVEL
@@ -14,6 +13,9 @@ from reference.scene.graph import set_variant
 from reports.ci import baselines, check_pictures, check_record
 from reports.ci.baselines import BaselineFile
 from reports.files import ownership
+
+FILES = ("check.json", *(f"{name}.png" for name in check_pictures.NAMES))
+"""What a failure leaves in its folder."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
         versions=check_record.other_versions(file.baseline),
     )
     if folder is not None:
-        _clear(folder)
+        ownership.clear(folder, FILES)
     result = replace(result, seconds=perf_counter() - begin)
     if result.folder is not None:
         _write_failure(file, result)
@@ -160,16 +162,6 @@ def _checked(file: BaselineFile, case, level, progress):
 
 def _small(pictures):
     return check_pictures.reduced(pictures)
-
-
-def _clear(folder):
-    """Delete the files of an earlier failure, and the folder unless it holds others."""
-    ours = ownership.made(folder)
-    for name in ("check.json", *(f"{name}.png" for name in check_pictures.NAMES)):
-        if name in ours:
-            (folder / name).unlink(missing_ok=True)
-    if folder.is_dir() and {path.name for path in folder.iterdir()} <= {ownership.MARK}:
-        atomic.remove(folder)
 
 
 def _write_failure(file, result):

@@ -5,7 +5,7 @@ line. What is not in the list is not touched, and neither is a folder without su
 """
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -75,19 +75,33 @@ def claim(folder: Path, *names: str) -> None:
             file.write("".join(f"{name}\n" for name in new))
 
 
-def folder(path: Path) -> Path:
-    """Make a folder for results, or take one that fotismos made.
+def release(folder: Path, *names: str) -> None:
+    """Take names off the list of what fotismos made in a folder."""
+    left = made(folder) - set(names)
+    if left:
+        atomic.write(folder / MARK, "".join(f"{name}\n" for name in sorted(left)))
+    else:
+        (folder / MARK).unlink(missing_ok=True)
 
-    Raises
-    ------
-    InputError
-        Where it holds something else.
-    """
-    require_free_folder(path)
-    claim(path.parent, path.name)
-    path.mkdir(exist_ok=True)
+
+def folder(path: Path) -> Path:
+    """Make a folder for single results, or use one that is there, whatever else is in it."""
+    if not path.exists():
+        path.mkdir()
+        claim(path.parent, path.name)
     claim(path)
     return path
+
+
+def clear(path: Path, names: Iterable[str]) -> None:
+    """Delete those of some files that fotismos made, and their folder once it is empty."""
+    ours = made(path) & set(names)
+    for name in ours:
+        (path / name).unlink(missing_ok=True)
+    release(path, *ours)
+    if _is_empty(path):
+        path.rmdir()
+        release(path.parent, path.name)
 
 
 def write(path: Path, content: str | bytes) -> None:
