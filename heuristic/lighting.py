@@ -1,15 +1,15 @@
 """The sum over the lights of 8.10, for a handful of lights and for thousands."""
 
 from collections import defaultdict
-from dataclasses import fields, replace
-from numbers import Real
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import drjit as dr
 import numpy as np
 
 from heuristic import colours, lobes, numerics, terms, vectors
-from heuristic.lights import UNATTENUATED, is_unattenuated
-from heuristic.numerics import is_number
+from heuristic.light import Light
+from heuristic.materials import Material
 
 BLOCK = 16
 """Lights in one kernel. More are summed block after block by the same kernel, each light costing
@@ -17,13 +17,20 @@ about what it costs unrolled; a loop inside the kernel would fetch each paramete
 anew, and take twice as long. Larger blocks compile longer and gain little (see the benchmarks)."""
 
 
-def sum_lights(position, normal, view, material, lights, visible=None):
+def sum_lights(
+    position: Any,
+    normal: Any,
+    view: Any,
+    material: Material,
+    lights: Sequence[Light],
+    visible: Callable[[Any, Any], Any] | None = None,
+) -> tuple[Any, Any]:
     """Sum the light terms of 8.10, with ``k_d`` and ``k_s`` taken out of the sum.
 
     Parameters
     ----------
     position, normal, view
-        As of :func:`heuristic.shade`: normals and views of any length.
+        See :func:`heuristic.shade`: normals and views of any length.
     material : Material
         Tells which of the two sums are needed, and the form and exponent of the specular term.
     lights : sequence
@@ -71,85 +78,49 @@ def sum_lights(position, normal, view, material, lights, visible=None):
     return tuple(_summed(sums.get(name)) for name in ("diffuse", "specular"))
 
 
-def _summed(pair):
+def _summed(pair: tuple | None) -> Any:
     if pair is None or isinstance(pair[1], int):
         return pair and pair[0]
     return numerics.summed(*pair)
 
 
-def _add(parts, name, term):
+def _add(parts: dict, name: str, term: Any) -> None:
     parts[name] = parts[name] + term if name in parts else term
 
 
-def _portions(lights):
+def _portions(lights: Sequence[Light]) -> list[Sequence[Light]]:
     """Split lights into blocks as they are."""
     return [lights[begin : begin + BLOCK] for begin in range(0, len(lights), BLOCK)]
 
 
-def _blocks(lights, vector_type):
+def _blocks(lights: Sequence[Light], vector_type: type) -> Iterator[list[Light]]:
     """Split lights into blocks that share one kernel: of one structure, with opaque numbers."""
     alike = defaultdict(list)
     for light in lights:
-        alike[_structure(light)].append(light)
+        alike[light.structure()].append(light)
     for group in alike.values():
         for begin in range(0, len(group), BLOCK):
             yield _opaque(group[begin : begin + BLOCK], vector_type)
 
 
-def _structure(light):
-    """Return what decides on a light's instructions, apart from its numbers."""
-    return (
-        type(light),
-        is_unattenuated(getattr(light, "attenuation", UNATTENUATED)),
-        getattr(light, "clamped", False),
-        is_number(getattr(light, "exponent", None), 0),
-        colours.wavelength_count(light.intensity),
-    )
-
-
-def _opaque(lights, vector_type):
+def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
     """Move the numbers of a block of lights out of the kernel's code, into one small array.
 
     Which light comes from where in the array is the same for all blocks of a structure, and so is
     the kernel.
     """
-    values = [value for light in lights for value in _numbers(light).values()]
-    flat = [number for value in values for number in np.ravel(value)]
+    numbers = [light.numbers() for light in lights]
+    flat = [part for given in numbers for value in given.values() for part in np.ravel(value)]
     buffer = dr.leaf_t(vector_type)(flat)
     dr.eval(buffer)
     place = iter(range(len(flat)))
 
-    def fetch(value):
+    def fetched(value: object) -> object:
         if isinstance(value, tuple):
-            return tuple(map(fetch, value))
+            return tuple(map(fetched, value))
         return dr.gather(type(buffer), buffer, next(place))
 
-    def fetched(name, value):
-        fetched = fetch(value)
-        if name in ("position", "direction"):
-            return vector_type(fetched)
-        return colours.as_array(fetched, vector_type) if name == "intensity" else fetched
-
     return [
-        replace(light, **{name: fetched(name, value) for name, value in _numbers(light).items()})
-        for light in lights
+        light.with_numbers({name: fetched(v) for name, v in given.items()}, vector_type)
+        for light, given in zip(lights, numbers, strict=True)
     ]
-
-
-def _numbers(light):
-    """Return the fields of a light that are numbers, less those that its structure fixes."""
-    fixed = {"clamped"}
-    if is_unattenuated(getattr(light, "attenuation", UNATTENUATED)):
-        fixed.add("attenuation")
-    if is_number(getattr(light, "exponent", None), 0):
-        fixed.add("exponent")
-    given = {field.name: getattr(light, field.name) for field in fields(light)}
-    return {
-        name: value
-        for name, value in given.items()
-        if name not in fixed and all(isinstance(part, Real) for part in _parts(value))
-    }
-
-
-def _parts(value):
-    return value if isinstance(value, tuple) else (value,)

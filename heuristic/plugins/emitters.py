@@ -26,6 +26,7 @@ import mitsuba as mi
 
 from heuristic import numerics, terms, vectors
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from heuristic.light import Light
 from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLight
 from heuristic.plugins.spectra import emitted
 
@@ -33,24 +34,32 @@ FAR = 1e8
 """Where shadow rays of parallel light end: outside any scene. Mitsuba does not tell a plugin in
 Python how large the scene is, and rays of this length still keep their direction to 1e-7."""
 
-KINDS = ("heuristic_point", "heuristic_spot", "heuristic_directional")
 
-
-def define():
+def define() -> None:
     """Create the classes for the current variant and register them."""
 
+    def registered(plugin: type) -> type:
+        mi.register_emitter(plugin.model.plugin, plugin)
+        return plugin
+
     class HeuristicEmitter(mi.Emitter):
-        """What the three kinds share: a position-free delta light that is never hit by a ray."""
+        """What all kinds share: a position-free delta light that is never hit by a ray."""
+
+        model: type[Light]
 
         def __init__(self, props):
             super().__init__(props)
             self.intensity = emitted(props, "intensity", 1.0)
-            self.scale = mi.Float(props.get("scale", 1.0))
-            dr.make_opaque(self.scale)
+            self.numbers = []  # names of the parameters that are opaque numbers
+            self._keep(props, "scale", mi.Float, 1.0)
 
         def parameters_changed(self, keys=()):
             """Make edited numbers opaque, so that a new value compiles nothing."""
-            dr.make_opaque(self.scale)
+            dr.make_opaque(*(getattr(self, name) for name in self.numbers))
+
+        def traverse(self, callback):
+            for name in ("intensity", *self.numbers):
+                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
         def eval(self, si, active=True):
             return mi.Spectrum(0)
@@ -63,6 +72,13 @@ def define():
 
         def to_string(self):
             return f"{type(self).__name__}[intensity = {self.intensity}]"
+
+        def _keep(self, props, name, kind, default):
+            """Read a parameter as an opaque number."""
+            value = kind(props.get(name, default))
+            dr.make_opaque(value)
+            setattr(self, name, value)
+            self.numbers.append(name)
 
         def _spectrum(self, it, active):
             si = dr.zeros(mi.SurfaceInteraction3f)
@@ -79,22 +95,21 @@ def define():
             ds.emitter = mi.EmitterPtr(self)
             return ds
 
+    @registered
     class HeuristicPoint(HeuristicEmitter):
         """Equation 6.1, and both forms of attenuation of 8.6."""
 
+        model = PointLight
+
         def __init__(self, props):
             super().__init__(props)
-            self.position = mi.Point3f(props.get("position", mi.ScalarPoint3f(0)))
-            names = ("k0", "k1", "k2")
-            given = tuple(
-                props.get(name, float(default))
-                for name, default in zip(names, UNATTENUATED, strict=True)
-            )
-            self.k0, self.k1, self.k2 = map(mi.Float, given)
+            self._keep(props, "position", mi.Point3f, mi.ScalarPoint3f(0))
+            defaults = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
+            for name, default in defaults.items():
+                self._keep(props, name, mi.Float, default)
             self.clamped = props.get("clamped", False)
-            self.unattenuated = given == UNATTENUATED
+            self.unattenuated = all(props.get(name, d) == d for name, d in defaults.items())
             self.m_flags = +mi.EmitterFlags.DeltaPosition
-            dr.make_opaque(self.position, self.k0, self.k1, self.k2)
 
         def sample_direction(self, it, sample, active=True):
             # Divided by its largest component first: the square need not lie in the type's range.
@@ -115,14 +130,9 @@ def define():
                 self.position, self._spectrum(si, active), self._coefficients(), self.clamped
             )
 
-        def traverse(self, callback):
-            for name in ("position", "intensity", "scale", "k0", "k1", "k2"):
-                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
-
         def parameters_changed(self, keys=()):
             super().parameters_changed(keys)
             self.unattenuated = self.unattenuated and not {"k0", "k1", "k2"} & set(keys)
-            dr.make_opaque(self.position, self.k0, self.k1, self.k2)
 
         def bbox(self):
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
@@ -134,15 +144,17 @@ def define():
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
             return law(distance, *self._coefficients(), intensity)
 
+    @registered
     class HeuristicSpot(HeuristicPoint):
         """Equations 6.2-6.4."""
 
+        model = SpotLight
+
         def __init__(self, props):
             super().__init__(props)
-            self.direction = mi.Vector3f(props.get("direction", mi.ScalarVector3f(0, 0, 1)))
-            self.cutoff = mi.Float(props.get("cutoff", 30.0))
-            self.exponent = mi.Float(props.get("exponent", 0.0))
-            dr.make_opaque(self.direction, self.cutoff, self.exponent)
+            self._keep(props, "direction", mi.Vector3f, mi.ScalarVector3f(0, 0, 1))
+            self._keep(props, "cutoff", mi.Float, 30.0)
+            self._keep(props, "exponent", mi.Float, 0.0)
 
         def sample_direction(self, it, sample, active=True):
             ds, weight = super().sample_direction(it, sample, active)
@@ -158,10 +170,6 @@ def define():
             cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
             return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
 
-        def parameters_changed(self, keys=()):
-            super().parameters_changed(keys)
-            dr.make_opaque(self.direction, self.cutoff, self.exponent)
-
         def light(self, si, active=True):
             return SpotLight(
                 self.position,
@@ -173,41 +181,25 @@ def define():
                 self.clamped,
             )
 
-        def traverse(self, callback):
-            super().traverse(callback)
-            for name in ("direction", "cutoff", "exponent"):
-                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
-
+    @registered
     class HeuristicDirectional(HeuristicEmitter):
         """A directional light: parallel rays of constant intensity."""
 
+        model = DirectionalLight
+
         def __init__(self, props):
             super().__init__(props)
-            self.direction = mi.Vector3f(props.get("direction", mi.ScalarVector3f(0, 0, 1)))
+            self._keep(props, "direction", mi.Vector3f, mi.ScalarVector3f(0, 0, 1))
             self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
-            dr.make_opaque(self.direction)
 
         def sample_direction(self, it, sample, active=True):
             direction = -vectors.normalise(self.direction)
             ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
             return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
 
-        def parameters_changed(self, keys=()):
-            super().parameters_changed(keys)
-            dr.make_opaque(self.direction)
-
         def light(self, si, active=True):
             """Return the kernel's form of this light."""
             return DirectionalLight(self.direction, self._spectrum(si, active))
 
-        def traverse(self, callback):
-            for name in ("direction", "intensity", "scale"):
-                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
-
         def bbox(self):
             return mi.ScalarBoundingBox3f()
-
-    for name, plugin in zip(
-        KINDS, (HeuristicPoint, HeuristicSpot, HeuristicDirectional), strict=True
-    ):
-        mi.register_emitter(name, plugin)

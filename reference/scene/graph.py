@@ -8,9 +8,10 @@ from contextlib import contextmanager
 
 import mitsuba as mi
 
+from heuristic import light
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError
-from heuristic.plugins import emitters, mapped
+from heuristic.plugins import mapped
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -21,7 +22,7 @@ KINDS_OF_OWN_PLUGINS = {
     "heuristic_glow": mi.ObjectType.Emitter,
     "heuristic_tilt": mi.ObjectType.Texture,
 }
-KINDS_OF_OWN_PLUGINS |= dict.fromkeys(emitters.KINDS, mi.ObjectType.Emitter)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(light.PLUGINS, mi.ObjectType.Emitter)
 KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
 
 

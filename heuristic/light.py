@@ -1,0 +1,152 @@
+"""What every kind of light is to the kernel; the kinds are in :mod:`heuristic.lights`.
+
+A light answers one question, ``illuminate(position)``: from which direction ``L``, with what
+intensity and over what distance does its light arrive? Occlusion is not its business. Beside that
+it says which of its values decide on the kernel's instructions, so that lights of one structure can
+share a kernel.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from math import inf, isfinite
+from numbers import Real
+from typing import Any, ClassVar, NamedTuple, Self
+
+import drjit as dr
+
+from heuristic import colours
+from heuristic.errors import InputError
+
+PLUGINS: dict[str, type["Light"]] = {}
+"""The kinds of light, by the emitter plugin that stands for each in a Mitsuba scene."""
+
+
+class Arrival(NamedTuple):
+    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays."""
+
+    toward: object
+    intensity: object
+    distance: object
+
+
+class Light:
+    """A kind of light, as the kernel sees it; each subclass is a frozen dataclass.
+
+    A subclass that names its ``plugin`` is listed in :data:`PLUGINS`. Fields of one name mean the
+    same in all kinds, and are checked by :data:`CHECKS`.
+    """
+
+    plugin: ClassVar[str]
+
+    def __init_subclass__(cls, plugin: str = "", **options: object) -> None:
+        super().__init_subclass__(**options)
+        if plugin:
+            cls.plugin = plugin
+            PLUGINS[plugin] = cls
+
+    def __post_init__(self) -> None:
+        for name, check in CHECKS.items():
+            if hasattr(self, name):
+                object.__setattr__(self, name, check(getattr(self, name)))
+
+    def illuminate(self, position: Any) -> Arrival:
+        """Return how the light arrives at positions, Dr.Jit arrays of three components."""
+        raise NotImplementedError
+
+    def wide_toward(self, position: Any) -> tuple[Any, Any]:
+        """Return ``L`` in double precision, as a vector and its inverse length."""
+        raise NotImplementedError
+
+    def compiled(self) -> dict[str, object]:
+        """Return the fields that are part of the kernel's code, with their values."""
+        return {}
+
+    def structure(self) -> tuple:
+        """Return what decides on the light's instructions, apart from its numbers; hashable."""
+        return type(self), colours.wavelength_count(self.intensity), *self.compiled().items()
+
+    def numbers(self) -> dict[str, object]:
+        """Return the fields that are plain numbers, or tuples of them, and not compiled in."""
+        compiled = self.compiled()
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in compiled}
+        return {name: value for name, value in given.items() if _is_plain(value)}
+
+    def with_numbers(self, numbers: Mapping[str, object], vector_type: type) -> Self:
+        """Return the light with other :meth:`numbers`: Dr.Jit floats, or tuples of them."""
+        arrays = {
+            name: ARRAYS[name](value, vector_type) if name in ARRAYS else value
+            for name, value in numbers.items()
+        }
+        return replace(self, **arrays)
+
+
+def _is_plain(value: object) -> bool:
+    parts = value if isinstance(value, tuple) else (value,)
+    return all(isinstance(part, Real) for part in parts)
+
+
+def _triple(name: str, value: Any) -> object:
+    """Return three finite floats, or the Dr.Jit array that was given."""
+    if dr.is_array_v(value) and dr.is_jit_v(value):
+        return value
+    try:
+        triple = tuple(float(component) for component in value)
+    except (TypeError, ValueError):
+        triple = ()
+    if len(triple) != 3 or not all(map(isfinite, triple)):
+        raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
+    return triple
+
+
+def _direction(value: Any) -> object:
+    direction = _triple("direction", value)
+    if isinstance(direction, tuple) and not any(direction):
+        raise InputError("direction = (0, 0, 0) points nowhere: give a vector of any other length.")
+    return direction
+
+
+def _attenuation(value: Any) -> tuple:
+    """Return three checked numbers; where one is a Dr.Jit value, none is looked at."""
+    coefficients = tuple(value) if isinstance(value, Sequence) else ()
+    if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
+        return coefficients
+    are_numbers = all(isinstance(c, Real) and isfinite(c) and c >= 0 for c in coefficients)
+    if len(coefficients) != 3 or not are_numbers or not any(coefficients):
+        raise InputError(
+            f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
+            " more, and not all 0."
+        )
+    return coefficients
+
+
+def _cutoff(value: Any) -> object:
+    if isinstance(value, Real) and not 0 < value < 180:
+        raise InputError(
+            f"cutoff = {value!r} is not allowed: give an angle between 0 and 180 degrees, both"
+            " excluded."
+        )
+    return value
+
+
+def _exponent(value: Any) -> object:
+    if isinstance(value, Real) and not 0 <= value < inf:
+        raise InputError(f"exponent = {value!r} is not allowed: give a finite value of 0 or more.")
+    return value
+
+
+CHECKS: dict[str, Callable[[Any], object]] = {
+    "position": partial(_triple, "position"),
+    "direction": _direction,
+    "intensity": partial(colours.checked, "intensity"),
+    "cutoff": _cutoff,
+    "exponent": _exponent,
+    "attenuation": _attenuation,
+}
+
+ARRAYS = {
+    "position": lambda value, vector_type: vector_type(value),
+    "direction": lambda value, vector_type: vector_type(value),
+    "intensity": colours.as_array,
+}
+"""What the kernel's array of a field is made by; other fields stay as they are."""
