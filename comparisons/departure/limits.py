@@ -30,9 +30,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic
 
-SMALLEST_ALPHA = 1e-4
 LOST = 0.05
 """Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
 WEDGE_LOST = 0.01

@@ -11,19 +11,15 @@ from functools import cached_property
 
 import mitsuba as mi
 
-from reference.pairing.halves import INTEGRATOR, with_sampler
-from reference.pairing.lights.reading import BSDF, EMITTER, SHAPE
+from reference.pairing import lights
+from reference.pairing.halves import BSDF, INTEGRATOR, with_sampler
 from reference.planning.effects import Effect
 from reference.planning.planner import Plan
-from reference.planning.structure import examine
+from reference.planning.structure import EMITTER, SHAPE, examine
 from reference.rendering import direct
 from reference.rendering.environment import AlbedoTable
 from reference.rendering.renderer import Renderer
 from reference.scene.graph import Reference, properties
-
-OF_LIGHT = {"heuristic_point": Effect.ATTENUATION, "heuristic_spot": Effect.CONE}
-"""The effect that tells a light's two forms apart. A spot's attenuation goes with its cone, since
-Mitsuba has no spot that falls off in another way."""
 
 OF_BSDFS = {Effect.MICROFACETS, Effect.TRANSMISSION}
 """Effects that tell a surface's two forms apart."""
@@ -163,7 +159,7 @@ class Between:
         graph = self.pair.heuristic.copy()
         ambient = self._integrator.get("ambient", None)
         for key, index in graph.children(0, EMITTER):
-            is_background = graph.plugin(index) not in OF_LIGHT | {"heuristic_directional": None}
+            is_background = not lights.is_heuristic(graph.plugin(index))
             seen = is_background and Effect.ENVIRONMENT not in simulated
             if not seen or self.pair.hide_emitters:
                 graph.detach(0, key)
@@ -216,19 +212,19 @@ class Between:
         """The effect that tells the two forms of a light apart, by its key in the scene."""
         inexact = {record.name for record in self.pair.emitters if not record.exact}
         return {
-            key: OF_LIGHT[self.pair.heuristic.plugin(index)]
+            key: effect
             for key, index in self.pair.heuristic.children(0, EMITTER)
             if key in dict(self.pair.physical.children(0, EMITTER))
-            and self.pair.heuristic.plugin(index) in OF_LIGHT
+            and (effect := lights.effect_of(self.pair.heuristic.plugin(index)))
             and self.pair.heuristic.label(index) in inexact
         }
 
     @cached_property
     def _environments(self):
         """The keys of the physical half's lights that are no single point or direction."""
-        known = ("point", "spot", "directional")
         graph = self.pair.physical
-        return [k for k, index in graph.children(0, EMITTER) if graph.plugin(index) not in known]
+        found = graph.children(0, EMITTER)
+        return [key for key, index in found if not lights.of(graph.plugin(index)).exact]
 
 
 def _graft(graph, other, index):

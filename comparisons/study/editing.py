@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.errors import InputError
+from reference.pairing import lights
 from reference.scene.graph import Reference
 from reference.scene.values import COLOURS
 
@@ -30,16 +31,10 @@ EDITABLE = {
         "int_ior": ("eta", lambda props: float(props["int_ior"]) / float(props["ext_ior"])),
     },
     "diffuse": {"reflectance": ("reflectance.value", None)},
-    "area": {"radiance": ("radiance.value", None)},
-    "point": {"intensity": ("intensity.value", None)},
-    "heuristic_point": {"position": ("position", None), "scale": ("scale", None)},
-    "heuristic_spot": {
-        "position": ("position", None),
-        "direction": ("direction", None),
-        "intensity": ("intensity.value", None),
-        "scale": ("scale", None),
-    },
     "disk": {"to_world": ("to_world", lambda props: _transform(props["to_world"]))},
+} | {
+    plugin: {key: (name, None) for key, name in names.items()}
+    for plugin, names in lights.edits().items()
 }
 """Values that can be edited: for each plugin and property, the name that ``mitsuba.traverse`` has
 for it, and how it is made out of the properties where it is not the property itself."""

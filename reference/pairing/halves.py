@@ -16,16 +16,16 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
 from heuristic.plugins.interpolated import viewpoint
-from reference.pairing import bsdfs, meshing
+from reference.pairing import bsdfs, lights, meshing
 from reference.pairing.factors import Convention, Miss, specular_albedo
-from reference.pairing.lights import reading, to_heuristic, to_physical
+from reference.pairing.lights import areas, constants
 from reference.rendering.gbuffer import gbuffer
-from reference.scene import preparation, values
+from reference.scene import preparation
 from reference.scene.graph import Graph, properties
 from reference.scene.preparation import Overridden
 
-BSDF, EMITTER, INTEGRATOR, SENSOR = (
-    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Integrator", "Sensor")
+BSDF, INTEGRATOR, SENSOR = (
+    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Sensor")
 )
 
 
@@ -110,7 +110,7 @@ def pair(
 
     heuristic = graph.copy()
     given_physical = bsdfs.to_heuristic(heuristic, convention)
-    lights, radiance = to_heuristic.replace_lights(heuristic, geometry, settings.hide_emitters)
+    emitters, radiance = lights.to_heuristic(heuristic, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(heuristic, ambient, settings, interpolation, prune)
     if interpolation is not Interpolation.PHONG:
@@ -121,11 +121,11 @@ def pair(
         )
 
     physical = graph.copy()
-    lights += to_physical.add_glowing_shapes(physical)
+    emitters += areas.add_glowing_shapes(physical)
     given_heuristic = bsdfs.to_physical(physical, convention)
-    lights += to_physical.replace_lights(physical, lambda: gbuffer(geometry()))
+    emitters += lights.to_physical(physical, lambda: gbuffer(geometry()))
     if settings.ambient is not None:
-        lights.append(_add_environment(physical, graph, settings.ambient, convention))
+        emitters.append(constants.add_environment(physical, graph, settings.ambient, convention))
 
     records = (*given_physical, *given_heuristic)
     return Pair(
@@ -136,7 +136,7 @@ def pair(
         max_depth=settings.max_depth,
         convention=convention,
         bsdfs=records,
-        emitters=tuple(lights),
+        emitters=tuple(emitters),
         misses=tuple(miss for record in records for miss in record.misses),
         warnings=tuple(_energy_warnings(heuristic)),
         integrator=settings.integrator,
@@ -179,58 +179,10 @@ def _set_integrator(graph, ambient, settings, interpolation, prune):
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 
-def _add_environment(physical, graph, ambient, convention):
-    """Add the constant environment that stands for ``I_a``.
-
-    A physical surface has one diffuse reflectance, where the model has ``k_a`` beside ``k_d``. The
-    ``matched`` radiance is ``I_a k_a / k_d``, by least squares where materials differ; the
-    ``literal`` one is ``I_a``.
-    """
-    ratio, exact = (1.0,) * 3, True
-    if convention is Convention.MATCHED:
-        ratio, exact = _ambient_ratio(graph)
-    plain = isinstance(ambient, (float, int, *values.COLOURS))
-    if plain and ratio != (1.0,) * 3:
-        components = (float(ambient),) * 3 if isinstance(ambient, (float, int)) else tuple(ambient)
-        ambient = values.scaled(components, ratio)
-    light = physical.add(EMITTER, properties("constant", radiance=ambient))
-    physical.attach(0, "environment", light)
-    note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"
-    mean = sum(ratio) / len(ratio)
-    return reading.PairedEmitter("ambient", "ambient", "constant", mean, exact, note)
-
-
-def _ambient_ratio(graph):
-    """Return ``k_a / k_d`` for each channel by least squares, and whether it fits all materials."""
-    pairs = []
-    for index in _phongs(graph):
-        k_a, k_d = (values.colour(graph, index, key, 0.0) for key in ("k_a", "k_d"))
-        # Without a diffuse part the reflectance is k_a itself.
-        pairs.append((k_a, k_d if any(k_d) or any(_specular(graph, index)) else k_a))
-    ratio = []
-    for channel in range(3):
-        weight = sum(k_d[channel] ** 2 for _, k_d in pairs)
-        product = sum(k_a[channel] * k_d[channel] for k_a, k_d in pairs)
-        ratio.append(product / weight if weight > 0 else 1.0)
-    exact = all(
-        abs(k_a[channel] - ratio[channel] * k_d[channel]) <= 1e-6 * max(k_a[channel], 1e-6)
-        for k_a, k_d in pairs
-        for channel in range(3)
-    ) and not any(any(_specular(graph, index)) for index in _phongs(graph))
-    return tuple(ratio), exact
-
-
-def _specular(graph, index):
-    return values.colour(graph, index, "k_s", 0.0)
-
-
-def _phongs(graph):
-    return [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
-
-
 def _energy_warnings(graph):
     """Name the materials that reflect more light than they receive at normal incidence."""
-    for index in _phongs(graph):
+    phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
+    for index in phongs:
         try:
             material = bsdfs.phong(graph, index)
         except InputError:

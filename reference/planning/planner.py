@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import mitsuba as mi
 
 from heuristic.interpolation import Interpolation
+from reference.pairing import lights
 from reference.pairing.nearest import WRAPPERS
 from reference.pairing.nearest.operations import plain
 from reference.planning import rules
@@ -40,9 +41,6 @@ SAMPLER = "multijitter"
 at 64 samples a pixel, 10 times the efficiency of ``independent`` there (``stratified`` 5 times)."""
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
-
-EXACT_LIGHTS = ("point", "spot", "directional")
-"""Lights that need no random number."""
 
 STOCK_SAMPLER = "independent"
 SPP = 256
@@ -114,7 +112,7 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     occlusion, interreflection = rules.occlusion(structure), rules.interreflection(structure)
     decisions = _decisions(pair, structure, interpolation, occlusion, interreflection)
     terms = tuple(name for name in ("k_i", "k_a", "k_d", "k_s") if _present(pair.heuristic, name))
-    exact = [light for light in structure.lights if light.kind in EXACT_LIGHTS]
+    exact = [light for light in structure.lights if lights.of(light.kind).exact]
     rr_depth = pair.rr_depth or RR_DEPTH
     is_clear = any(not shape.opaque for shape in structure.shapes)
     if pair.media or is_clear or 0 <= pair.max_depth < 2:
@@ -128,7 +126,7 @@ def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
     random = [
         light
         for light in structure.lights
-        if light.kind not in EXACT_LIGHTS and not (tabulated and light.kind == "constant")
+        if not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
     ]
     passes = PASSES if random or mi.is_spectral else DETERMINISTIC_PASSES
     return Plan(
@@ -189,8 +187,7 @@ def _decisions(pair, structure, interpolation, occlusion, interreflection):
     listing = ", ".join(sorted(set(kinds))) or "none"
     plugins = {physical.plugin(index) for index in physical.nodes(BSDF)}
     has_environment = any(
-        light.shape is None and light.kind not in (*EXACT_LIGHTS, "projector")
-        for light in structure.lights
+        light.shape is None and lights.of(light.kind).surrounds for light in structure.lights
     )
     found = {
         Effect.EMISSION: _coefficient(heuristic, "k_i"),
@@ -200,7 +197,7 @@ def _decisions(pair, structure, interpolation, occlusion, interreflection):
         Effect.DIFFUSE: _coefficient(heuristic, "k_d"),
         Effect.SPECULAR: _coefficient(heuristic, "k_s"),
         Effect.ATTENUATION: _attenuation(heuristic),
-        Effect.CONE: ("spot" in kinds or _spots(heuristic), f"lights: {listing}"),
+        Effect.CONE: (_cones(heuristic) or _cones(physical), f"lights: {listing}"),
         Effect.POLYGONS: (
             interpolation is not Interpolation.PHONG,
             f"interpolation {interpolation.value}",
@@ -249,7 +246,7 @@ def _attenuation(graph):
     attenuated = [
         graph.label(index)
         for index in graph.nodes(EMITTER)
-        if graph.plugin(index) in ("heuristic_point", "heuristic_spot")
+        if lights.of(graph.plugin(index)).is_attenuated
         and (graph.props(index).get("k1", 0.0), graph.props(index).get("k2", 0.0)) != (0.0, 0.0)
     ]
     if attenuated:
@@ -257,8 +254,8 @@ def _attenuation(graph):
     return False, "no light of the heuristic half falls off with distance"
 
 
-def _spots(graph):
-    return any(graph.plugin(index) == "heuristic_spot" for index in graph.nodes(EMITTER))
+def _cones(graph):
+    return any(lights.of(graph.plugin(index)).has_cone for index in graph.nodes(EMITTER))
 
 
 def _diffuse(graph):
@@ -268,7 +265,7 @@ def _diffuse(graph):
 def _can_tabulate(graph):
     """Tell whether the environment can be tabulated: one plain BSDF, one constant light, RGB."""
     shapes = graph.nodes(mi.ObjectType.Shape)
-    extended = [graph.plugin(i) for i in graph.nodes(EMITTER)]
-    extended = [plugin for plugin in extended if plugin not in EXACT_LIGHTS]
+    kinds = [lights.of(graph.plugin(index)) for index in graph.nodes(EMITTER)]
+    extended = [kind.uniform for kind in kinds if not kind.exact]
     textures = graph.nodes(mi.ObjectType.Texture)
-    return len(shapes) == 1 and extended == ["constant"] and not textures and mi.is_rgb
+    return len(shapes) == 1 and extended == [True] and not textures and mi.is_rgb

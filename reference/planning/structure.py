@@ -10,6 +10,8 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
+from reference.pairing import lights
+from reference.pairing.lights.kind import Given
 from reference.scene import values
 
 BSDF, EMITTER, SHAPE = (getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Shape"))
@@ -196,13 +198,4 @@ def _lights(graph):
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
             continue
-        props = graph.props(index)
-        matrix = np.array(props["to_world"].matrix) if "to_world" in props else None
-        if plugin in ("point", "spot"):
-            given = props.get("position", (0, 0, 0)) if matrix is None else matrix[:3, 3]
-            yield LightFacts(name, plugin, position=np.ravel(given).astype(float))
-        elif plugin == "directional":
-            given = props.get("direction", (0, 0, 1)) if matrix is None else matrix[:3, 2]
-            yield LightFacts(name, plugin, toward=-np.ravel(given).astype(float))
-        else:
-            yield LightFacts(name, plugin)
+        yield LightFacts(name, plugin, **lights.of(plugin).place(Given(graph, index)))

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import mitsuba as mi
 
 from heuristic.errors import InputError
-from reference.pairing import bsdfs
-from reference.pairing.lights import reading
+from reference.pairing import bsdfs, lights
 from reference.scene.graph import Reference, properties
 
 FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
@@ -55,7 +54,7 @@ def prepare(graph, resolution, sensor=0):
     _open_merged(graph)
     bsdfs.give_default(graph)
     bsdfs.check(graph)
-    reading.check(graph)
+    lights.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")

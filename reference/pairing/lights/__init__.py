@@ -1,1 +1,132 @@
-"""Lights, paired both ways."""
+"""Lights: one module a kind, paired both ways (table in :mod:`reference.pairing.factors`).
+
+The kinds are the modules of this package that declare a ``KIND``; nothing else lists them. What the
+table has no row for gets the nearest light that there is:
+
+==================================  ===============================================================
+Physical                            Nearest
+==================================  ===============================================================
+``envmap`` and other environments   ``I_a``, its mean radiance over the sphere
+``sunsky``, ``timed_sunsky``        the same for the sky; the sun is a directional light of its
+                                    irradiance and mean direction
+``projector``, textured ``spot``    a spot: the even cone of the same solid angle and flux
+textured ``area``                   as ``area``, of its mean radiance
+any other                           none: it is left out
+==================================  ===============================================================
+"""
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pkgutil import iter_modules
+
+import mitsuba as mi
+
+from heuristic.light import PLUGINS
+from reference.pairing.lights import environments
+from reference.pairing.lights.kind import Given, LightKind, PairedEmitter
+from reference.planning.effects import Effect
+from reference.scene import values
+from reference.scene.graph import Graph
+
+EMITTER, SHAPE = mi.ObjectType.Emitter, mi.ObjectType.Shape
+
+_modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
+KINDS: tuple[LightKind, ...] = tuple(module.KIND for module in _modules if hasattr(module, "KIND"))
+
+_physical = {plugin: kind for kind in KINDS for plugin in kind.plugins}
+_heuristic = {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
+
+
+def of(plugin: str) -> LightKind:
+    """Return the kind of an emitter, of either half, by the name of its plugin.
+
+    An unknown one is taken for an environment, which is what premises may least rely on.
+    """
+    return (_physical | _heuristic).get(plugin, environments.KIND)
+
+
+def is_heuristic(plugin: str) -> bool:
+    """Tell whether an emitter is one of the heuristic's own lights."""
+    return plugin in PLUGINS
+
+
+def effect_of(plugin: str) -> Effect | None:
+    """Return the effect that tells the two forms of a heuristic light apart, None if none does."""
+    return _heuristic[plugin].effect if plugin in _heuristic else None
+
+
+def edits() -> dict[str, dict[str, str]]:
+    """Return what can be edited in place: by plugin and property, the name for Mitsuba."""
+    return {plugin: dict(names) for kind in KINDS for plugin, names in kind.edits.items()}
+
+
+def check(graph: Graph) -> None:
+    """Refuse intensities that are negative or not finite.
+
+    Raises
+    ------
+    InputError
+        Naming the parameter, its value and its place.
+    """
+    for index in graph.nodes(EMITTER):
+        plugin = graph.plugin(index)
+        colour = "intensity" if is_heuristic(plugin) else of(plugin).colour
+        if colour:
+            values.check_colours(graph, index, (colour,))
+
+
+def to_heuristic(
+    graph: Graph, geometry: Callable[[], mi.Scene], hide_emitters: bool
+) -> tuple[list[PairedEmitter], object]:
+    """Replace physical lights by heuristic ones.
+
+    ``geometry()`` returns the Mitsuba scene, for the size and place of area lights. The environment
+    stays as a background. With ``hide_emitters`` the shapes of area lights are taken out.
+
+    Returns
+    -------
+    records : list of PairedEmitter
+    ambient : object or None
+        The radiance of the environment, as the parser keeps it, to become ``I_a``.
+    """
+    records, ambient = [], None
+    for shape, key, index in list(_lights(graph)):
+        if shape is not None:
+            graph.detach(shape, key)
+        light = Given(graph, index, shape, geometry, hide_emitters=hide_emitters)
+        kind = of(light.plugin)
+        if kind.on_shapes != (shape is not None):
+            kind = environments.KIND
+        found = kind.ambient(light) if kind.ambient is not None else None
+        ambient = ambient if found is None else found
+        records.append(kind.to_heuristic(light))
+    return records, ambient
+
+
+def to_physical(graph: Graph, surface: Callable[[], object]) -> list[PairedEmitter]:
+    """Replace heuristic lights by physical ones.
+
+    ``surface()`` returns the `GBuffer` that the mean irradiance is taken over where the attenuation
+    is not the inverse square.
+    """
+    return [
+        of(graph.plugin(index)).to_physical(Given(graph, index, surface=surface))
+        for index in graph.nodes(EMITTER)
+        if is_heuristic(graph.plugin(index))
+    ]
+
+
+def _lights(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
+    """Return shape, key and node of the physical lights, those of shapes last."""
+    on_shapes = [
+        (shape, key, index)
+        for shape in graph.nodes(SHAPE)
+        for key, index in graph.children(shape, EMITTER)
+    ]
+    owned = {index for _, _, index in on_shapes}
+    for index in graph.nodes(EMITTER):
+        if index not in owned and not is_heuristic(graph.plugin(index)):
+            yield None, "", index
+    for shape, key, index in on_shapes:
+        if graph.plugin(index) != "heuristic_glow":
+            yield shape, key, index

@@ -17,6 +17,9 @@ LATTICE = (1, 19_463)
 """Generator of the rank-1 lattice (Korobov)."""
 
 
+MEAN = "I_a is the mean radiance over the sphere"
+
+
 @dataclass(frozen=True)
 class Beam:
     """A light from one place: the even cone of the same solid angle and flux.

@@ -1,18 +1,33 @@
-"""The two fall-offs of a spot light fitted to each other.
+"""Spots: ``spot`` and ``heuristic_spot``, whose fall-offs are fitted to each other.
 
 Mitsuba's ``spot`` is even up to its beam width and falls linearly in the angle to 0 at its cutoff;
 the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can be the other. The fit minimises
 ``int (cos^m(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle.
 """
 
+from collections.abc import Callable
+
+import mitsuba as mi
 import numpy as np
 from scipy.optimize import minimize_scalar
+
+from heuristic.lights import SpotLight
+from reference.pairing.factors import INTENSITY_FACTOR
+from reference.pairing.lights import points, projectors
+from reference.pairing.lights.kind import (
+    FALLOFF_OF_MITSUBA,
+    Given,
+    LightKind,
+    PairedEmitter,
+    at_position,
+)
+from reference.planning.effects import Effect
 
 LARGEST_EXPONENT = 1e5
 STEPS = 2048
 
 
-def exponent_for(cutoff, beam_width):
+def exponent_for(cutoff: float, beam_width: float) -> float:
     """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off; angles in degrees."""
     theta, weight = _cone(cutoff)
     wanted = linear_falloff(theta, cutoff, beam_width)
@@ -25,7 +40,7 @@ def exponent_for(cutoff, beam_width):
     return float(np.expm1(found.x))
 
 
-def cone_for(cutoff, exponent):
+def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
     """Return the cutoff and beam width whose linear fall-off is nearest to ``cos^m``, in degrees.
 
     A sharp beam ends long before its cone does, so that the cutoff is fitted too, up to the cone's.
@@ -44,22 +59,92 @@ def cone_for(cutoff, exponent):
     return edge, best_beam(edge)
 
 
-def _least(function, low, high):
+def _least(function: Callable[[float], float], low: float, high: float) -> float:
     """Return where a function of one minimum is least, the ends of the interval included."""
     found = minimize_scalar(function, bounds=(low, high), method="bounded").x
     return float(min((low, high, found), key=function))
 
 
-def linear_falloff(theta, cutoff, beam_width):
+def linear_falloff(theta: np.ndarray, cutoff: float, beam_width: float) -> np.ndarray:
     """Return the factor of Mitsuba's ``spot`` at the angles ``theta``, all in degrees."""
     return np.clip((cutoff - theta) / max(cutoff - beam_width, 1e-12), 0, 1)
 
 
-def power_falloff(theta, exponent):
+def power_falloff(theta: np.ndarray, exponent: float) -> np.ndarray:
     """Return ``cos^m(theta)``, 0 beyond a right angle; ``theta`` in degrees."""
     return np.maximum(np.cos(np.radians(theta)), 0) ** exponent * (theta < 90)
 
 
-def _cone(cutoff):
+def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
     theta = (np.arange(STEPS) + 0.5) * cutoff / STEPS
     return theta, np.sin(np.radians(theta))
+
+
+def _to_heuristic(light: Given) -> PairedEmitter:
+    if light.value("texture", None) is not None:
+        return projectors.even_cone(light)
+    cutoff = light.number("cutoff_angle", 20.0)
+    beam_width = light.number("beam_width", 0.75 * cutoff)
+    exponent = exponent_for(cutoff, beam_width)
+    return light.replace(
+        "heuristic_spot",
+        exact=False,
+        note=f"m = {exponent:.4g} fitted to the linear fall-off from {beam_width:g} to"
+        f" {cutoff:g} deg",
+        position=light.position,
+        direction=mi.ScalarVector3f(*light.column(2)),
+        cutoff=cutoff,
+        exponent=exponent,
+        intensity=light.value("intensity", 1.0),
+        scale=INTENSITY_FACTOR,
+        **FALLOFF_OF_MITSUBA,
+    )
+
+
+def _to_physical(light: Given) -> PairedEmitter:
+    axis = np.ravel(light.value("direction", (0, 0, 1))).astype(float)
+    axis = axis / np.linalg.norm(axis)
+    cutoff, exponent = light.number("cutoff", 30.0), light.number("exponent", 0.0)
+    edge, beam_width = cone_for(cutoff, exponent)
+
+    def cone(travel):
+        theta = np.degrees(np.arccos(np.clip(travel @ axis, -1, 1)))
+        return power_falloff(theta, exponent) * (theta <= cutoff)
+
+    factor, _, note = points.level(light, cone)
+    fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
+    position = np.ravel(light.position)
+    up = np.eye(3)[np.argmin(np.abs(axis))]
+    return light.replace(
+        "spot",
+        factor,
+        exact=False,
+        note=f"{fitted}; {note}" if note else fitted,
+        to_world=mi.ScalarTransform4f().look_at(
+            position.tolist(), (position + axis).tolist(), up.tolist()
+        ),
+        intensity=light.scaled_intensity(factor),
+        cutoff_angle=edge,
+        beam_width=beam_width,
+    )
+
+
+KIND = LightKind(
+    plugins=("spot",),
+    to_heuristic=_to_heuristic,
+    model=SpotLight,
+    to_physical=_to_physical,
+    colour="intensity",
+    place=at_position,
+    exact=True,
+    # A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
+    effect=Effect.CONE,
+    edits={
+        "heuristic_spot": {
+            "position": "position",
+            "direction": "direction",
+            "intensity": "intensity.value",
+            "scale": "scale",
+        }
+    },
+)

@@ -1,0 +1,106 @@
+"""Shapes that shine: ``area``. In the far field a point or an even spot, near by a glow ``k_i``."""
+
+import mitsuba as mi
+import numpy as np
+
+from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
+from reference.pairing.lights import measured
+from reference.pairing.lights.kind import FALLOFF_OF_MITSUBA, Given, LightKind, PairedEmitter
+from reference.scene import values
+from reference.scene.graph import Graph, Reference, properties
+
+EMITTER, SHAPE, BSDF = (getattr(mi.ObjectType, kind) for kind in ("Emitter", "Shape", "BSDF"))
+
+FLATNESS = 0.5
+"""A light whose mean normal is longer is treated as flat; a closed one has a mean normal of 0."""
+
+
+def _to_heuristic(light: Given) -> PairedEmitter:
+    """Replace the light by emission of its shape and a spot or point at its centroid."""
+    graph, shape, radiance = light.graph, light.shape, light.value("radiance", 1.0)
+    if light.hide_emitters:
+        # Mitsuba's integrators look through it, and the heuristic casts no shadows.
+        graph.remove(shape)
+    else:
+        _glow(graph, shape, radiance)
+    identifier = graph.props(shape).id()
+    made = next(found for found in light.geometry().shapes() if found.id() == identifier)
+    derived, record = _far_light(graph, shape, radiance, made)
+    derived.set_id(f"light of {graph.label(shape)}")
+    graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
+    return record
+
+
+def _far_light(
+    graph: Graph, shape: int, radiance: object, made: mi.Shape
+) -> tuple[mi.Properties, PairedEmitter]:
+    centroid, area, normal = _extent(made)
+    if _varies(graph, radiance):
+        radiance = measured.surface_mean(graph, made)
+    flatness = float(np.linalg.norm(normal))
+    if flatness > FLATNESS:
+        plugin, factor, form = "heuristic_spot", INTENSITY_FACTOR * area * flatness, ""
+        cone = {"direction": mi.ScalarVector3f(*normal), "cutoff": 90.0, "exponent": 1.0}
+    else:
+        plugin, factor, form, cone = "heuristic_point", CLOSED_LIGHT_FACTOR * area, "closed, ", {}
+    derived = properties(
+        plugin,
+        **cone,
+        scale=factor,
+        position=mi.ScalarPoint3f(*centroid),
+        intensity=radiance,
+        **FALLOFF_OF_MITSUBA,
+    )
+    note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
+    return derived, PairedEmitter(graph.label(shape), "area", plugin, factor, False, note)
+
+
+def _varies(graph: Graph, value: object) -> bool:
+    """Tell whether a value is a texture that differs from point to point."""
+    if not isinstance(value, Reference):
+        return False
+    return graph.instantiate(value.index()).is_spatially_varying()
+
+
+def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float]]:
+    """Return centroid, area and mean normal of a shape, by its own sampling on a regular grid."""
+    cells = (np.arange(64) + 0.5) / 64
+    x, y = (axis.ravel() for axis in np.meshgrid(cells, cells))
+    sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
+    centroid = np.array(sample.p).mean(axis=1)
+    normal = np.array(sample.n).mean(axis=1)
+    return centroid.tolist(), float(np.ravel(shape.surface_area())[0]), normal.tolist()
+
+
+def _glow(graph: Graph, shape: int, radiance: object) -> None:
+    """Give a shape its own copy of its phong, with ``k_i`` set to a radiance."""
+    ((key, bsdf),) = graph.children(shape, BSDF)
+    props = mi.Properties(graph.props(bsdf))
+    props.set_id(f"{graph.label(shape)}_glowing")
+    props["k_i"] = radiance
+    graph.attach(shape, key, graph.add(BSDF, props))
+
+
+def add_glowing_shapes(graph: Graph) -> list[PairedEmitter]:
+    """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
+
+    To be called while the shapes still have their ``phong``.
+    """
+    records = []
+    for shape in graph.nodes(SHAPE):
+        for _, bsdf in graph.children(shape, BSDF):
+            radiance = graph.props(bsdf).get("k_i", 0.0)
+            if graph.plugin(bsdf) == "phong" and values.may_be_nonzero(radiance):
+                light = graph.add(EMITTER, properties("area", radiance=radiance))
+                graph.attach(shape, "emitter", light)
+                records.append(PairedEmitter(graph.label(shape), "k_i", "area", 1.0, True))
+    return records
+
+
+KIND = LightKind(
+    plugins=("area",),
+    to_heuristic=_to_heuristic,
+    colour="radiance",
+    on_shapes=True,
+    edits={"area": {"radiance": "radiance.value"}},
+)
