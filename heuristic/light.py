@@ -6,7 +6,7 @@ it says which of its values decide on the kernel's instructions, so that lights 
 share a kernel.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from math import inf, isfinite
@@ -39,11 +39,9 @@ class Light:
 
     plugin: ClassVar[str]
 
-    def __init_subclass__(cls, plugin: str = "", **options: object) -> None:
-        super().__init_subclass__(**options)
+    def __init_subclass__(cls, plugin: str = "") -> None:
         if plugin:
-            cls.plugin = plugin
-            PLUGINS[plugin] = cls
+            cls.plugin, PLUGINS[plugin] = plugin, cls
 
     def __post_init__(self) -> None:
         for name, check in CHECKS.items():
@@ -72,13 +70,12 @@ class Light:
         given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in compiled}
         return {name: value for name, value in given.items() if _is_plain(value)}
 
-    def with_numbers(self, numbers: Mapping[str, object], vector_type: type) -> Self:
-        """Return the light with other :meth:`numbers`: Dr.Jit floats, or tuples of them."""
-        arrays = {
-            name: ARRAYS[name](value, vector_type) if name in ARRAYS else value
-            for name, value in numbers.items()
-        }
-        return replace(self, **arrays)
+    def with_numbers(self, fetch: Callable[[object], object], vector_type: type) -> Self:
+        """Return the light with its :meth:`numbers` replaced by Dr.Jit's, which ``fetch`` gives."""
+        fetched = {name: fetch(value) for name, value in self.numbers().items()}
+        for name in ARRAYS.keys() & fetched.keys():
+            fetched[name] = ARRAYS[name](fetched[name], vector_type)
+        return replace(self, **fetched)
 
 
 def _is_plain(value: object) -> bool:

@@ -109,8 +109,8 @@ def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
     Which light comes from where in the array is the same for all blocks of a structure, and so is
     the kernel.
     """
-    numbers = [light.numbers() for light in lights]
-    flat = [part for given in numbers for value in given.values() for part in np.ravel(value)]
+    values = [value for light in lights for value in light.numbers().values()]
+    flat = [number for value in values for number in np.ravel(value)]
     buffer = dr.leaf_t(vector_type)(flat)
     dr.eval(buffer)
     place = iter(range(len(flat)))
@@ -120,7 +120,4 @@ def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
             return tuple(map(fetched, value))
         return dr.gather(type(buffer), buffer, next(place))
 
-    return [
-        light.with_numbers({name: fetched(v) for name, v in given.items()}, vector_type)
-        for light, given in zip(lights, numbers, strict=True)
-    ]
+    return [light.with_numbers(fetched, vector_type) for light in lights]

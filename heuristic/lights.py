@@ -140,7 +140,10 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
         return super().compiled() | even
 
     def illuminate(self, position: Any) -> Arrival:
-        """Equation 6.3: ``I_0 f_att`` within the cone; times 6.4's fall-off where ``m > 0``."""
+        """Equation 6.3: ``I_0 f_att`` within the cone; times the fall-off of 6.4 where ``m > 0``.
+
+        Returns an :class:`heuristic.light.Arrival`.
+        """
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         axis = vectors.normalise(vector_type(self.direction))

@@ -246,7 +246,7 @@ def _attenuation(graph):
     attenuated = [
         graph.label(index)
         for index in graph.nodes(EMITTER)
-        if lights.of(graph.plugin(index)).is_attenuated
+        if lights.of(graph.plugin(index)).has("attenuation")
         and (graph.props(index).get("k1", 0.0), graph.props(index).get("k2", 0.0)) != (0.0, 0.0)
     ]
     if attenuated:
@@ -255,7 +255,7 @@ def _attenuation(graph):
 
 
 def _cones(graph):
-    return any(lights.of(graph.plugin(index)).has_cone for index in graph.nodes(EMITTER))
+    return any(lights.of(graph.plugin(index)).has("cutoff") for index in graph.nodes(EMITTER))
 
 
 def _diffuse(graph):

@@ -5,7 +5,7 @@ import numpy as np
 
 from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
 from reference.pairing.lights import measured
-from reference.pairing.lights.kind import FALLOFF_OF_MITSUBA, Given, LightKind, PairedEmitter
+from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 from reference.scene import values
 from reference.scene.graph import Graph, Reference, properties
 
@@ -43,14 +43,8 @@ def _far_light(
         cone = {"direction": mi.ScalarVector3f(*normal), "cutoff": 90.0, "exponent": 1.0}
     else:
         plugin, factor, form, cone = "heuristic_point", CLOSED_LIGHT_FACTOR * area, "closed, ", {}
-    derived = properties(
-        plugin,
-        **cone,
-        scale=factor,
-        position=mi.ScalarPoint3f(*centroid),
-        intensity=radiance,
-        **FALLOFF_OF_MITSUBA,
-    )
+    position = mi.ScalarPoint3f(*centroid)
+    derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
     return derived, PairedEmitter(graph.label(shape), "area", plugin, factor, False, note)
 

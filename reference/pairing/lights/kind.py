@@ -1,8 +1,6 @@
 """What a kind of light declares, and what its rules read.
 
-A kind is one module of :mod:`reference.pairing.lights` that ends in ``KIND = LightKind(...)``. It
-says how the light is paired in both directions, and what planning, studies and the scenes between
-the halves need to know of it.
+A kind is one module of :mod:`reference.pairing.lights` that declares ``KIND = LightKind(...)``.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +10,7 @@ from functools import cached_property
 import mitsuba as mi
 import numpy as np
 
-from heuristic.light import Light
+from heuristic.light import PLUGINS, Light
 from heuristic.lights import INVERSE_SQUARE
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.planning.effects import Effect
@@ -37,7 +35,7 @@ class PairedEmitter:
 
 @dataclass(frozen=True)
 class Given:
-    """A light of a graph that is being changed into one of the halves, as rules read it.
+    """A light of a graph that is becoming one of the halves, as rules read and replace it.
 
     Attributes
     ----------
@@ -45,10 +43,9 @@ class Given:
         The graph and the light's node.
     shape
         Node of the shape that shines, None for lights that belong to no shape.
-    geometry : callable
-        Returns the Mitsuba scene without materials, for the size and place of shapes.
-    surface : callable
-        Returns the `GBuffer` of the physical half, for the mean irradiance over it.
+    geometry, surface : callable
+        Return the Mitsuba scene without materials, for the size and place of shapes, and the
+        `GBuffer` that mean irradiances are taken over.
     hide_emitters
         Whether camera rays look through lights.
     """
@@ -67,7 +64,7 @@ class Given:
 
     @property
     def label(self) -> str:
-        """A short name for records: see :meth:`Graph.label`."""
+        """A short name for records."""
         return self.graph.label(self.index)
 
     @cached_property
@@ -80,13 +77,7 @@ class Given:
         return self.graph.props(self.index).get(key, default)
 
     def number(self, key: str, default: float) -> float:
-        """Return a parameter as a finite number.
-
-        Raises
-        ------
-        InputError
-            When it is not one.
-        """
+        """Return a parameter as a finite number, or raise :class:`InputError`."""
         return values.number(self.graph, self.index, key, default)
 
     def column(self, number: int) -> list[float]:
@@ -94,19 +85,15 @@ class Given:
         matrix = self.value("to_world", mi.ScalarTransform4f()).matrix
         return [float(component) for component in np.array(matrix)[:3, number]]
 
-    @property
-    def position(self) -> object:
-        """The position of a point or spot, however it was given, in world space."""
-        if "to_world" in self.graph.props(self.index):
-            return mi.ScalarPoint3f(*self.column(3))
-        return self.value("position", mi.ScalarPoint3f(0))
+    def vector(self, key: str, default: tuple, column: int) -> np.ndarray:
+        """Return a position or direction (3,), given as itself or as a column of ``to_world``."""
+        is_moved = "to_world" in self.graph.props(self.index)
+        given = self.column(column) if is_moved else self.value(key, default)
+        return np.ravel(given).astype(float)
 
-    @property
-    def direction(self) -> list[float]:
-        """The direction in which parallel light travels, however it was given; of any length."""
-        if "to_world" in self.graph.props(self.index):
-            return self.column(2)
-        return [float(c) for c in np.ravel(self.value("direction", (0, 0, 1)))]
+    def position(self) -> np.ndarray:
+        """Return the place of a light that shines from a point, (3,) in world space."""
+        return self.vector("position", (0, 0, 0), 3)
 
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
         """Return the intensity of a heuristic light times a factor."""
@@ -114,17 +101,12 @@ class Given:
         return values.scaled(colour, factor * self.number("scale", 1.0))
 
     def replace(
-        self,
-        plugin: str,
-        factor: float = INTENSITY_FACTOR,
-        exact: bool = True,
-        note: str = "",
-        **parameters: object,
+        self, props: mi.Properties, factor: float, exact: bool = True, note: str = ""
     ) -> PairedEmitter:
         """Put a light of another plugin in its place, and return the record of it."""
         given = self.plugin
-        self.graph.replace(self.index, properties(plugin, **parameters))
-        return PairedEmitter(self.label, given, plugin, factor, exact, note)
+        self.graph.replace(self.index, props)
+        return PairedEmitter(self.label, given, props.plugin_name(), factor, exact, note)
 
     def becomes_ambient(self, note: str = "", lost: str = "") -> PairedEmitter:
         """Return the record of an environment that is ``I_a``; its node stays as a background."""
@@ -133,8 +115,7 @@ class Given:
     def leave_out(self) -> PairedEmitter:
         """Take the light out of the scene, and return the record of it."""
         self.graph.remove(self.index)
-        note = "left out: it has no nearest form"
-        lost = "this kind of light"
+        note, lost = "left out: it has no nearest form", "this kind of light"
         return PairedEmitter(self.label, self.plugin, "none", 0.0, False, note, lost)
 
 
@@ -146,29 +127,20 @@ class LightKind:
     ----------
     plugins
         Mitsuba's emitters of this kind.
-    to_heuristic
-        Replaces the light by its nearest heuristic form, and returns the record of it.
+    to_heuristic, to_physical
+        Put the nearest form in the light's place, and return the record. The second is None where
+        the heuristic has no light of its own for it.
     model
-        Its class in :mod:`heuristic.lights`, None where the heuristic has no light of its own for
-        it.
-    to_physical
-        Replaces the heuristic light by the physical one; None where there is no ``model``.
+        Its class in :mod:`heuristic.lights`, or None.
     ambient
-        Returns the radiance that becomes ``I_a``, as the parser keeps it, or None; called before
-        ``to_heuristic``.
+        Returns the radiance that becomes ``I_a``, as the parser keeps it, or None.
     colour
         The parameter that holds the intensity, where the kind is paired by its parameters.
     place
-        Returns ``position``, or ``toward`` (the direction to the light), (3,) each, in a dict;
-        nothing for lights that have neither.
-    exact
-        Whether it needs no random numbers.
-    surrounds
-        Whether its light comes from everywhere: an environment.
-    uniform
-        Whether that light is the same from everywhere.
-    on_shapes
-        Whether it belongs to a shape that shines.
+        Returns ``position`` or ``toward``, the direction to the light, (3,) each; nothing for
+        lights that have neither.
+    exact, surrounds, uniform, on_shapes
+        Whether it needs no random numbers, comes from everywhere, evenly so, belongs to a shape.
     effect
         The effect that tells its two forms apart, None where they are one.
     edits
@@ -178,8 +150,8 @@ class LightKind:
 
     plugins: tuple[str, ...]
     to_heuristic: Callable[[Given], PairedEmitter]
-    model: type[Light] | None = None
     to_physical: Callable[[Given], PairedEmitter] | None = None
+    model: type[Light] | None = None
     ambient: Callable[[Given], object] | None = None
     colour: str = ""
     place: Callable[[Given], dict[str, np.ndarray]] = lambda light: {}
@@ -190,22 +162,16 @@ class LightKind:
     effect: Effect | None = None
     edits: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
-    @property
-    def is_attenuated(self) -> bool:
-        """Whether the heuristic form has the coefficients of 6.1."""
-        return self._has("attenuation")
-
-    @property
-    def has_cone(self) -> bool:
-        """Whether the light ends at the edge of a cone."""
-        return self._has("cutoff")
-
-    def _has(self, name: str) -> bool:
-        return self.model is not None and name in {entry.name for entry in fields(self.model)}
+    def has(self, name: str) -> bool:
+        """Tell whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
+        return self.model is not None and _has(self.model, name)
 
 
-def at_position(light: Given) -> dict[str, np.ndarray]:
-    """Return the place of a light that shines from a point."""
-    is_moved = "to_world" in light.graph.props(light.index)
-    given = light.column(3) if is_moved else light.value("position", (0, 0, 0))
-    return {"position": np.ravel(given).astype(float)}
+def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: object) -> mi.Properties:
+    """Return the properties of a heuristic light, which falls off as Mitsuba's do."""
+    falloff = FALLOFF_OF_MITSUBA if _has(PLUGINS[plugin], "attenuation") else {}
+    return properties(plugin, scale=scale, **values, **falloff)
+
+
+def _has(model: type[Light], name: str) -> bool:
+    return name in {entry.name for entry in fields(model)}

@@ -6,7 +6,7 @@ import mitsuba as mi
 
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.pairing.lights import measured
-from reference.pairing.lights.kind import FALLOFF_OF_MITSUBA, Given, LightKind, PairedEmitter
+from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 
 
 def even_cone(light: Given) -> PairedEmitter:
@@ -15,18 +15,16 @@ def even_cone(light: Given) -> PairedEmitter:
     beam = measured.beam(light.graph, light.emitter, origin, axis)
     if beam is None:
         return light.leave_out()
-    record = light.replace(
+    props = heuristic(
         "heuristic_spot",
-        exact=False,
-        note=f"an even cone of {beam.cutoff:.4g} deg, of the same solid angle and flux",
         position=mi.ScalarPoint3f(*origin),
         direction=mi.ScalarVector3f(*axis),
         cutoff=beam.cutoff,
         exponent=0.0,
         intensity=beam.intensity,
-        scale=INTENSITY_FACTOR,
-        **FALLOFF_OF_MITSUBA,
     )
+    note = f"an even cone of {beam.cutoff:.4g} deg, of the same solid angle and flux"
+    record = light.replace(props, INTENSITY_FACTOR, exact=False, note=note)
     return replace(record, name=label, lost="its picture")
 
 

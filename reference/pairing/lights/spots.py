@@ -14,14 +14,9 @@ from scipy.optimize import minimize_scalar
 from heuristic.lights import SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.pairing.lights import points, projectors
-from reference.pairing.lights.kind import (
-    FALLOFF_OF_MITSUBA,
-    Given,
-    LightKind,
-    PairedEmitter,
-    at_position,
-)
+from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 from reference.planning.effects import Effect
+from reference.scene.graph import properties
 
 LARGEST_EXPONENT = 1e5
 STEPS = 2048
@@ -86,24 +81,21 @@ def _to_heuristic(light: Given) -> PairedEmitter:
     cutoff = light.number("cutoff_angle", 20.0)
     beam_width = light.number("beam_width", 0.75 * cutoff)
     exponent = exponent_for(cutoff, beam_width)
-    return light.replace(
+    props = heuristic(
         "heuristic_spot",
-        exact=False,
-        note=f"m = {exponent:.4g} fitted to the linear fall-off from {beam_width:g} to"
-        f" {cutoff:g} deg",
-        position=light.position,
+        position=mi.ScalarPoint3d(*light.position()),
         direction=mi.ScalarVector3f(*light.column(2)),
         cutoff=cutoff,
         exponent=exponent,
         intensity=light.value("intensity", 1.0),
-        scale=INTENSITY_FACTOR,
-        **FALLOFF_OF_MITSUBA,
     )
+    note = f"m = {exponent:.4g} fitted to the linear fall-off from {beam_width:g} to {cutoff:g} deg"
+    return light.replace(props, INTENSITY_FACTOR, exact=False, note=note)
 
 
 def _to_physical(light: Given) -> PairedEmitter:
-    axis = np.ravel(light.value("direction", (0, 0, 1))).astype(float)
-    axis = axis / np.linalg.norm(axis)
+    position, axis = light.position(), np.ravel(light.value("direction", (0, 0, 1))).astype(float)
+    axis /= np.linalg.norm(axis)
     cutoff, exponent = light.number("cutoff", 30.0), light.number("exponent", 0.0)
     edge, beam_width = cone_for(cutoff, exponent)
 
@@ -113,20 +105,15 @@ def _to_physical(light: Given) -> PairedEmitter:
 
     factor, _, note = points.level(light, cone)
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
-    position = np.ravel(light.position)
-    up = np.eye(3)[np.argmin(np.abs(axis))]
-    return light.replace(
+    ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
+    props = properties(
         "spot",
-        factor,
-        exact=False,
-        note=f"{fitted}; {note}" if note else fitted,
-        to_world=mi.ScalarTransform4f().look_at(
-            position.tolist(), (position + axis).tolist(), up.tolist()
-        ),
+        to_world=mi.ScalarTransform4f().look_at(*(end.tolist() for end in ends)),
         intensity=light.scaled_intensity(factor),
         cutoff_angle=edge,
         beam_width=beam_width,
     )
+    return light.replace(props, factor, exact=False, note=f"{fitted}; {note}" if note else fitted)
 
 
 KIND = LightKind(
@@ -135,7 +122,7 @@ KIND = LightKind(
     model=SpotLight,
     to_physical=_to_physical,
     colour="intensity",
-    place=at_position,
+    place=lambda light: {"position": light.position()},
     exact=True,
     # A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
     effect=Effect.CONE,
