@@ -11,6 +11,8 @@ from heuristic.errors import InputError
 
 FORMS = ("phong", "blinn")
 
+COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
+
 
 @dataclass(frozen=True)
 class Material:
@@ -63,7 +65,7 @@ class Material:
     n_is_moderate: bool = False
 
     def __post_init__(self):
-        for name in ("k_i", "k_a", "k_d", "k_s"):
+        for name in COEFFICIENTS:
             object.__setattr__(self, name, colours.checked(name, getattr(self, name)))
         _check_exponent(self.n)
         check_form(self.form)

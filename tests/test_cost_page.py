@@ -81,13 +81,11 @@ def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
 
 
 def test_every_effect_with_a_price_has_a_colour_of_its_own():
-    from reference.pairing import lights
     from reference.planning.effects import Effect
     from reports.charts.price_chart import COLOURS
 
     heuristic_only = {Effect.EMISSION, Effect.AMBIENT, Effect.DIFFUSE, Effect.SPECULAR}
     assert set(COLOURS) == set(Effect) - heuristic_only
-    assert {kind.effect for kind in lights.KINDS} - {None} <= set(COLOURS)
     assert len(set(COLOURS.values())) == len(COLOURS)
 
 

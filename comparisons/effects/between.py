@@ -215,7 +215,7 @@ class Between:
             key: effect
             for key, index in self.pair.heuristic.children(0, EMITTER)
             if key in dict(self.pair.physical.children(0, EMITTER))
-            and (effect := lights.effect_of(self.pair.heuristic.plugin(index)))
+            and (effect := _of_light(self.pair.heuristic.plugin(index)))
             and self.pair.heuristic.label(index) in inexact
         }
 
@@ -225,6 +225,17 @@ class Between:
         graph = self.pair.physical
         found = graph.children(0, EMITTER)
         return [key for key, index in found if not lights.of(graph.plugin(index)).exact]
+
+
+def _of_light(plugin):
+    """Return the effect that tells a light's two forms apart.
+
+    A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
+    """
+    kind = lights.of(plugin)
+    if kind.has("cutoff"):
+        return Effect.CONE
+    return Effect.ATTENUATION if kind.has("attenuation") else None
 
 
 def _graft(graph, other, index):

@@ -21,6 +21,8 @@ Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance `
 (:mod:`heuristic.convention`). :meth:`light` hands the same parameters to the kernel.
 """
 
+from dataclasses import fields
+
 import drjit as dr
 import mitsuba as mi
 
@@ -37,6 +39,14 @@ Python how large the scene is, and rays of this length still keep their directio
 
 def define() -> None:
     """Create the classes for the current variant and register them."""
+    parameters = {
+        "scale": (mi.Float, 1.0),
+        "position": (mi.Point3f, mi.ScalarPoint3f(0)),
+        "direction": (mi.Vector3f, mi.ScalarVector3f(0, 0, 1)),
+        "cutoff": (mi.Float, 30.0),
+        "exponent": (mi.Float, 0.0),
+    }
+    coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
     def registered(plugin: type) -> type:
         mi.register_emitter(plugin.model.plugin, plugin)
@@ -51,15 +61,38 @@ def define() -> None:
             super().__init__(props)
             self.intensity = emitted(props, "intensity", 1.0)
             self.numbers = []  # names of the parameters that are opaque numbers
-            self._keep(props, "scale", mi.Float, 1.0)
+            names = {field.name for field in fields(self.model)}
+            for name, (kind, default) in parameters.items():
+                if name in names or name == "scale":
+                    self._keep(props, name, kind, default)
+            if "attenuation" in names:
+                self.clamped = props.get("clamped", False)
+                self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
+                for name, default in coefficients.items():
+                    self._keep(props, name, mi.Float, default)
 
         def parameters_changed(self, keys=()):
             """Make edited numbers opaque, so that a new value compiles nothing."""
             dr.make_opaque(*(getattr(self, name) for name in self.numbers))
+            if coefficients.keys() & set(keys):
+                self.unattenuated = False
 
         def traverse(self, callback):
             for name in ("intensity", *self.numbers):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+        def light(self, si, active=True):
+            """Return the kernel's form of this light."""
+            given = {"intensity": self._spectrum(si, active)}
+            for field in fields(self.model):
+                if field.name not in given:
+                    given[field.name] = getattr(self, field.name)
+            return self.model(**given)
+
+        @property
+        def attenuation(self):
+            """The coefficients of 6.1; plain numbers where they are 1, 0 and 0."""
+            return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
         def eval(self, si, active=True):
             return mi.Spectrum(0)
@@ -103,12 +136,6 @@ def define() -> None:
 
         def __init__(self, props):
             super().__init__(props)
-            self._keep(props, "position", mi.Point3f, mi.ScalarPoint3f(0))
-            defaults = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
-            for name, default in defaults.items():
-                self._keep(props, name, mi.Float, default)
-            self.clamped = props.get("clamped", False)
-            self.unattenuated = all(props.get(name, d) == d for name, d in defaults.items())
             self.m_flags = +mi.EmitterFlags.DeltaPosition
 
         def sample_direction(self, it, sample, active=True):
@@ -121,40 +148,18 @@ def define() -> None:
             direction = half * dr.select(is_away, dr.rcp(length), 0)
             distance = numerics.at_most(2 * length * size, numerics.largest(length))
             ds = self._direction_sample(it, self.position, direction, distance)
-            weight = self._attenuated(distance, self._spectrum(it, active))
+            law = terms.clamped_attenuation if self.clamped else terms.attenuation
+            weight = law(distance, *self.attenuation, self._spectrum(it, active))
             return ds, IRRADIANCE_PER_INTENSITY * weight & active
-
-        def light(self, si, active=True):
-            """Return the kernel's form of this light."""
-            return PointLight(
-                self.position, self._spectrum(si, active), self._coefficients(), self.clamped
-            )
-
-        def parameters_changed(self, keys=()):
-            super().parameters_changed(keys)
-            self.unattenuated = self.unattenuated and not {"k0", "k1", "k2"} & set(keys)
 
         def bbox(self):
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
-
-        def _coefficients(self):
-            return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
-
-        def _attenuated(self, distance, intensity):
-            law = terms.clamped_attenuation if self.clamped else terms.attenuation
-            return law(distance, *self._coefficients(), intensity)
 
     @registered
     class HeuristicSpot(HeuristicPoint):
         """Equations 6.2-6.4."""
 
         model = SpotLight
-
-        def __init__(self, props):
-            super().__init__(props)
-            self._keep(props, "direction", mi.Vector3f, mi.ScalarVector3f(0, 0, 1))
-            self._keep(props, "cutoff", mi.Float, 30.0)
-            self._keep(props, "exponent", mi.Float, 0.0)
 
         def sample_direction(self, it, sample, active=True):
             ds, weight = super().sample_direction(it, sample, active)
@@ -170,17 +175,6 @@ def define() -> None:
             cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
             return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
 
-        def light(self, si, active=True):
-            return SpotLight(
-                self.position,
-                self.direction,
-                self._spectrum(si, active),
-                self.cutoff,
-                self.exponent,
-                self._coefficients(),
-                self.clamped,
-            )
-
     @registered
     class HeuristicDirectional(HeuristicEmitter):
         """A directional light: parallel rays of constant intensity."""
@@ -189,17 +183,12 @@ def define() -> None:
 
         def __init__(self, props):
             super().__init__(props)
-            self._keep(props, "direction", mi.Vector3f, mi.ScalarVector3f(0, 0, 1))
             self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
 
         def sample_direction(self, it, sample, active=True):
             direction = -vectors.normalise(self.direction)
             ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
             return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
-
-        def light(self, si, active=True):
-            """Return the kernel's form of this light."""
-            return DirectionalLight(self.direction, self._spectrum(si, active))
 
         def bbox(self):
             return mi.ScalarBoundingBox3f()

@@ -39,10 +39,8 @@ import numpy as np
 from heuristic import lobes, numerics, terms, vectors
 from heuristic.convention import RADIANCE_PER_IRRADIANCE
 from heuristic.errors import InputError
-from heuristic.materials import Material, check_form
+from heuristic.materials import COEFFICIENTS, Material, check_form
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
-
-COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
 
 SMALLEST_SAMPLE = 2.0**-25
 """In place of a random number of 0, which stands for all those below 2^-24."""

@@ -5,8 +5,7 @@ import mitsuba as mi
 
 from heuristic import terms
 from heuristic.errors import InputError
-from heuristic.materials import Material
-from heuristic.plugins.phong import COEFFICIENTS
+from heuristic.materials import COEFFICIENTS, Material
 
 
 class SceneMaterials:

@@ -4,6 +4,7 @@ Everything here errs on one side: a shape is called convex, flat, or unable to s
 where that is certain, so that a rule that rests on it never leaves out light that is there.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import mitsuba as mi
@@ -12,21 +13,11 @@ import numpy as np
 from heuristic import meshes
 from reference.pairing import lights
 from reference.pairing.lights.kind import Given
+from reference.pairing.nearest import rule_of
 from reference.scene import values
+from reference.scene.graph import Graph
 
 BSDF, EMITTER, SHAPE = (getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Shape"))
-
-OPAQUE = ("diffuse", "plastic", "roughplastic", "conductor", "roughconductor", "phong")
-"""BSDFs that only reflect, on the side that the normal points to."""
-
-REFLECTANCES = {
-    "diffuse": ("reflectance",),
-    "plastic": ("diffuse_reflectance", "specular_reflectance"),
-    "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
-    "conductor": ("specular_reflectance",),
-    "roughconductor": ("specular_reflectance",),
-    "phong": ("k_d", "k_s"),
-}
 
 ROUNDING = 1e-6
 """Of a mesh's size: dents less deep than single precision resolves do not count."""
@@ -65,12 +56,12 @@ class ShapeFacts:
     reflects: bool
     opaque: bool
 
-    def corners(self):
+    def corners(self) -> np.ndarray:
         """Return the corners of the bounding box, (8, 3)."""
         choice = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
         return np.where(choice, self.high, self.low)
 
-    def may_face(self, other):
+    def may_face(self, other: "ShapeFacts") -> bool:
         """Tell whether this shape can receive light from another one, as far as planes tell."""
         if self.plane is None:
             return True
@@ -103,7 +94,7 @@ class Structure:
     cameras: tuple[np.ndarray, ...]
 
 
-def examine(graph, scene):
+def examine(graph: Graph, scene: mi.Scene) -> Structure:
     """Return the :class:`Structure` of a physical half: its graph, and the same instantiated."""
     nodes = {graph.props(index).id(): index for index in graph.nodes(SHAPE)}
     shapes = tuple(_shape_facts(graph, nodes.get(shape.id()), shape) for shape in scene.shapes())
@@ -111,7 +102,7 @@ def examine(graph, scene):
     return Structure(shapes, tuple(_lights(graph)), cameras)
 
 
-def _shape_facts(graph, index, shape):
+def _shape_facts(graph: Graph, index: int | None, shape: mi.Shape) -> ShapeFacts:
     box = shape.bbox()
     nested = graph.children(index, BSDF) if index is not None else []
     bsdf = nested[0][1] if nested else None  # an instance has those of its group
@@ -124,11 +115,11 @@ def _shape_facts(graph, index, shape):
         convex=convex,
         plane=plane,
         reflects=reflects,
-        opaque=bool(plugins) and all(plugin in OPAQUE for plugin in plugins),
+        opaque=bool(plugins) and all(rule_of(p).reflectances is not None for p in plugins),
     )
 
 
-def _surface(graph, bsdf):
+def _surface(graph: Graph, bsdf: int | None) -> tuple[tuple[str, ...], bool, bool]:
     """Return the plugins of a BSDF, whether it can reflect, and whether it is two-sided."""
     if bsdf is None:
         return (), True, True
@@ -137,17 +128,16 @@ def _surface(graph, bsdf):
         plugins = tuple(plugin for found, _, _ in inner for plugin in found)
         return plugins, any(reflects for _, reflects, _ in inner), True
     plugin, props = graph.plugin(bsdf), graph.props(bsdf)
-    if plugin not in REFLECTANCES:
+    reflectances = rule_of(plugin).reflectances
+    if reflectances is None:
         return (plugin,), True, True
-    # A reflectance that is not given has the plugin's default, which is not 0 but for phong.
     reflects = any(
-        values.may_be_nonzero(props[name]) if name in props else plugin != "phong"
-        for name in REFLECTANCES[plugin]
+        values.may_be_nonzero(props.get(name, default)) for name, default in reflectances.items()
     )
     return (plugin,), reflects, bool(props.get("twosided", False))
 
 
-def _geometry(shape, twosided):
+def _geometry(shape: mi.Shape, twosided: bool) -> tuple[bool, tuple | None]:
     """Tell whether a shape is convex, and its plane if it is flat and one-sided."""
     kind = shape.shape_type()
     if kind == +mi.ShapeType.Sphere:
@@ -162,7 +152,7 @@ def _geometry(shape, twosided):
     return False, None
 
 
-def _is_convex(mesh):
+def _is_convex(mesh: mi.Mesh) -> bool:
     """Tell whether all vertices lie behind all faces, and shading normals are the faces' own.
 
     A bowl whose faces look inward has all vertices before them, and is not convex in this sense.
@@ -187,7 +177,7 @@ def _is_convex(mesh):
     return True
 
 
-def _lights(graph):
+def _lights(graph: Graph) -> Iterator[LightFacts]:
     owners = {
         child: graph.props(shape).id()
         for shape in graph.nodes(SHAPE)

@@ -10,10 +10,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from reference.pairing.nearest.probe import lattice
+
 NODES = 256
 SAMPLES = 8192
-LATTICE = (1, 3547, 1663)
-"""Generator of the rank-1 lattice (Korobov) that the BSDF is sampled on."""
 
 
 class AlbedoTable:
@@ -24,10 +24,8 @@ class AlbedoTable:
 
     def __init__(self, bsdf):
         mu = np.linspace(1e-3, 1, NODES) ** 2
-        index = np.arange(SAMPLES)
-        lattice = (np.outer(LATTICE, index) / SAMPLES + 0.5 / SAMPLES) % 1
         grid_mu = mi.Float(np.repeat(mu, SAMPLES))
-        points = [mi.Float(np.tile(row, NODES)) for row in lattice]
+        points = [mi.Float(np.tile(row, NODES)) for row in lattice(SAMPLES)[:3]]
         si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
         si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
         _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))

@@ -24,7 +24,6 @@ import mitsuba as mi
 from heuristic.light import PLUGINS
 from reference.pairing.lights import environments
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter
-from reference.planning.effects import Effect
 from reference.scene import values
 from reference.scene.graph import Graph
 
@@ -33,8 +32,8 @@ EMITTER, SHAPE = mi.ObjectType.Emitter, mi.ObjectType.Shape
 _modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
 KINDS: tuple[LightKind, ...] = tuple(module.KIND for module in _modules if hasattr(module, "KIND"))
 
-_physical = {plugin: kind for kind in KINDS for plugin in kind.plugins}
-_heuristic = {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
+_by_plugin = {plugin: kind for kind in KINDS for plugin in kind.plugins}
+_by_plugin |= {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
 
 
 def of(plugin: str) -> LightKind:
@@ -42,17 +41,12 @@ def of(plugin: str) -> LightKind:
 
     An unknown one is taken for an environment, which is what premises may least rely on.
     """
-    return (_physical | _heuristic).get(plugin, environments.KIND)
+    return _by_plugin.get(plugin, environments.KIND)
 
 
 def is_heuristic(plugin: str) -> bool:
     """Tell whether an emitter is one of the heuristic's own lights."""
     return plugin in PLUGINS
-
-
-def effect_of(plugin: str) -> Effect | None:
-    """Return the effect that tells the two forms of a heuristic light apart, None if none does."""
-    return _heuristic[plugin].effect if plugin in _heuristic else None
 
 
 def edits() -> dict[str, dict[str, str]]:

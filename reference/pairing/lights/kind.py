@@ -13,7 +13,6 @@ import numpy as np
 from heuristic.light import PLUGINS, Light
 from heuristic.lights import INVERSE_SQUARE
 from reference.pairing.factors import INTENSITY_FACTOR
-from reference.planning.effects import Effect
 from reference.scene import values
 from reference.scene.graph import Graph, properties
 
@@ -141,8 +140,6 @@ class LightKind:
         lights that have neither.
     exact, surrounds, uniform, on_shapes
         Whether it needs no random numbers, comes from everywhere, evenly so, belongs to a shape.
-    effect
-        The effect that tells its two forms apart, None where they are one.
     edits
         What a study can edit in place: for each plugin and property, its name below
         ``mitsuba.traverse``.
@@ -159,7 +156,6 @@ class LightKind:
     surrounds: bool = False
     uniform: bool = False
     on_shapes: bool = False
-    effect: Effect | None = None
     edits: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:

@@ -3,6 +3,7 @@
 Every mean is over a rank-1 lattice of samples, and comes as a value that a graph can hold.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -10,7 +11,8 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from reference.pairing.nearest.probe import WAVELENGTHS, as_value, opaque_wavelengths
+from reference.pairing.nearest.probe import WAVELENGTHS, as_value, lattice, opaque_wavelengths
+from reference.scene.graph import Graph
 
 SAMPLES = 65_536
 LATTICE = (1, 19_463)
@@ -31,13 +33,13 @@ class Beam:
     intensity: object
 
 
-def mean_radiance(graph, emitter):
+def mean_radiance(graph: Graph, emitter: mi.Emitter) -> object:
     """Return the mean radiance of an environment over the sphere, ``int L dw / (4 pi)``."""
     means, _ = _arriving(emitter)
     return as_value(graph, means / (4 * np.pi), emitted=True)
 
 
-def irradiance(graph, emitter):
+def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[object, list[float]] | None:
     """Return ``int L dw`` of a distant light as intensity ``I_p``, and its mean direction.
 
     The direction, in which the light travels, is that of the mean of the directions that it comes
@@ -49,7 +51,9 @@ def irradiance(graph, emitter):
     return as_value(graph, means / IRRADIANCE_PER_INTENSITY, emitted=True), (-toward).tolist()
 
 
-def beam(graph, emitter, position, axis):
+def beam(
+    graph: Graph, emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float]
+) -> Beam | None:
     """Return the :class:`Beam` of a light at a position; None where it sends nothing.
 
     Directions are spread evenly over a cone about the axis, first the hemisphere, then the
@@ -69,7 +73,7 @@ def beam(graph, emitter, position, axis):
     return Beam(float(cutoff), as_value(graph, found.mean(axis=1) / share, emitted=True))
 
 
-def surface_mean(graph, shape):
+def surface_mean(graph: Graph, shape: mi.Shape) -> object:
     """Return the mean radiance of a shape's textured emission over its area."""
     emitter = shape.emitter()
     x, y = _lattice()
@@ -81,7 +85,7 @@ def surface_mean(graph, shape):
     return as_value(graph, np.concatenate(means), emitted=True)
 
 
-def _arriving(emitter):
+def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
     """Return ``int L dw`` a channel, and the unit mean direction towards the light."""
     it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
     x, y = _lattice()
@@ -94,7 +98,9 @@ def _arriving(emitter):
     return np.concatenate(means), toward / max(np.linalg.norm(toward), 1e-30)
 
 
-def _intensities(emitter, position, axis, widest):
+def _intensities(
+    emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float], widest: float
+) -> np.ndarray:
     """Return the intensity in directions spread over a cone, (channels, SAMPLES)."""
     cosine = _cosines(widest)
     sine = np.sqrt(np.maximum(1 - cosine**2, 0))
@@ -111,13 +117,12 @@ def _intensities(emitter, position, axis, widest):
     return np.concatenate(found)
 
 
-def _cosines(widest):
+def _cosines(widest: float) -> np.ndarray:
     return 1 - np.array(_lattice()[0], float) * (1 - widest)
 
 
-def _lattice():
-    points = (np.outer(LATTICE, np.arange(SAMPLES)) / SAMPLES + 0.5 / SAMPLES) % 1
-    return tuple(mi.Float(row) for row in points)
+def _lattice() -> tuple[mi.Float, ...]:
+    return tuple(mi.Float(row) for row in lattice(SAMPLES, LATTICE))
 
 
 def _wavelengths():

@@ -9,7 +9,6 @@ from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.lights import INVERSE_SQUARE, PointLight
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
-from reference.planning.effects import Effect
 from reference.scene.graph import properties
 
 
@@ -60,7 +59,6 @@ KIND = LightKind(
     colour="intensity",
     place=lambda light: {"position": light.position()},
     exact=True,
-    effect=Effect.ATTENUATION,
     edits={
         "point": {"intensity": "intensity.value"},
         "heuristic_point": {"position": "position", "scale": "scale"},

@@ -15,7 +15,6 @@ from heuristic.lights import SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.pairing.lights import points, projectors
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
-from reference.planning.effects import Effect
 from reference.scene.graph import properties
 
 LARGEST_EXPONENT = 1e5
@@ -124,8 +123,6 @@ KIND = LightKind(
     colour="intensity",
     place=lambda light: {"position": light.position()},
     exact=True,
-    # A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
-    effect=Effect.CONE,
     edits={
         "heuristic_spot": {
             "position": "position",

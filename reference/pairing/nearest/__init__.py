@@ -1,5 +1,7 @@
 """The phong material that is nearest to each of Mitsuba's BSDFs: one rule a plugin.
 
+A rule is one function, declared by :func:`reference.pairing.nearest.material.rule`.
+
 ==================================================  ================================================
 BSDF                                                Rule
 ==================================================  ================================================
@@ -13,44 +15,38 @@ any other, a user's own included                    :mod:`reference.pairing.near
 ==================================================  ================================================
 """
 
-from reference.pairing.nearest import clear, opaque, probed, wrapped
-from reference.pairing.nearest.material import BSDF, Context, Nearest
+from importlib import import_module
+from pkgutil import iter_modules
 
-RULES = {
-    "phong": opaque.phong,
-    "diffuse": opaque.diffuse,
-    "roughplastic": opaque.roughplastic,
-    "plastic": opaque.plastic,
-    "conductor": opaque.conductor,
-    "roughconductor": opaque.conductor,
-    "principled": opaque.principled,
-    "null": clear.null,
-    "dielectric": clear.dielectric,
-    "roughdielectric": clear.dielectric,
-    "thindielectric": clear.sheet,
-    "twosided": wrapped.twosided,
-    "mask": wrapped.mask,
-    "blendbsdf": wrapped.blend,
-    "normalmap": wrapped.normal_map,
-    "bumpmap": wrapped.bump_map,
-}
+from reference.pairing.factors import Convention
+from reference.pairing.nearest import probed
+from reference.pairing.nearest.material import RULES, Context, Nearest, Rule
+from reference.scene.graph import Graph
 
-WRAPPERS = ("twosided", "mask", "blendbsdf", "normalmap", "bumpmap")
+for _found in iter_modules(__path__):
+    import_module(f"{__name__}.{_found.name}")  # declares its rules
 
-__all__ = ["BSDF", "RULES", "WRAPPERS", "Nearest", "nearest_of"]
+WRAPPERS = tuple(plugin for plugin, rule in RULES.items() if rule.wraps)
 
 
-def nearest_of(graph, index, convention, found=None):
+def rule_of(plugin: str) -> Rule:
+    """Return the rule of a BSDF, by the name of its plugin."""
+    return RULES.get(plugin, Rule(probed.nearest))
+
+
+def nearest_of(
+    graph: Graph, index: int, convention: Convention, found: dict[int, Nearest] | None = None
+) -> Nearest:
     """Return the :class:`Nearest` material of a BSDF node.
 
     ``found``, where given, is completed with it and with those of nested nodes, by index.
     """
     found = {} if found is None else found
 
-    def nearest(inner):
+    def nearest(inner: int) -> Nearest:
         if inner not in found:
-            rule = RULES.get(graph.plugin(inner), probed.nearest)
-            found[inner] = rule(Context(graph, convention, nearest), inner)
+            rule = rule_of(graph.plugin(inner))
+            found[inner] = rule.nearest(Context(graph, convention, nearest), inner)
         return found[inner]
 
     return nearest(index)

@@ -5,27 +5,30 @@ lobe (`probed.lobe`). A closed body has two such surfaces on each path.
 """
 
 from reference.pairing.nearest import operations, probed
-from reference.pairing.nearest.material import Nearest
+from reference.pairing.nearest.material import Context, Nearest, rule
 
 NEAREST = "seen through without refraction, by the transmittance at normal incidence"
 
 
-def null(context, index):
+@rule("null")
+def null(context: Context, index: int) -> Nearest:
     """``null``: transmittance 1 (exact)."""
     return Nearest(transmittance=1.0, twosided=True)
 
 
-def dielectric(context, index):
+@rule("dielectric", "roughdielectric")
+def dielectric(context: Context, index: int) -> Nearest:
     """``dielectric``, ``roughdielectric``: the interface is lit from outside alone."""
     return _clear(context, index, "refraction", twosided=False)
 
 
-def sheet(context, index):
+@rule("thindielectric")
+def sheet(context: Context, index: int) -> Nearest:
     """``thindielectric``: both sides reflect, and nothing is refracted."""
     return _clear(context, index, "mirror image", twosided=True)
 
 
-def _clear(context, index, lost, twosided):
+def _clear(context: Context, index: int, lost: str, twosided: bool) -> Nearest:
     given = context.graph.props(index)
     white = probed.with_values(context, index, specular_reflectance=1.0, specular_transmittance=1.0)
     passed = operations.product(

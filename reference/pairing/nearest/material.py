@@ -1,18 +1,17 @@
 """What a rule of :mod:`reference.pairing.nearest` returns, and what it has at hand."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import mitsuba as mi
 
+from heuristic.materials import COEFFICIENTS
 from heuristic.terms import normalisation
 from reference.pairing.factors import Convention
 from reference.pairing.nearest import operations
 from reference.scene.graph import Graph, properties
 
 BSDF = mi.ObjectType.BSDF
-
-COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Nearest:
     lost: tuple[tuple[str, str], ...] = ()
     misses: tuple = ()
 
-    def properties(self):
+    def properties(self) -> mi.Properties:
         """Return the properties of the node ``phong``; what has its default is left out."""
         props = properties("phong")
         for name in (*COEFFICIENTS, "n", "transmittance"):
@@ -59,7 +58,7 @@ class Nearest:
             props["tilt"] = self.tilt
         return props
 
-    def parameters(self):
+    def parameters(self) -> dict[str, object]:
         """Return the coefficients for records: numbers, or the word ``texture``."""
         found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
         if not operations.is_zero(self.transmittance):
@@ -81,23 +80,53 @@ class Context:
     convention: Convention
     nearest: Callable[[int], Nearest] = field(repr=False, default=None)
 
-    def value(self, index, key, default):
+    def value(self, index: int, key: str, default: object) -> object:
         """Return a parameter as the parser keeps it."""
         return self.graph.props(index).get(key, default)
 
-    def plugin(self, index):
+    def plugin(self, index: int) -> str:
         """Return a node's plugin."""
         return self.graph.plugin(index)
 
 
-def alike(graph, first, second):
+@dataclass(frozen=True)
+class Rule:
+    """How the nearest material of a BSDF is found, and what planning knows of the BSDF.
+
+    ``reflectances`` are the parameters, with their defaults, without which it reflects nothing; it
+    has them if it only reflects, on the side that the normal points to, and None otherwise.
+    ``wraps`` tells that it is made of other BSDFs.
+    """
+
+    nearest: Callable[[Context, int], Nearest]
+    reflectances: Mapping[str, float] | None = None
+    wraps: bool = False
+
+
+RULES: dict[str, Rule] = {}
+"""By plugin; filled by :func:`rule`."""
+
+
+def rule(
+    *plugins: str, reflectances: Mapping[str, float] | None = None, wraps: bool = False
+) -> Callable:
+    """Declare a function as the :class:`Rule` of some plugins."""
+
+    def declared(nearest):
+        RULES.update(dict.fromkeys(plugins, Rule(nearest, reflectances, wraps)))
+        return nearest
+
+    return declared
+
+
+def alike(graph: Graph, first: Nearest, second: Nearest) -> tuple[Nearest, Nearest]:
     """Return two materials with their lobes scaled in one way, so that ``k_s`` can be mixed."""
     if first.normalised == second.normalised:
         return first, second
     return tuple(_normalised(graph, material) for material in (first, second))
 
 
-def _normalised(graph, material):
+def _normalised(graph: Graph, material: Nearest) -> Nearest:
     if material.normalised:
         return material
     scale = 1 / float(normalisation(material.form, operations.plain(material.n)))

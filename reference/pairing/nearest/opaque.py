@@ -5,15 +5,17 @@ from functools import lru_cache
 
 from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
-from reference.pairing.factors import Convention, exponent_of
+from reference.pairing.factors import Convention, Phong, exponent_of
 from reference.pairing.nearest import operations, probed
-from reference.pairing.nearest.material import Nearest
+from reference.pairing.nearest.material import Context, Nearest, rule
 from reference.scene import values
+from reference.scene.graph import Graph
 
 MIRROR = ("mirror image", "a highlight of the same albedo")
 
 
-def phong(context, index):
+@rule("phong", reflectances={"k_d": 0.0, "k_s": 0.0})
+def phong(context: Context, index: int) -> Nearest:
     """``phong``: itself."""
     props = context.graph.props(index)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
@@ -21,13 +23,15 @@ def phong(context, index):
     return Nearest(**given)
 
 
-def diffuse(context, index):
+@rule("diffuse", reflectances={"reflectance": 0.5})
+def diffuse(context: Context, index: int) -> Nearest:
     """``diffuse``: ``k_d = k_a = rho`` (exact)."""
     reflectance = context.value(index, "reflectance", 0.5)
     return Nearest(k_a=reflectance, k_d=reflectance)
 
 
-def roughplastic(context, index):
+@rule("roughplastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
+def roughplastic(context: Context, index: int) -> Nearest:
     """``roughplastic``: after the convention (:class:`reference.pairing.factors.Convention`).
 
     A textured reflectance is matched at each point: the diffuse part's albedo is linear in ``rho``,
@@ -53,7 +57,8 @@ def roughplastic(context, index):
     return Nearest(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n)
 
 
-def plastic(context, index):
+@rule("plastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
+def plastic(context: Context, index: int) -> Nearest:
     """``plastic``: as ``roughplastic`` when ``alpha`` goes to 0.
 
     The diffuse part is matched as there; the coat's mirror image becomes a narrow highlight of
@@ -78,7 +83,8 @@ def plastic(context, index):
     return Nearest(k_a=k_d, k_d=k_d, **probed.lobe(context, reflected, 0.0), lost=(MIRROR,))
 
 
-def conductor(context, index):
+@rule("conductor", "roughconductor", reflectances={"specular_reflectance": 1.0})
+def conductor(context: Context, index: int) -> Nearest:
     """``conductor``, ``roughconductor``: ``k_d = 0``, and a lobe of the albedo at normal incidence.
 
     The albedo is measured with a white ``specular_reflectance``, which then scales it point by
@@ -97,7 +103,8 @@ def conductor(context, index):
     return Nearest(k_a=reflected, **probed.lobe(context, reflected, alpha), lost=lost)
 
 
-def principled(context, index):
+@rule("principled")
+def principled(context: Context, index: int) -> Nearest:
     """``principled``: ``k_d = base_color (1 - metallic) (1 - spec_trans)``; the rest is a lobe.
 
     The lobe's albedo is measured, averaged over textures, less the diffuse part; its width is that
@@ -119,7 +126,7 @@ def principled(context, index):
     )
 
 
-def _of_base(graph, rho, whole, half):
+def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
     """Return the albedo of a plastic's diffuse base at each point of a reflectance.
 
     Light that the coat throws back is reflected by the base again, so that the albedo is ``c rho /
@@ -141,11 +148,13 @@ def _of_base(graph, rho, whole, half):
     )
 
 
-def _smooth_exponent():
+def _smooth_exponent() -> float:
     return exponent_of(probed.SMOOTH_ALPHA)
 
 
-def _roughplastic(graph, index, base=None, coat=None):
+def _roughplastic(
+    graph: Graph, index: int, base: tuple | None = None, coat: tuple | None = None
+) -> RoughPlastic:
     """Read a roughplastic's parameters, with Mitsuba's defaults; reflectances where not given."""
     props = graph.props(index)
     return RoughPlastic(
@@ -160,5 +169,5 @@ def _roughplastic(graph, index, base=None, coat=None):
 
 
 @lru_cache(maxsize=256)
-def _phong_of(plastic: RoughPlastic, convention: Convention):
+def _phong_of(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list]:
     return factors.to_phong(plastic, convention)

@@ -5,18 +5,19 @@ Where all operands are plain the result is plain too; otherwise it is a referenc
 :mod:`heuristic.plugins.mapped`, which computes the same at each point.
 """
 
+from collections.abc import Callable
 from numbers import Real
 
 import mitsuba as mi
 import numpy as np
 
-from reference.scene.graph import Reference, properties
+from reference.scene.graph import Graph, Reference, properties
 from reference.scene.values import COLOURS
 
 TEXTURE = mi.ObjectType.Texture
 
 
-def plain(value):
+def plain(value: object) -> float | tuple[float, ...] | None:
     """Return a value as a float or three floats, None where it is a texture or spectrum."""
     if isinstance(value, Real):
         return float(value)
@@ -27,13 +28,13 @@ def plain(value):
     return None
 
 
-def is_zero(value):
+def is_zero(value: object) -> bool:
     """Tell whether a value is plain and 0."""
     known = plain(value)
     return known is not None and not np.any(known)
 
 
-def product(graph, a, b):
+def product(graph: Graph, a: object, b: object) -> object:
     """Return ``a b``."""
     if is_zero(a) or is_zero(b):
         return 0.0
@@ -43,14 +44,14 @@ def product(graph, a, b):
     return _combined(graph, "heuristic_product", np.multiply, a=a, b=b)
 
 
-def total(graph, a, b):
+def total(graph: Graph, a: object, b: object) -> object:
     """Return ``a + b``."""
     if is_zero(a) or is_zero(b):
         return b if is_zero(a) else a
     return _combined(graph, "heuristic_sum", np.add, a=a, b=b)
 
 
-def share(graph, a, weight):
+def share(graph: Graph, a: object, weight: object) -> object:
     """Return ``a weight``; the weight is a scalar, clipped to [0, 1]."""
     if is_zero(a) or is_zero(weight):
         return 0.0
@@ -59,7 +60,7 @@ def share(graph, a, weight):
     )
 
 
-def rest(graph, a, weight):
+def rest(graph: Graph, a: object, weight: object) -> object:
     """Return ``a (1 - weight)``; the weight is a scalar, clipped to [0, 1]."""
     if is_zero(a) or is_zero(weight):
         return a
@@ -68,7 +69,7 @@ def rest(graph, a, weight):
     )
 
 
-def blend(graph, a, b, weight):
+def blend(graph: Graph, a: object, b: object, weight: object) -> object:
     """Return ``a (1 - weight) + b weight``; the weight is a scalar, clipped to [0, 1]."""
     if _same(a, b):
         return a
@@ -80,24 +81,24 @@ def blend(graph, a, b, weight):
     return _combined(graph, "heuristic_blend", mixed, a=a, b=b, weight=weight)
 
 
-def sides(graph, front, back):
+def sides(graph: Graph, front: object, back: object) -> object:
     """Return ``front`` where the front of a surface is seen, else ``back``."""
     if _same(front, back):
         return front
     return node(graph, "heuristic_sides", front=front, back=back)
 
 
-def exponent(graph, alpha):
+def exponent(graph: Graph, alpha: object) -> Reference:
     """Return the exponent of the lobe as wide as microfacets of a textured roughness."""
     return node(graph, "heuristic_exponent", alpha=alpha)
 
 
-def node(graph, plugin, **values):
+def node(graph: Graph, plugin: str, **values: object) -> Reference:
     """Add a texture node, and return the reference to it."""
     return Reference(graph.add(TEXTURE, properties(plugin, **values)))
 
 
-def _combined(graph, plugin, function, **operands):
+def _combined(graph: Graph, plugin: str, function: Callable, **operands: object) -> object:
     known = [plain(value) for value in operands.values()]
     if all(value is not None for value in known):
         found = np.asarray(function(*(np.asarray(value) for value in known)), float)
@@ -105,7 +106,7 @@ def _combined(graph, plugin, function, **operands):
     return node(graph, plugin, **operands)
 
 
-def _same(a, b):
+def _same(a: object, b: object) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
         return a.index() == b.index()
     known = plain(a), plain(b)

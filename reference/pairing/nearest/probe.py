@@ -12,6 +12,7 @@ At normal incidence, by a rank-1 lattice of samples that also covers the texture
 Textures are averaged.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, log, pi, radians, sin
 
@@ -20,6 +21,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.pairing.nearest import operations
+from reference.scene.graph import Graph
 
 SAMPLES = 8192
 LATTICE = (1, 3547, 1663, 5413, 2689)
@@ -42,12 +44,12 @@ class Probed:
     alpha: float
 
     @property
-    def specular(self):
+    def specular(self) -> np.ndarray:
         """Albedo of the lobe: what is reflected beside the diffuse part."""
         return np.maximum(self.reflected - self.diffuse, 0)
 
 
-def probe(bsdf):
+def probe(bsdf: mi.BSDF) -> Probed | None:
     """Return what is :class:`Probed` of a BSDF; None where it cannot be sampled."""
     wavelengths = WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
     try:
@@ -61,7 +63,7 @@ def probe(bsdf):
     return Probed(*albedos, alpha)
 
 
-def as_value(graph, albedo, emitted=False):
+def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> object:
     """Return albedos as a value of a graph: a number, a colour, or a tabulated spectrum.
 
     What is ``emitted`` is always tabulated in spectral variants, where a number means daylight.
@@ -81,11 +83,16 @@ def as_value(graph, albedo, emitted=False):
     )
 
 
-def interaction(size, wavelengths=None):
+def lattice(size: int, generator: Sequence[int] = LATTICE) -> np.ndarray:
+    """Return the points of a rank-1 lattice in the unit cube, (len(generator), size)."""
+    return (np.outer(generator, np.arange(size)) / size + 0.5 / size) % 1
+
+
+def interaction(
+    size: int, wavelengths: np.ndarray | None = None
+) -> tuple[mi.SurfaceInteraction3f, list]:
     """Return interactions on a plane seen head on, spread over the texture plane by a lattice."""
-    index = np.arange(size)
-    lattice = (np.outer(LATTICE, index) / size + 0.5 / size) % 1
-    points = [mi.Float(row) for row in lattice]
+    points = [mi.Float(row) for row in lattice(size)]
     si = dr.zeros(mi.SurfaceInteraction3f, size)
     si.t = 1.0
     si.n = mi.Normal3f(0, 0, 1)
@@ -98,14 +105,14 @@ def interaction(size, wavelengths=None):
     return si, points[:3]
 
 
-def opaque_wavelengths(wavelengths):
+def opaque_wavelengths(wavelengths: np.ndarray) -> mi.Spectrum:
     """Return four wavelengths as one spectrum that compiles the same kernel for all."""
     found = mi.Spectrum(*map(float, wavelengths))
     dr.make_opaque(found)
     return found
 
 
-def _at(bsdf, wavelengths):
+def _at(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     si, points = interaction(SAMPLES, wavelengths)
     context = mi.BSDFContext(mi.TransportMode.Importance)
     bs, weight = bsdf.sample(context, si, points[0], mi.Point2f(*points[1:]), True)
@@ -131,7 +138,7 @@ def _at(bsdf, wavelengths):
     return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
 
 
-def _means(value):
+def _means(value: mi.Spectrum) -> np.ndarray:
     """Return the mean of each channel of a spectrum."""
     return np.array([np.mean(np.array(channel, float)) for channel in value])
 

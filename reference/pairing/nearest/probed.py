@@ -7,7 +7,7 @@ import mitsuba as mi
 from heuristic.terms import normalisation
 from reference.pairing.factors import exponent_of
 from reference.pairing.nearest import operations
-from reference.pairing.nearest.material import Nearest
+from reference.pairing.nearest.material import Context, Nearest
 from reference.pairing.nearest.probe import as_value, probe
 
 SMOOTH_ALPHA = 0.05
@@ -27,7 +27,7 @@ class White:
     alpha: float
 
 
-def nearest(context, index):
+def nearest(context: Context, index: int) -> Nearest:
     """The diffuse part as ``k_d``, the rest as a lobe of the same albedo and width."""
     found = with_values(context, index)
     if found is None:
@@ -55,7 +55,7 @@ def nearest(context, index):
     )
 
 
-def with_values(context, index, **values):
+def with_values(context: Context, index: int, **values: object) -> White | None:
     """Probe a node's BSDF with some parameters changed; returns :class:`White`, None in vain.
 
     Only parameters that are given are changed: what has its default keeps it.
@@ -73,7 +73,7 @@ def with_values(context, index, **values):
     return White(*(as_value(context.graph, part) for part in parts), found.alpha)
 
 
-def lobe(context, albedo, alpha):
+def lobe(context: Context, albedo: object, alpha: object) -> dict[str, object]:
     """Return ``k_s``, ``n`` and ``normalised`` of a lobe of an albedo and a roughness.
 
     ``n`` is :func:`reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the albedo times

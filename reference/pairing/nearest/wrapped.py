@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+from heuristic.materials import COEFFICIENTS
 from reference.pairing.nearest import operations
-from reference.pairing.nearest.material import BSDF, COEFFICIENTS, Nearest, alike
+from reference.pairing.nearest.material import BSDF, Context, Nearest, alike, rule
 from reference.pairing.nearest.operations import TEXTURE
 
 
-def twosided(context, index):
+@rule("twosided", wraps=True)
+def twosided(context: Context, index: int) -> Nearest:
     """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
     graph = context.graph
     inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
@@ -21,7 +23,8 @@ def twosided(context, index):
     return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
 
 
-def mask(context, index):
+@rule("mask", wraps=True)
+def mask(context: Context, index: int) -> Nearest:
     """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
     graph = context.graph
     ((_, child),) = graph.children(index, BSDF)
@@ -39,7 +42,8 @@ def mask(context, index):
     return replace(inner, **reflected, transmittance=passed)
 
 
-def blend(context, index):
+@rule("blendbsdf", wraps=True)
+def blend(context: Context, index: int) -> Nearest:
     """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
 
     Exact where only one of the two has a lobe, or where the weight is 0 or 1.
@@ -70,19 +74,21 @@ def blend(context, index):
     )
 
 
-def normal_map(context, index):
+@rule("normalmap", wraps=True)
+def normal_map(context: Context, index: int) -> Nearest:
     """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
     return _tilted(context, index, normals=context.graph.props(index)["normalmap"])
 
 
-def bump_map(context, index):
+@rule("bumpmap", wraps=True)
+def bump_map(context: Context, index: int) -> Nearest:
     """``bumpmap``: the nested material, with the displaced surface's normal (as there)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
     scale = float(context.value(index, "scale", 1.0))
     return _tilted(context, index, heights=context.graph.props(index)[key], scale=scale)
 
 
-def _tilted(context, index, **values):
+def _tilted(context: Context, index: int, **values: object) -> Nearest:
     ((_, child),) = context.graph.children(index, BSDF)
     inner = context.nearest(child)
     lost = inner.lost
