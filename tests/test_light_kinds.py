@@ -10,9 +10,7 @@ from reference.pairing import lights, nearest
 from reference.pairing.nearest.material import Nearest, rule
 from reference.planning.structure import examine
 
-PLUGINS_OF_BOTH = sorted(
-    {plugin for kind in lights.KINDS for plugin in kind.plugins} | set(PLUGINS)
-)
+PHYSICAL = [plugin for kind in lights.KINDS for plugin in kind.plugins]
 NEEDED = {"projector": {"irradiance": 1.0}}
 
 
