@@ -68,19 +68,19 @@ class Light:
         """Return the fields that are plain numbers, or tuples of them, and not compiled in."""
         compiled = self.compiled()
         given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in compiled}
-        return {name: value for name, value in given.items() if _is_plain(value)}
+        return {
+            name: value
+            for name, value in given.items()
+            if all(isinstance(v, Real) for v in (value if isinstance(value, tuple) else (value,)))
+        }
 
     def with_numbers(self, fetch: Callable[[object], object], vector_type: type) -> Self:
         """Return the light with its :meth:`numbers` replaced by Dr.Jit's, which ``fetch`` gives."""
         fetched = {name: fetch(value) for name, value in self.numbers().items()}
-        for name in ARRAYS.keys() & fetched.keys():
-            fetched[name] = ARRAYS[name](fetched[name], vector_type)
+        for name, array in ARRAYS.items():
+            if name in fetched:
+                fetched[name] = array(fetched[name], vector_type)
         return replace(self, **fetched)
-
-
-def _is_plain(value: object) -> bool:
-    parts = value if isinstance(value, tuple) else (value,)
-    return all(isinstance(part, Real) for part in parts)
 
 
 def _triple(name: str, value: Any) -> object:
@@ -117,18 +117,9 @@ def _attenuation(value: Any) -> tuple:
     return coefficients
 
 
-def _cutoff(value: Any) -> object:
-    if isinstance(value, Real) and not 0 < value < 180:
-        raise InputError(
-            f"cutoff = {value!r} is not allowed: give an angle between 0 and 180 degrees, both"
-            " excluded."
-        )
-    return value
-
-
-def _exponent(value: Any) -> object:
-    if isinstance(value, Real) and not 0 <= value < inf:
-        raise InputError(f"exponent = {value!r} is not allowed: give a finite value of 0 or more.")
+def _number(name: str, is_allowed: Callable[[Real], bool], allowed: str, value: object) -> object:
+    if isinstance(value, Real) and not is_allowed(value):
+        raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
     return value
 
 
@@ -136,8 +127,13 @@ CHECKS: dict[str, Callable[[Any], object]] = {
     "position": partial(_triple, "position"),
     "direction": _direction,
     "intensity": partial(colours.checked, "intensity"),
-    "cutoff": _cutoff,
-    "exponent": _exponent,
+    "cutoff": partial(
+        _number,
+        "cutoff",
+        lambda degrees: 0 < degrees < 180,
+        "an angle between 0 and 180 degrees, both excluded",
+    ),
+    "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
     "attenuation": _attenuation,
 }
 

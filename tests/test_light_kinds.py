@@ -40,7 +40,12 @@ def test_facts_are_mitsubas_own(plugin):
 @pytest.mark.usefixtures("rgb")
 @pytest.mark.parametrize(
     ("plugin", "name"),
-    [(plugin, name) for plugin, names in lights.edits().items() for name in names.values()],
+    [
+        (plugin, name)
+        for kind in lights.KINDS
+        for plugin, names in kind.edits.items()
+        for name in names.values()
+    ],
 )
 def test_what_a_study_edits_is_there(plugin, name):
     found = [key for key, _ in mi.traverse(graph_of(plugin).instantiate())]

@@ -34,7 +34,8 @@ EDITABLE = {
     "disk": {"to_world": ("to_world", lambda props: _transform(props["to_world"]))},
 } | {
     plugin: {key: (name, None) for key, name in names.items()}
-    for plugin, names in lights.edits().items()
+    for kind in lights.KINDS
+    for plugin, names in kind.edits.items()
 }
 """Values that can be edited: for each plugin and property, the name that ``mitsuba.traverse`` has
 for it, and how it is made out of the properties where it is not the property itself."""

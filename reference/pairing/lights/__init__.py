@@ -49,11 +49,6 @@ def is_heuristic(plugin: str) -> bool:
     return plugin in PLUGINS
 
 
-def edits() -> dict[str, dict[str, str]]:
-    """Return what can be edited in place: by plugin and property, the name for Mitsuba."""
-    return {plugin: dict(names) for kind in KINDS for plugin, names in kind.edits.items()}
-
-
 def check(graph: Graph) -> None:
     """Refuse intensities that are negative or not finite.
 
