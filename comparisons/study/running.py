@@ -6,14 +6,20 @@ So a run that ends early loses nothing, and the next one repeats nothing.
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from comparisons import atomic
-from comparisons.study import dataset, point, processes
+from comparisons.pool import Pool, Task, cores
+from comparisons.study import dataset, point
 from comparisons.study.point import Block
+from heuristic.errors import LostProcessError
 
 POINTS = "points"
 """Folder of the finished blocks."""
+
+WORTH_A_PROCESS = 16
+"""Blocks below which the start of a process costs more than it saves."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ def run(study, folder, spread=None, progress=None):
         Where finished blocks are kept, in ``points/``.
     spread : callable, optional
         Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
-        (:mod:`comparisons.study.processes`, :mod:`comparisons.study.cluster`). All are done in this
+        (:func:`processes`, :mod:`comparisons.study.cluster`). All are done in this
         process where it is not given.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
@@ -66,13 +72,48 @@ def run(study, folder, spread=None, progress=None):
     at_hand = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
     report("points", done, total)
-    for block, rows in (spread or processes.over(1))(left):
+    for block, rows in (spread or processes(1))(left):
         _write(kept / f"{block.key}.json", rows)
         found[block.key] = rows
         done += len(rows)
         report("points", done, total)
     rows = [row for block in blocks for row in _named(block, found[block.key])]
     return Outcome(dataset.table(study, rows), done - at_hand, at_hand, _failed(rows))
+
+
+def processes(count):
+    """Return what spreads blocks over so many processes of this machine, as `run` takes it.
+
+    A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
+    several processes keep all of them busy.
+
+    Raises
+    ------
+    LostProcessError
+        While it runs, when one of the processes ends.
+    """
+
+    def spread(blocks):
+        workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
+        tasks = [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
+        threads = partial(_set_threads, max(1, cores() // workers))
+        with Pool(0 if workers == 1 else workers, threads) as pool:
+            for task, rows in pool.each(tasks):
+                try:
+                    yield task.arguments[0], rows.result()
+                except LostProcessError as error:
+                    raise LostProcessError(
+                        f"{error} All finished points are kept; run the same command again, and it"
+                        " goes on from there."
+                    ) from error
+
+    return spread
+
+
+def _set_threads(number):
+    import drjit as dr
+
+    dr.set_thread_count(number)
 
 
 def _named(block: Block, rows):

@@ -7,14 +7,13 @@ which one of them may kill; a single one is compared in this process.
 
 import shlex
 import sys
-from contextlib import nullcontext
 
+from comparisons.pool import Pool, Task
 from heuristic.errors import FotismosError
 from reports.asked import jobs
 from reports.run import single
 from reports.run.single import Wanted
 from reports.run.stages import Run
-from reports.run.worker import Worker
 from reports.terminal import verbosity
 
 
@@ -77,16 +76,20 @@ def _compare(run, places, folder, wanted, views, failures):
     from reports.terminal import progress
 
     alone = len(places) == 1
-    with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
-        for place, name in places.items():
+    with progress.shown() as bar, Pool(0 if alone else 1, single.load) as pool:
+        tasks = (
+            Task(place, single.compare, (name, folder, place, wanted), bar.of(name_of(name)))
+            for place, name in places.items()
+        )
+        for task, outcome in pool.each(tasks):
             try:
-                done = worker.compare(name, folder, place, wanted, bar.of(name_of(name)))
+                done = outcome.result()
             except FotismosError as error:
                 if alone:
                     raise
-                failures[place] = error
+                failures[task.name] = error
                 continue
-            views[place] = done.view
+            views[task.name] = done.view
             run.did(done)
             verbosity.remark(progress.details(done.view["record"]))
 
