@@ -34,7 +34,6 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
 
     ``shown`` is what else the page shows.
     """
-    from reports.page import hard_cases
     from reports.run import output
 
     places = _places(names)
@@ -49,6 +48,7 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
         raise
     if with_hard_cases:
         from comparisons.hard import collection
+        from reports.page import hard_cases
 
         with run.timing("hard cases"):
             shown["hard_cases"] = hard_cases.view(collection.collect())
@@ -96,7 +96,6 @@ def _compare(run, places, folder, wanted, views, failures):
 
 def _write(run, folder, views, failures, with_figures, shown):
     """Write what is about all scenes, and say what came of them."""
-    from reports.charts import figures
     from reports.run import output
     from reports.terminal import progress, tables
 
@@ -114,6 +113,8 @@ def _write(run, folder, views, failures, with_figures, shown):
         records = [view["record"] for view in views.values()]
         tables.write(folder / output.TABLES, records)
         if with_figures:
+            from reports.charts import figures
+
             figures.write_run(folder / output.FIGURES, records)
         verbosity.tell(progress.summary(records))
     verbosity.tell_where(folder / "index.html")
