@@ -4,13 +4,12 @@ Every finished block is a file of its own at once, under a name made out of all 
 So a run that ends early loses nothing, and the next one repeats nothing.
 """
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from comparisons import atomic
 from comparisons.pool import Pool, Task, cores
+from comparisons.store import Entry
 from comparisons.study import dataset, point
 from comparisons.study.point import Block
 from heuristic.errors import LostProcessError
@@ -64,8 +63,9 @@ def run(study, folder, spread=None, progress=None):
     kept = Path(folder) / POINTS
     kept.mkdir(parents=True, exist_ok=True)
     blocks = [block for part in study.parts for block in point.blocks(part)]
-    found = {block.key: _read(kept / f"{block.key}.json") for block in blocks}
-    found = {key: rows for key, rows in found.items() if rows and not _failed(rows)}
+    entries = {block.key: Entry(kept / f"{block.key}.json", block.key) for block in blocks}
+    stored = {key: (entry.load() or {}).get("rows") for key, entry in entries.items()}
+    found = {key: rows for key, rows in stored.items() if rows and not _failed(rows)}
     # Parts may share points; these are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
@@ -73,7 +73,7 @@ def run(study, folder, spread=None, progress=None):
     report = progress or (lambda *_: None)
     report("points", done, total)
     for block, rows in (spread or processes(1))(left):
-        _write(kept / f"{block.key}.json", rows)
+        entries[block.key].save({"rows": rows})
         found[block.key] = rows
         done += len(rows)
         report("points", done, total)
@@ -126,15 +126,3 @@ def _named(block: Block, rows):
 
 def _failed(rows):
     return sum(row["error"] is not None for row in rows)
-
-
-def _read(path):
-    """Return the rows of a finished block; None where there are none, or none that can be read."""
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-
-
-def _write(path, rows):
-    atomic.write(path, json.dumps(rows, ensure_ascii=False))

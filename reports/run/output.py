@@ -107,7 +107,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         for file, content in priced.items():
             (place / file).write_bytes(content)
         if key is not None:
-            (place / finished.FILE).write_text(finished.text(view, key), encoding="utf-8")
+            finished.save(place, key, view)
     return view
 
 
