@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import mitsuba as mi
 
 from heuristic.backend import VARIANTS
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.plugins import emitters, mapped
 
 Parser = mi.parser
@@ -34,9 +34,7 @@ def set_variant(variant):
         For any other name.
     """
     if variant not in VARIANTS:
-        raise InputError(
-            f"variant {variant!r} is not supported: choose one of {', '.join(VARIANTS)}."
-        )
+        raise unknown("variant", variant, VARIANTS)
     mi.set_variant(variant)
 
 
