@@ -7,7 +7,6 @@ run succeeds.
 
 import hashlib
 import json
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
