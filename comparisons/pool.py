@@ -14,6 +14,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
+from math import inf
 from multiprocessing import connection, get_context, parent_process
 from pathlib import Path
 from time import monotonic
@@ -63,14 +64,11 @@ class Pool:
     prepare
         Called once in each new process.
     limit_s
-        Seconds that a task may take, start-up included; None for any.
+        Seconds that a task may take, start-up included.
     """
 
     def __init__(
-        self,
-        count: int,
-        prepare: Callable[[], object] | None = None,
-        limit_s: float | None = None,
+        self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
     ) -> None:
         self._count, self._prepare, self._limit_s = count, prepare, limit_s
         self._idle: list[_Worker] = []
@@ -107,7 +105,7 @@ class Pool:
 
     def _fill(self, waiting: Iterator[Task]) -> None:
         """Give tasks to idle and new processes."""
-        self._idle = [worker for worker in self._idle if worker.is_alive()]
+        self._idle = [worker for worker in self._idle if worker.process.is_alive()]
         for task in islice(waiting, self._count - len(self._busy)):
             worker = self._idle.pop() if self._idle else _Worker(self._prepare)
             worker.give(task, self._limit_s)
@@ -118,7 +116,7 @@ class Pool:
         first = min(worker.deadline for worker in self._busy)
         ready = connection.wait(
             [worker.pipe for worker in self._busy],
-            None if first == float("inf") else max(0.0, first - monotonic()),
+            None if first == inf else max(0.0, first - monotonic()),
         )
         for worker in self._busy:
             if worker.pipe in ready:
@@ -138,20 +136,16 @@ class _Worker:
     outcome: Future[Any]
     deadline: float
 
-    def __init__(self, prepare: Callable[[], object] | None) -> None:
+    def __init__(self, prepare: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
         self.pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs,), daemon=True)
-        self._process.start()
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.process.start()
         theirs.close()  # so that the end of the process is the end of the pipe
         self._send(prepare)
 
-    def is_alive(self) -> bool:
-        return self._process.is_alive()
-
-    def give(self, task: Task, limit_s: float | None) -> None:
-        self.task, self.outcome = task, Future()
-        self.deadline = monotonic() + (limit_s or float("inf"))
+    def give(self, task: Task, limit_s: float) -> None:
+        self.task, self.outcome, self.deadline = task, Future(), monotonic() + limit_s
         self._send((task.name, task.function, task.arguments, task.progress is not None))
 
     def receive(self) -> None:
@@ -160,13 +154,11 @@ class _Worker:
             kind, content = self.pipe.recv()
         except (EOFError, OSError):
             self.lose(_reason(self.end()))
-            return
-        if kind == "progress":
-            self.task.progress(*content)
-        elif kind == "done":
-            self.outcome.set_result(content)
         else:
-            self.outcome.set_exception(content)
+            if kind == "progress":
+                self.task.progress(*content)
+            else:
+                getattr(self.outcome, kind)(content)
 
     def lose(self, reason: str) -> None:
         """End the process, and say why as the outcome of its task."""
@@ -176,12 +168,12 @@ class _Worker:
     def end(self, grace_s: float = GRACE_S) -> int | None:
         """End the process with its group, and return its exit code."""
         self.pipe.close()
-        self._process.join(grace_s)
+        self.process.join(grace_s)
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.kill()
-        self._process.join()
-        return self._process.exitcode
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()
+        self.process.join()
+        return self.process.exitcode
 
     def _send(self, message: object) -> None:
         with suppress(ConnectionError):  # a process that is gone is noticed in `receive`
@@ -215,9 +207,7 @@ def _work(pipe: Any) -> NoReturn:
     if FIRST_VICTIM.exists():
         FIRST_VICTIM.write_text("1000")
     with suppress(EOFError, ConnectionError):
-        prepare = pipe.recv()
-        if prepare is not None:
-            prepare()
+        pipe.recv()()  # prepares
         while True:
             _tell(pipe, *_answer(pipe, *pipe.recv()))
     os._exit(0)  # nobody is listening any more
@@ -226,18 +216,18 @@ def _work(pipe: Any) -> NoReturn:
 def _answer(
     pipe: Any, name: str, function: Callable[..., Any], arguments: tuple, with_progress: bool
 ) -> tuple[str, Any]:
-    """Return the kind and the content of the message on how a task ended."""
+    """Return how a task ended: the method of its outcome to call, and the argument."""
 
     def progress(*told: Any) -> None:
         _tell(pipe, "progress", told)
 
     try:
-        return "done", function(*arguments, *([progress] if with_progress else []))
+        return "set_result", function(*arguments, *([progress] if with_progress else []))
     except FotismosError as error:
-        return "failed", error
+        return "set_exception", error
     except Exception as error:  # whatever a task brings about is its own failure
         traceback.print_exc()
-        return "failed", LostProcessError(f"{name}: {type(error).__name__}: {error}")
+        return "set_exception", LostProcessError(f"{name}: {type(error).__name__}: {error}")
 
 
 def _tell(pipe: Any, kind: str, content: Any) -> None:
