@@ -12,6 +12,9 @@ A message names the value, what is allowed and what to do next. The command line
 a traceback and leaves with the class's `exit_code`.
 """
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class FotismosError(Exception):
     """Base of the errors that fotismos raises on purpose; catch it to catch them all."""
@@ -41,3 +44,21 @@ class LostProcessError(FotismosError):
     """A process, or a scheduler, that work was given to is gone; what it finished is kept."""
 
     exit_code = 1
+
+
+def unknown(what: str, given: object, allowed: Iterable[str]) -> InputError:
+    """Return the error for a word that is not among those allowed.
+
+    ``what`` stands before the word, such as ``loss`` or ``form =``.
+    """
+    allowed = list(allowed)
+    return InputError(
+        f"{what} {given!r} is not known{suggestion(given, allowed)}: choose one of"
+        f" {', '.join(allowed)}."
+    )
+
+
+def suggestion(given: object, allowed: Iterable[str]) -> str:
+    """Return the question whether the nearest of the words allowed is meant; empty if none is."""
+    near = get_close_matches(str(given), list(allowed), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""

@@ -7,7 +7,7 @@ from numbers import Real
 import drjit as dr
 
 from heuristic import colours, numerics
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 
 FORMS = ("phong", "blinn")
 
@@ -83,4 +83,4 @@ def _check_exponent(n):
 def check_form(form):
     """Refuse a form of the specular lobe that is not in :data:`FORMS`."""
     if form not in FORMS:
-        raise InputError(f"form = {form!r} is not known: choose one of {', '.join(FORMS)}.")
+        raise unknown("form =", form, FORMS)

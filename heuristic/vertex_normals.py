@@ -20,7 +20,7 @@ from enum import Enum
 
 import drjit as dr
 
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.normals import cross, scaled_edges, shorter_edges, triangle_normal, unit
 
 CANCELLATION_STEPS = 16
@@ -50,10 +50,8 @@ def vertex_normals(positions, faces, weighting=Weighting.ANGLE):
     try:
         weighting = Weighting(weighting)
     except ValueError:
-        allowed = ", ".join(known.value for known in Weighting)
-        raise InputError(
-            f"weighting {weighting!r} is not known: choose one of {allowed}."
-        ) from None
+        allowed = [known.value for known in Weighting]
+        raise unknown("weighting", weighting, allowed) from None
     return _FUNCTIONS[weighting](positions, faces)
 
 

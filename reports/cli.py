@@ -5,26 +5,36 @@ message on standard error, never a traceback.
 """
 
 import sys
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from pkgutil import iter_modules
 
 import click
 
+import reports.commands
 from heuristic.errors import FotismosError
 from heuristic.version import __version__
-from reports.commands import (
-    check,
-    compare,
-    completion,
-    cost,
-    doctor,
-    fit,
-    plan,
-    report,
-    scenes,
-    study,
+
+
+class Commands(Mapping[str, click.Command]):
+    """The commands by name: one a module of `reports.commands`, imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> click.Command:
+        if name not in set(self):
+            raise KeyError(name)
+        return getattr(import_module(f"reports.commands.{name}"), name)
+
+    def __iter__(self) -> Iterator[str]:
+        return (module.name for module in iter_modules(reports.commands.__path__))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+@click.group(
+    commands=Commands(),
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="fotismos")
 def cli():
     """Textbook shading against physically based rendering, scene by scene.
@@ -40,21 +50,6 @@ def cli():
 
     Colours and bars are for terminals alone, and NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
-
-
-for command in (
-    compare.compare,
-    plan.plan,
-    cost.cost,
-    fit.fit,
-    check.check,
-    report.report,
-    study.study,
-    scenes.scenes,
-    doctor.doctor,
-    completion.completion,
-):
-    cli.add_command(command)
 
 
 def main():

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from comparisons.departure.limits import LOST
-from comparisons.hard import catalogue, physical, terminators
+from comparisons.hard import collection, physical, terminators
 from comparisons.hard.cases import Convention, error, evaluate
 from tests import conftest
 
-CASES = {case.name: case for case in catalogue.CASES}
+CASES = {case.name: case for case in collection.CASES}
 GROUPS = {"exponents", "geometry", "lights", "shading", "reference", "colour"}
 ALL = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
@@ -37,14 +37,14 @@ def test_ours_keeps_the_bound(outcomes, case):
 
 
 def test_the_cases_are_told_apart_and_explained():
-    assert len(CASES) == len(catalogue.CASES)
+    assert len(CASES) == len(collection.CASES)
     assert {case.group for case in CASES.values()} == GROUPS
     for case in CASES.values():
         assert case.hard.endswith(".")
         assert 0 < case.bound <= (LOST if case.group == "reference" else 1e-3)
 
 
-@pytest.mark.parametrize("convention", catalogue.CONVENTIONS, ids=lambda c: c.name)
+@pytest.mark.parametrize("convention", collection.CONVENTIONS, ids=lambda c: c.name)
 def test_what_is_laid_down_is_done(rgb_for_all, convention):
     assert convention.holds()
     assert convention.text.endswith(".")

@@ -7,8 +7,7 @@ import pytest
 
 from comparisons.hard import collection as hard_record
 from comparisons.hard.cases import Convention, Outcome, evaluate
-from comparisons.hard.catalogue import CASES
-from comparisons.hard.collection import HardCases, Picture
+from comparisons.hard.collection import CASES, HardCases, Picture
 from comparisons.hard.furnace import Furnace
 from reports.page import hard_cases as section
 from reports.page import page

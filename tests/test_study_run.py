@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.study import cluster, dataset, design, editing, point, processes, rendered, running
+from comparisons.study import cluster, dataset, design, editing, point, rendered, running
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError
 from reference.pairing import halves
@@ -135,12 +135,12 @@ def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
 
 
 def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, monkeypatch):
-    monkeypatch.setattr(processes, "WORTH_A_PROCESS", 1)
+    monkeypatch.setattr(running, "WORTH_A_PROCESS", 1)
     wanted = study("alpha = [0.1, 0.2, 0.3]\nlight_angle = {from=0, to=85, steps=18}", "lobe", "")
     alone = running.run(wanted, tmp_path / "a")
 
     def killing(given):
-        for number, done in enumerate(processes.over(2)(given)):
+        for number, done in enumerate(running.processes(2)(given)):
             yield done
             if number == 2:
                 os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)

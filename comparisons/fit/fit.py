@@ -20,7 +20,7 @@ from comparisons.fit.parameters import parameters
 from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Fit, FitImages
 from comparisons.options import Options
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
 
@@ -54,7 +54,7 @@ class FitOptions:
 
     def __post_init__(self):
         if self.loss not in LOSSES:
-            raise InputError(f"loss {self.loss!r} is not known: choose one of {', '.join(LOSSES)}.")
+            raise unknown("loss", self.loss, LOSSES)
         if not self.forms or not set(self.forms) <= set(FORMS):
             raise InputError(f"forms {self.forms} are not known: choose of {', '.join(FORMS)}.")
 

@@ -11,7 +11,7 @@ from functools import partial
 import mitsuba as mi
 
 from comparisons.gallery import chapter_six, spectral
-from heuristic.errors import InputError
+from heuristic.errors import InputError, suggestion
 from reference.scene.source import Source
 
 RESOLUTION = 512
@@ -59,7 +59,8 @@ def builtin(name):
     """
     if name not in SCENES:
         raise InputError(
-            f"{name!r} is neither a file nor a built-in scene. Built-in are: {', '.join(SCENES)}."
+            f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)}. Built-in"
+            f" are: {', '.join(SCENES)}."
         )
     return SCENES[name]
 

@@ -2,7 +2,7 @@
 
 A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
 the naive one does not. Tests demand both of every case; the report prints them. The cases
-themselves are in `comparisons.hard.catalogue`.
+themselves are in `comparisons.hard.collection`.
 """
 
 from collections.abc import Callable

@@ -1,14 +1,23 @@
-"""The hard cases evaluated: what the report shows of them."""
+"""All hard cases in one place, and evaluated: what the tests and the report show of them.
+
+Cases of the group ``reference`` need a Mitsuba variant and the plugins.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.hard import furnace, kernel, textbook
+from comparisons.hard import colour_values, furnace, kernel, orientation, physical, surfaces
 from comparisons.hard.cases import Convention, Outcome, evaluate
-from comparisons.hard.catalogue import CASES, CONVENTIONS
+from comparisons.hard.conventions import CONVENTIONS
 from comparisons.hard.furnace import Furnace
-from comparisons.hard.textbook import Setting
+from comparisons.hard.textbook import NAIVE, Setting, shade
+
+CASES = tuple(
+    case
+    for module in (kernel, orientation, surfaces, physical, colour_values)
+    for case in module.CASES
+)
 
 PICTURE = 160
 """Pixels along each side of a picture."""
@@ -52,7 +61,7 @@ def collect():
 
 def _picture(title, setting):
     setting = setting.rounded()
-    naive = textbook.shade(setting, textbook.NAIVE)
+    naive = shade(setting, NAIVE)
     images = (naive, kernel.by_kernel(setting))
     return Picture(title, *(image.reshape(PICTURE, PICTURE) for image in images))
 

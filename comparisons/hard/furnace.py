@@ -28,11 +28,6 @@ class Furnace:
     albedo: tuple[float, ...]
     asymmetry: float
 
-    @property
-    def creates(self):
-        """The largest share of light that the model adds; negative where it only loses."""
-        return max(self.albedo) - 1
-
 
 MODELS = {
     "diffuse, ρ = 1": {"type": "diffuse", "reflectance": 1.0},

@@ -31,6 +31,14 @@ def _directions(seed):
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
+def _turned(axis, toward, degrees):
+    """Tilt directions by angles (POINTS,), each at right angles to another direction."""
+    side = np.cross(axis, toward)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    angle = np.deg2rad(degrees)[:, None]
+    return np.cos(angle) * axis + np.sin(angle) * side
+
+
 def _inside():
     """Points of a sphere of radius 2 with a light within, seen from outside."""
     normal, view, _ = _directions(11)
@@ -43,10 +51,7 @@ def _inside():
 def _behind():
     """Shading normals 91 to 180 degrees away from a light, seen about the mirror direction."""
     light, side, jitter = _directions(12)
-    side = np.cross(light, side)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    angle = np.deg2rad(np.linspace(91, 180, POINTS))[:, None]
-    normal = np.cos(angle) * light + np.sin(angle) * side
+    normal = _turned(light, side, np.linspace(91, 180, POINTS))
     mirrored = 2 * (normal * light).sum(axis=1, keepdims=True) * normal - light
     return Setting(
         normal=normal, light=light, view=mirrored + 0.1 * jitter, k_d=0.5, k_s=0.5, n=9.5
@@ -56,10 +61,7 @@ def _behind():
 def _unseen():
     """Shading normals 91 to 120 degrees away from the viewer, with a light on their own side."""
     view, side, light = _directions(13)
-    side = np.cross(view, side)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    angle = np.deg2rad(np.linspace(91, 120, POINTS))[:, None]
-    normal = np.cos(angle) * view + np.sin(angle) * side
+    normal = _turned(view, side, np.linspace(91, 120, POINTS))
     height = (light * normal).sum(axis=1, keepdims=True)
     light += (np.abs(height) + 0.1 - height) * normal
     return Setting(normal=normal, light=light, view=view, k_d=1.0)

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from itertools import count, islice
 from threading import Lock
 
+from comparisons.pool import cores
 from comparisons.study import point
-from comparisons.study.processes import cores
 from heuristic.errors import InstallationError, LostProcessError
 
 NEEDED = ("dask", "distributed")

@@ -29,7 +29,7 @@ from scipy.stats import qmc
 
 from comparisons.study.levels import Fixed, Span, values
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from reference.pairing.factors import Convention
 
 DESIGNS = ("grid", "random", "sobol")
@@ -195,15 +195,13 @@ def _parameters(scene, given, where):
 def _known(table, names, where):
     for key in table:
         if key not in names:
-            raise InputError(
-                f"{where}: {key!r} is not known. Known are {', '.join(sorted(names))}."
-            )
+            raise unknown(f"{where}:", key, sorted(names))
 
 
 def _choice(table, key, choices, where):
     chosen = table.get(key, choices[0])
     if chosen not in choices:
-        raise InputError(f"{where}: {key} = {chosen!r}: choose one of {', '.join(choices)}.")
+        raise unknown(f"{where}: {key} =", chosen, choices)
     return chosen
 
 

@@ -10,21 +10,6 @@ from heuristic.errors import InputError
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """One value."""
-
-    value: float
-
-    def values(self):
-        """Return all values, for a grid."""
-        return (self.value,)
-
-    def at(self, u):
-        """Return the values at ``u``, an array of numbers in [0, 1)."""
-        return np.full(len(u), self.value)
-
-
-@dataclass(frozen=True)
 class Listed:
     """Values one by one; drawn with equal chance."""
 
@@ -37,6 +22,10 @@ class Listed:
     def at(self, u):
         """Return the values at ``u``, an array of numbers in [0, 1)."""
         return np.array(self.listed)[(u * len(self.listed)).astype(int)]
+
+
+class Fixed(Listed):
+    """One value, that of all points."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +66,7 @@ def values(raw, parameter, is_grid, where):
         if not raw:
             raise InputError(f"{where} = []: give one value or more.")
         return Listed(tuple(_checked(value, parameter, where) for value in raw))
-    return Fixed(_checked(raw, parameter, where))
+    return Fixed((_checked(raw, parameter, where),))
 
 
 def _span(raw, parameter, is_grid, where):

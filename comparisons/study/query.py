@@ -5,7 +5,7 @@ from math import isclose
 import numpy as np
 import pyarrow as pa
 
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 
 
 def rows(table, part, where=None):
@@ -21,7 +21,7 @@ def rows(table, part, where=None):
     where = where or {}
     parts = sorted(set(table["part"].to_pylist()))
     if part not in parts:
-        raise InputError(f"there is no part {part!r}. There are {', '.join(parts)}.")
+        raise unknown("part", part, parts)
     for name in where:
         require(table, name)
     chosen = table.filter(pa.array([value == part for value in table["part"].to_pylist()]))
@@ -44,9 +44,7 @@ def require(table, column):
         Listing the columns, when there is not.
     """
     if column not in table.column_names:
-        raise InputError(
-            f"there is no column {column!r}. There are {', '.join(table.column_names)}."
-        )
+        raise unknown("column", column, table.column_names)
 
 
 def unit(table, column):
@@ -87,10 +85,6 @@ class Facts:
     def at_largest(self, part, column, parameter, **where):
         """Return a parameter's value where a column is largest."""
         return max(rows(self._table, part, where), key=lambda row: row[column])[parameter]
-
-    def at_smallest(self, part, column, parameter, **where):
-        """Return a parameter's value where a column is smallest."""
-        return min(rows(self._table, part, where), key=lambda row: row[column])[parameter]
 
     def count(self, part):
         """Return the number of points of a part that have a result."""

@@ -4,16 +4,21 @@ Every finished block is a file of its own at once, under a name made out of all 
 So a run that ends early loses nothing, and the next one repeats nothing.
 """
 
-import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from comparisons import atomic
-from comparisons.study import dataset, point, processes
+from comparisons.pool import Pool, Task, cores
+from comparisons.store import Entry
+from comparisons.study import dataset, point
 from comparisons.study.point import Block
+from heuristic.errors import LostProcessError
 
 POINTS = "points"
 """Folder of the finished blocks."""
+
+WORTH_A_PROCESS = 16
+"""Blocks below which the start of a process costs more than it saves."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,7 @@ def run(study, folder, spread=None, progress=None):
         Where finished blocks are kept, in ``points/``.
     spread : callable, optional
         Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
-        (:mod:`comparisons.study.processes`, :mod:`comparisons.study.cluster`). All are done in this
+        (:func:`processes`, :mod:`comparisons.study.cluster`). All are done in this
         process where it is not given.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
@@ -58,21 +63,57 @@ def run(study, folder, spread=None, progress=None):
     kept = Path(folder) / POINTS
     kept.mkdir(parents=True, exist_ok=True)
     blocks = [block for part in study.parts for block in point.blocks(part)]
-    found = {block.key: _read(kept / f"{block.key}.json") for block in blocks}
-    found = {key: rows for key, rows in found.items() if rows and not _failed(rows)}
+    entries = {block.key: Entry(kept / f"{block.key}.json", block.key) for block in blocks}
+    stored = {key: (entry.load() or {}).get("rows") for key, entry in entries.items()}
+    found = {key: rows for key, rows in stored.items() if rows and not _failed(rows)}
     # Parts may share points; these are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
     at_hand = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
     report("points", done, total)
-    for block, rows in (spread or processes.over(1))(left):
-        _write(kept / f"{block.key}.json", rows)
+    for block, rows in (spread or processes(1))(left):
+        entries[block.key].save({"rows": rows})
         found[block.key] = rows
         done += len(rows)
         report("points", done, total)
     rows = [row for block in blocks for row in _named(block, found[block.key])]
     return Outcome(dataset.table(study, rows), done - at_hand, at_hand, _failed(rows))
+
+
+def processes(count):
+    """Return what spreads blocks over so many processes of this machine, as `run` takes it.
+
+    A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
+    several processes keep all of them busy.
+
+    Raises
+    ------
+    LostProcessError
+        While it runs, when one of the processes ends.
+    """
+
+    def spread(blocks):
+        workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
+        tasks = [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
+        threads = partial(_set_threads, max(1, cores() // workers))
+        with Pool(0 if workers == 1 else workers, threads) as pool:
+            for task, rows in pool.each(tasks):
+                try:
+                    yield task.arguments[0], rows.result()
+                except LostProcessError as error:
+                    raise LostProcessError(
+                        f"{error} All finished points are kept; run the same command again, and it"
+                        " goes on from there."
+                    ) from error
+
+    return spread
+
+
+def _set_threads(number):
+    import drjit as dr
+
+    dr.set_thread_count(number)
 
 
 def _named(block: Block, rows):
@@ -85,15 +126,3 @@ def _named(block: Block, rows):
 
 def _failed(rows):
     return sum(row["error"] is not None for row in rows)
-
-
-def _read(path):
-    """Return the rows of a finished block; None where there are none, or none that can be read."""
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-
-
-def _write(path, rows):
-    atomic.write(path, json.dumps(rows, ensure_ascii=False))

@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from heuristic import light
 from heuristic.backend import VARIANTS
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.plugins import mapped
 
 Parser = mi.parser
@@ -35,9 +35,7 @@ def set_variant(variant):
         For any other name.
     """
     if variant not in VARIANTS:
-        raise InputError(
-            f"variant {variant!r} is not supported: choose one of {', '.join(VARIANTS)}."
-        )
+        raise unknown("variant", variant, VARIANTS)
     mi.set_variant(variant)
 
 

@@ -22,7 +22,7 @@ are viridis and magma, whose lightness rises steadily, so that they survive with
 from collections import defaultdict
 
 from comparisons.study import query
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 
 SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
 KEYS = {"name", "title", "part", "kind", "x", "y", "values", "series", "where", "rule", "log"}
@@ -62,18 +62,19 @@ def check(figure, study):
     where = f"figure {figure.get('name')!r}"
     kind = figure.get("kind")
     if kind not in NEEDED:
-        raise InputError(f"{where}: kind = {kind!r}: choose one of {', '.join(NEEDED)}.")
-    missing, unknown = NEEDED[kind] - set(figure), set(figure) - KEYS
-    if missing or unknown:
-        wrong = f"lacks {', '.join(sorted(missing))}" if missing else f"has {', '.join(unknown)}"
+        raise unknown(f"{where}: kind =", kind, NEEDED)
+    missing, surplus = NEEDED[kind] - set(figure), set(figure) - KEYS
+    if missing or surplus:
+        verb, names = ("lacks", missing) if missing else ("has", surplus)
+        wrong = f"{verb} {', '.join(sorted(names))}"
         raise InputError(f"{where} {wrong}. It needs {', '.join(sorted(NEEDED[kind]))}.")
     parts = {part.name: part for part in study.parts}
     if figure["part"] not in parts:
-        raise InputError(f"{where}: part = {figure['part']!r}: there are {', '.join(parts)}.")
+        raise unknown(f"{where}: part =", figure["part"], parts)
     spans = parts[figure["part"]].spans
     for name in (figure["x"], figure.get("y"), figure.get("series"), *figure.get("where", ())):
         if name is not None and name not in spans:
-            raise InputError(f"{where}: {name!r} is no parameter: there are {', '.join(spans)}.")
+            raise unknown(f"{where}: parameter", name, spans)
 
 
 def default_figures(study):

@@ -11,7 +11,7 @@ from comparisons.case import Request, open_case
 from comparisons.check import check as checking
 from comparisons.check.measurement import PASSES
 from comparisons.check.moved import LEVEL
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from reports.ci import baselines, checks
 from reports.ci import lines as lines
 
@@ -115,7 +115,7 @@ class Fotismos:
         case = checking.made_small(self._open(self._found(scene), options, "scene"))
         found = checking.measure_scene(case.source, case.options).measurement
         if metric not in found.metrics:
-            raise InputError(f"metric {metric!r}: choose one of {', '.join(found.metrics)}.")
+            raise unknown("metric", metric, found.metrics)
         measured = found.metrics[metric]
         return Departure(
             case.name, metric, measured.value, measured.error, measured.noise_floor, PASSES

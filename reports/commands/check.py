@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from comparisons import atomic
 from heuristic.errors import InputError
 from reports.asked import jobs
 from reports.terminal import verbosity
@@ -210,6 +211,6 @@ def _report_errors(results):
 def _write(path, content):
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        atomic.write(path, content)
     except OSError as error:
         raise InputError(f"--junit {path}: {error.strerror or error}.") from error

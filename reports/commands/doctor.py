@@ -1,8 +1,14 @@
-"""``fotismos doctor``: check the installation."""
+"""``fotismos doctor``: what the installation consists of, and whether it renders."""
+
+import platform
+from importlib import metadata
 
 import click
 
-from reports.asked import jobs
+from heuristic import backend
+from heuristic.version import __version__
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
 
 
 @click.command()
@@ -13,7 +19,38 @@ def doctor():
     Examples:
       fotismos doctor
     """  # noqa: D301 click reads the \b as: keep these lines
-    from reports.doctor import examine
-
-    for line in examine(jobs.VARIANTS):
+    for line in examine(backend.VARIANTS):
         click.echo(line)
+
+
+def examine(variants):
+    """Yield lines on versions, LLVM and a test rendering for each variant.
+
+    Raises
+    ------
+    InstallationError
+        When Dr.Jit found no LLVM that it can work with.
+    """
+    yield f"fotismos        {__version__}"
+    yield f"python          {platform.python_version()} on {platform.platform()}"
+    for library in LIBRARIES:
+        yield f"{library:<15} {metadata.version(library)}"
+    info = backend.check()
+    version = ".".join(map(str, info.version))
+    yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
+    if info.note:
+        yield f"                {info.note}"
+    for variant in variants:
+        yield f"{variant:<15} {_render(variant)}"
+
+
+def _render(variant):
+    """Render a small figure in a variant, and say how that went."""
+    from reference.scene.graph import set_variant
+
+    set_variant(variant)
+    from comparisons.compare import Options, compare
+    from comparisons.gallery.builtin import builtin
+
+    compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
+    return "renders"

@@ -59,8 +59,8 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
     jobs.check_installation()
+    from comparisons.pool import cores
     from comparisons.study import cluster, design, running
-    from comparisons.study import processes as pool
     from reports.run import output as files
     from reports.run import study_files
     from reports.terminal import progress
@@ -74,7 +74,7 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     elif workers:
         spreading = cluster.local(workers)
     else:
-        spreading = nullcontext(pool.over(processes or pool.cores()))
+        spreading = nullcontext(running.processes(processes or cores()))
     with spreading as spread, progress.shown("points") as bar:
         outcome = running.run(wanted, folder, spread, bar.of(wanted.name))
     places = list(study_files.write(wanted, outcome, folder, page))

@@ -7,14 +7,13 @@ which one of them may kill; a single one is compared in this process.
 
 import shlex
 import sys
-from contextlib import nullcontext
 
+from comparisons.pool import Pool, Task
 from heuristic.errors import FotismosError
 from reports.asked import jobs
 from reports.run import single
 from reports.run.single import Wanted
 from reports.run.stages import Run
-from reports.run.worker import Worker
 from reports.terminal import verbosity
 
 
@@ -35,7 +34,6 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
 
     ``shown`` is what else the page shows.
     """
-    from reports.page import hard_cases
     from reports.run import output
 
     places = _places(names)
@@ -50,6 +48,7 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
         raise
     if with_hard_cases:
         from comparisons.hard import collection
+        from reports.page import hard_cases
 
         with run.timing("hard cases"):
             shown["hard_cases"] = hard_cases.view(collection.collect())
@@ -77,23 +76,26 @@ def _compare(run, places, folder, wanted, views, failures):
     from reports.terminal import progress
 
     alone = len(places) == 1
-    with progress.shown() as bar, nullcontext(single) if alone else Worker() as worker:
-        for place, name in places.items():
+    with progress.shown() as bar, Pool(0 if alone else 1, single.load) as pool:
+        tasks = (
+            Task(place, single.compare, (name, folder, place, wanted), bar.of(name_of(name)))
+            for place, name in places.items()
+        )
+        for task, outcome in pool.each(tasks):
             try:
-                done = worker.compare(name, folder, place, wanted, bar.of(name_of(name)))
+                done = outcome.result()
             except FotismosError as error:
                 if alone:
                     raise
-                failures[place] = error
+                failures[task.name] = error
                 continue
-            views[place] = done.view
+            views[task.name] = done.view
             run.did(done)
             verbosity.remark(progress.details(done.view["record"]))
 
 
 def _write(run, folder, views, failures, with_figures, shown):
     """Write what is about all scenes, and say what came of them."""
-    from reports.charts import figures
     from reports.run import output
     from reports.terminal import progress, tables
 
@@ -111,6 +113,8 @@ def _write(run, folder, views, failures, with_figures, shown):
         records = [view["record"] for view in views.values()]
         tables.write(folder / output.TABLES, records)
         if with_figures:
+            from reports.charts import figures
+
             figures.write_run(folder / output.FIGURES, records)
         verbosity.tell(progress.summary(records))
     verbosity.tell_where(folder / "index.html")

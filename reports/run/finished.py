@@ -1,16 +1,15 @@
 """Finished scenes, found again in their files instead of rendered once more.
 
 ``view.json``, in the folder of a scene's results, holds what the page shows of the scene and the
-key of all that it depends on. It is written with the other results, whole or not at all.
+key of all that it depends on. It is written with the other results, atomically.
 """
 
-import json
 from base64 import b64decode, b64encode
 from dataclasses import asdict
-from pathlib import Path
 
 from markupsafe import Markup
 
+from comparisons.store import Entry
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded, Plane
 
@@ -28,14 +27,13 @@ def key_of(passes, options, with_cost, figures):
     return f"{passes} noise={options.noise} cost={with_cost} figures={figures}"
 
 
-def text(view, key):
-    """Return the content of the file for a view, as `reports.run.output.write_scene` returns it."""
+def save(place, key, view):
+    """Write the file of a view, which `reports.run.output.write_scene` returns, to a folder."""
     study = view["cost"]
-    return json.dumps(
+    _entry(place, key).save(
         view
         | {name: _encoded(view[name]) for name in PICTURES}
         | {
-            "key": key,
             "embedded": asdict(view["embedded"]),
             "charts": [asdict(figure) for figure in view["charts"]],
             "cost": study and study | {"images": _encoded(study["images"])},
@@ -45,10 +43,11 @@ def text(view, key):
 
 def load(place, key):
     """Return the view of the results in a folder; None where they are not those of the key."""
+    view = _entry(place, key).load()
+    if view is None:
+        return None
     try:
-        view = json.loads((place / FILE).read_text(encoding="utf-8"))
-        linked = [place.parent / file for file in view["files"].values()]
-        if view.pop("key") != key or not all(map(Path.is_file, linked)):
+        if not all((place.parent / file).is_file() for file in view["files"].values()):
             return None
         study = view["cost"]
         return (
@@ -62,8 +61,12 @@ def load(place, key):
                 "cost": study and study | {"images": _decoded(study["images"])},
             }
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None  # nothing there, or nothing of ours
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None  # not a view
+
+
+def _entry(place, key):
+    return Entry(place / FILE, key)
 
 
 def _embedded(given):

@@ -7,13 +7,11 @@ run succeeds.
 
 import hashlib
 import json
-import zipfile
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from comparisons import atomic
+from comparisons.store import Entry
 
 INTERVAL_S = 10.0
 """Seconds from one writing to the next, at least: short runs write nothing."""
@@ -22,46 +20,30 @@ SHARE = 0.05
 """Of the time, at most, that writing may take."""
 
 
-class KeptPasses:
+class KeptPasses(Entry):
     """The kept passes of one scene.
 
     Parameters
     ----------
-    path
-        The file.
-    key
-        What the passes depend on (:func:`key_of`); a file with another key is not used.
+    path, key
+        As for :class:`comparisons.store.Entry`; :func:`key_of` makes the key.
     interval
         Seconds between writings, at least.
     """
 
     def __init__(self, path, key, interval=INTERVAL_S):
-        self.path, self.key, self.interval = Path(path), key, interval
+        super().__init__(path, key)
+        self.interval = interval
         self._next = perf_counter() + interval
-
-    def load(self):
-        """Return the state that was kept, a dictionary of arrays; None where there is none."""
-        try:
-            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-                if str(file["key"]) != self.key:
-                    return None
-                return {name: file[name] for name in file.files if name != "key"}
-        except (FileNotFoundError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
-            return None  # nothing kept, or nothing of ours
 
     def offer(self, count, state):
         """Write ``state()`` if it is time to; ``count`` is the number of passes that it holds."""
         begin = perf_counter()
         if begin < self._next:
             return
-        with atomic.replacing(self.path) as partial, partial.open("wb") as file:
-            np.savez(file, key=np.array(self.key), **state())
+        self.save(state())
         end = perf_counter()
         self._next = end + max(self.interval, (end - begin) / SHARE)
-
-    def remove(self):
-        """Delete the file."""
-        self.path.unlink(missing_ok=True)
 
 
 def of_scene(folder, name, case):

@@ -8,7 +8,7 @@ from comparisons.departure.metrics import METRICS
 from heuristic.errors import InputError
 from reports.files import exr, images, ownership
 from reports.page import embedding, page
-from reports.run import cost_files, finished
+from reports.run import finished
 
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
@@ -67,6 +67,8 @@ def write_scene(folder, name, comparison, study=None, key=None):
         What the page needs of it: record, pictures and links.
     """
     data, shown = comparison.data, comparison.images
+    if study:
+        from reports.run import cost_files
     maps = {key: shown.maps[key] for key in (*METRICS, "log2_luminance")}
     exposure = data["viewing"]["exposure"]
 
@@ -105,7 +107,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         for file, content in priced.items():
             (place / file).write_bytes(content)
         if key is not None:
-            (place / finished.FILE).write_text(finished.text(view, key), encoding="utf-8")
+            finished.save(place, key, view)
     return view
 
 

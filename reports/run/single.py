@@ -51,7 +51,6 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     """
     from comparisons.case import open_case
     from comparisons.compare import compare
-    from reports.charts import figures as prints
     from reports.run import finished, kept, output
 
     done = Done()
@@ -72,7 +71,9 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
             study = _cost(case, progress, result.data)
     with done.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
-            prints.write_scene(folder / output.FIGURES, place, result)
+            from reports.charts import figures
+
+            figures.write_scene(folder / output.FIGURES, place, result)
         done.view = output.write_scene(folder, place, result, study, key)
     passes.remove()
     return done

@@ -8,6 +8,7 @@ import vl_convert
 
 from comparisons import atomic
 from comparisons.study import dataset, query
+from comparisons.study.running import POINTS
 from heuristic.errors import InputError
 from reports.charts import study_charts
 from reports.files import ownership
@@ -76,9 +77,9 @@ def require_free(study, folder):
         Naming what is not fotismos's.
     """
     ownership.require_free(folder / f"{study.name}.parquet")
-    for name in (FIGURES, study.POINTS):
+    for name in (FIGURES, POINTS):
         ownership.require_free_folder(folder / name)
-    ownership.folder(folder / study.POINTS)
+    ownership.folder(folder / POINTS)
 
 
 def drawn(study, table):

@@ -12,7 +12,8 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-from comparisons.study import cluster, design, point, processes  # isort: skip  it finds LLVM first
+from comparisons import pool  # isort: skip
+from comparisons.study import cluster, design, point, running  # isort: skip  it finds LLVM first
 
 import drjit as dr
 
@@ -31,7 +32,7 @@ def run(rounds):
     """Print a row for each way, and return the numbers."""
     (part,) = design.parse(STUDY.format(steps=POINTS // 4)).parts
     blocks = point.blocks(part)
-    cores = processes.cores()
+    cores = pool.cores()
     ways = [
         ("one process, 1 thread", 1, _here(1)),
         (f"one process, {cores} threads", cores, _here(cores)),
@@ -55,13 +56,13 @@ def run(rounds):
 def _here(threads):
     before = dr.thread_count()
     dr.set_thread_count(threads)
-    yield processes.over(1)
+    yield running.processes(1)
     dr.set_thread_count(before)
 
 
 @contextmanager
 def _pool(count):
-    yield processes.over(count)
+    yield running.processes(count)
 
 
 def _time(spread, blocks):

@@ -1,0 +1,237 @@
+"""Processes that work is given to, so that a task which kills its process takes no other along.
+
+A process does task after task, so that its start-up is paid once; a new one takes the place of one
+that died. Each leads a process group of its own, which ends as a whole: with the process, when its
+time is over, and when the process that asked for the work ends, in whatever way.
+"""
+
+import os
+import signal
+import subprocess
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from math import inf
+from multiprocessing import connection, get_context, parent_process
+from pathlib import Path
+from time import monotonic
+from typing import Any, NoReturn
+
+from heuristic.errors import FotismosError, LostProcessError
+
+FIRST_VICTIM = Path("/proc/self/oom_score_adj")
+"""Where Linux reads which process to end first when memory runs out."""
+
+GUARD = ("/bin/sh", "-c", "read _; kill -9 0")
+"""Ends its process group as soon as there is nobody left who could write to its input."""
+
+GRACE_S = 1.0
+"""Seconds in which a process may end by itself."""
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call of ``function(*arguments)``, both of which can be pickled.
+
+    ``name`` stands in messages. ``progress``, where it is given, is called in the process that
+    asked; the function takes what calls it as one more argument.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    progress: Callable[..., None] | None = None
+
+
+class Pool:
+    """Does tasks in processes of their own; a context that ends the processes.
+
+    Parameters
+    ----------
+    count
+        Processes at the same time, at most. With 0 the tasks are done in this process, one after
+        another and without a limit.
+    prepare
+        Called once in each new process.
+    limit_s
+        Seconds that a task may take, start-up included.
+    """
+
+    def __init__(
+        self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
+    ) -> None:
+        self._count, self._prepare, self._limit_s = count, prepare, limit_s
+        self._idle: list[_Worker] = []
+        self._busy: list[_Worker] = []
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        workers = self._idle + self._busy
+        for worker in workers:
+            worker.pipe.close()
+        until = monotonic() + GRACE_S
+        for worker in workers:
+            worker.end(max(0.0, until - monotonic()))
+
+    def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
+        """Do tasks; yields each as it is finished, with its outcome.
+
+        The outcome returns what the function returned, or raises the `FotismosError` that it
+        raised. In a process apart it raises a `LostProcessError` for any other exception, for a
+        process that ended, and when the time is over.
+        """
+        if self._count == 0:
+            for task in tasks:
+                yield task, _done_here(task)
+            return
+        waiting = iter(tasks)
+        self._fill(waiting)
+        while self._busy:
+            finished = self._finished()
+            self._fill(waiting)  # so that no process waits for what is done with the results
+            yield from finished
+
+    def _fill(self, waiting: Iterator[Task]) -> None:
+        """Give tasks to idle and new processes."""
+        self._idle = [worker for worker in self._idle if worker.process.is_alive()]
+        for task in islice(waiting, self._count - len(self._busy)):
+            worker = self._idle.pop() if self._idle else _Worker(self._prepare)
+            worker.give(task, self._limit_s)
+            self._busy.append(worker)
+
+    def _finished(self) -> list[tuple[Task, Future[Any]]]:
+        """Wait for messages, or the end of somebody's time; return the tasks that are over."""
+        first = min(worker.deadline for worker in self._busy)
+        ready = connection.wait(
+            [worker.pipe for worker in self._busy],
+            None if first == inf else max(0.0, first - monotonic()),
+        )
+        for worker in self._busy:
+            if worker.pipe in ready:
+                worker.receive()
+            elif worker.deadline <= monotonic():
+                worker.lose(f"it took longer than {self._limit_s:g} s, and was ended.")
+        over = [worker for worker in self._busy if worker.outcome.done()]
+        self._busy = [worker for worker in self._busy if worker not in over]
+        self._idle += over
+        return [(worker.task, worker.outcome) for worker in over]
+
+
+class _Worker:
+    """One process, as seen from the one that asked."""
+
+    task: Task
+    outcome: Future[Any]
+    deadline: float
+
+    def __init__(self, prepare: Callable[[], object]) -> None:
+        context = get_context("spawn")  # a fork would share threads' locks with its parent
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.process.start()
+        theirs.close()  # so that the end of the process is the end of the pipe
+        self._send(prepare)
+
+    def give(self, task: Task, limit_s: float) -> None:
+        self.task, self.outcome, self.deadline = task, Future(), monotonic() + limit_s
+        self._send((task.name, task.function, task.arguments, task.progress is not None))
+
+    def receive(self) -> None:
+        """Take one message, which may be the outcome of the task."""
+        try:
+            kind, content = self.pipe.recv()
+        except (EOFError, OSError):
+            self.lose(_reason(self.end()))
+        else:
+            if kind == "progress":
+                self.task.progress(*content)
+            else:
+                getattr(self.outcome, kind)(content)
+
+    def lose(self, reason: str) -> None:
+        """End the process, and say why as the outcome of its task."""
+        self.end()
+        self.outcome.set_exception(LostProcessError(f"{self.task.name}: {reason}"))
+
+    def end(self, grace_s: float = GRACE_S) -> int | None:
+        """End the process with its group, and return its exit code."""
+        self.pipe.close()
+        self.process.join(grace_s)
+        with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()
+        self.process.join()
+        return self.process.exitcode
+
+    def _send(self, message: object) -> None:
+        with suppress(ConnectionError):  # a process that is gone is noticed in `receive`
+            self.pipe.send(message)
+
+
+def _done_here(task: Task) -> Future[Any]:
+    outcome: Future[Any] = Future()
+    try:
+        outcome.set_result(task.function(*task.arguments, *filter(None, [task.progress])))
+    except Exception as error:
+        outcome.set_exception(error)
+    return outcome
+
+
+def _reason(code: int | None) -> str:
+    """Say what is known about a process that ended."""
+    if code == -signal.SIGKILL:
+        return "its process was killed (SIGKILL), most often by the system when memory runs out."
+    if code is not None and code < 0:
+        return f"its process died of {signal.Signals(-code).name} in native code."
+    return f"its process ended with exit code {code}."
+
+
+def _work(pipe: Any) -> NoReturn:
+    """Do what comes through the pipe, until it is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
+    os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
+    os.setpgid(0, 0)
+    guard = subprocess.Popen(GUARD, stdin=parent_process().sentinel)  # noqa: F841  lives as long
+    if FIRST_VICTIM.exists():
+        FIRST_VICTIM.write_text("1000")
+    with suppress(EOFError, ConnectionError):
+        pipe.recv()()  # prepares
+        while True:
+            _tell(pipe, *_answer(pipe, *pipe.recv()))
+    os._exit(0)  # nobody is listening any more
+
+
+def _answer(
+    pipe: Any, name: str, function: Callable[..., Any], arguments: tuple, with_progress: bool
+) -> tuple[str, Any]:
+    """Return how a task ended: the method of its outcome to call, and the argument."""
+
+    def progress(*told: Any) -> None:
+        _tell(pipe, "progress", told)
+
+    try:
+        return "set_result", function(*arguments, *([progress] if with_progress else []))
+    except FotismosError as error:
+        return "set_exception", error
+    except Exception as error:  # whatever a task brings about is its own failure
+        traceback.print_exc()
+        return "set_exception", LostProcessError(f"{name}: {type(error).__name__}: {error}")
+
+
+def _tell(pipe: Any, kind: str, content: Any) -> None:
+    try:
+        pipe.send((kind, content))
+    except ConnectionError:
+        os._exit(0)

@@ -1,0 +1,39 @@
+"""What a comparison imports: the rooms that it passes through, and no others."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+OURS = ("heuristic", "reference", "comparisons", "reports")
+"""The packages of the project."""
+
+ELSEWHERE = ("hard", "fit", "study", "check")
+"""Folders of comparisons that comparing two images has no need of."""
+
+MOST = 105
+"""Modules and packages of ours."""
+
+COMPARE = """
+import sys
+from reports import cli
+sys.argv = ["fotismos", "compare", "fig-8-9", "--resolution", "16x16", "-o", sys.argv[1], "-q"]
+cli.main()
+print(*sorted(sys.modules))
+"""
+
+
+def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", COMPARE, tmp_path / "out"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    modules = [name for name in done.stdout.split() if name.partition(".")[0] in OURS]
+    assert "comparisons.compare" in modules
+    for folder in ELSEWHERE:
+        assert [name for name in modules if name.startswith(f"comparisons.{folder}")] == []
+    assert len(modules) <= MOST, "\n".join(modules)

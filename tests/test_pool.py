@@ -1,0 +1,183 @@
+"""Processes that work is given to: deaths, time limits, process groups, and what is told."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from comparisons.pool import Pool, Task
+from heuristic.errors import InputError, LostProcessError
+
+ROOT = Path(__file__).parents[1]
+
+
+def add(*numbers):
+    return sum(numbers)
+
+
+def process():
+    return os.getpid()
+
+
+def count(total, progress):
+    for done in range(total):
+        progress("counting", done, total)
+    return total
+
+
+def die_of(number):
+    os.kill(os.getpid(), number)
+
+
+def refuse(message):
+    raise InputError(message)
+
+
+def note_once(path):
+    with path.open("a") as file:
+        file.write("once\n")
+
+
+def leave_behind(path):
+    """Start a process that outlives this one, and never return."""
+    child = subprocess.Popen(["/bin/sh", "-c", "sleep 1000; true"])
+    path.write_text(f"{os.getpid()} {child.pid}")
+    time.sleep(1000)
+
+
+def is_alive(pid):
+    """Tell whether a process runs; one that ended and was not asked for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def ends(*pids):
+    until = time.monotonic() + 10
+    while any(map(is_alive, pids)) and time.monotonic() < until:
+        time.sleep(0.02)
+    return not any(map(is_alive, pids))
+
+
+def do(pool, *tasks):
+    """Return what came of each task: a value, or what it raised."""
+    found = {}
+    for task, outcome in pool.each(tasks):
+        found[task.name] = outcome.exception() or outcome.result()
+    return found
+
+
+@pytest.mark.parametrize("processes", [0, 1, 2])
+def test_tasks_are_done_and_report_their_progress(processes):
+    told = []
+    with Pool(processes) as pool:
+        found = do(
+            pool,
+            Task("sum", add, (1, 2)),
+            Task("count", count, (3,), lambda *words: told.append(words)),
+            Task("wrong", refuse, ("no such thing",)),
+        )
+    assert (found["sum"], found["count"]) == (3, 3)
+    assert told == [("counting", done, 3) for done in range(3)]
+    assert isinstance(found["wrong"], InputError)
+    assert str(found["wrong"]) == "no such thing"
+
+
+def test_one_process_does_task_after_task_once_it_is_prepared(tmp_path):
+    path = tmp_path / "prepared"
+    with Pool(1, partial(note_once, path)) as pool:
+        found = do(pool, *(Task(name, process, ()) for name in "abc"))
+        found |= do(pool, Task("d", process, ()))
+    assert len(set(found.values())) == 1
+    assert os.getpid() not in found.values()
+    assert path.read_text() == "once\n"
+
+
+def test_a_task_that_kills_its_process_takes_no_other_along(capfd):
+    with Pool(1) as pool:
+        found = do(
+            pool,
+            Task("aborting", die_of, (signal.SIGABRT,)),
+            Task("killed", die_of, (signal.SIGKILL,)),
+            Task("leaving", os._exit, (7,)),
+            Task("dividing", divmod, (1, 0)),
+            Task("sum", add, (1, 2)),
+        )
+    assert found.pop("sum") == 3
+    assert all(isinstance(error, LostProcessError) for error in found.values())
+    messages = {name: str(error) for name, error in found.items()}
+    assert messages["aborting"] == "aborting: its process died of SIGABRT in native code."
+    assert messages["killed"].startswith("killed: its process was killed (SIGKILL)")
+    assert messages["leaving"] == "leaving: its process ended with exit code 7."
+    assert messages["dividing"].startswith("dividing: ZeroDivisionError: ")
+    assert "Traceback" in capfd.readouterr().err
+
+
+def test_an_idle_process_that_died_is_replaced():
+    with Pool(1) as pool:
+        pid = do(pool, Task("a", process, ()))["a"]
+        os.kill(pid, signal.SIGKILL)
+        assert ends(pid)
+        assert do(pool, Task("b", process, ()))["b"] != pid
+
+
+def test_a_task_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
+    with Pool(2, limit_s=3.0) as pool:
+        found = do(pool, Task("slow", leave_behind, (tmp_path / "pids",)), Task("sum", add, (1, 2)))
+        pids = (tmp_path / "pids").read_text().split()
+        assert ends(*pids)
+    assert found["sum"] == 3
+    assert str(found["slow"]) == "slow: it took longer than 3 s, and was ended."
+
+
+def test_what_is_under_way_ends_with_the_pool(tmp_path):
+    path = tmp_path / "pids"
+
+    def tasks():
+        yield Task("slow", leave_behind, (path,))
+        while not path.exists() or len(path.read_text().split()) < 2:
+            time.sleep(0.02)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), Pool(2) as pool:
+        list(pool.each(tasks()))
+    assert ends(*path.read_text().split())
+
+
+PARENT = """
+import sys
+from pathlib import Path
+from comparisons.pool import Pool, Task
+from tests.test_pool import leave_behind
+
+if __name__ == "__main__":
+    with Pool(1) as pool:
+        list(pool.each([Task("slow", leave_behind, (Path(sys.argv[1]),))]))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_process_group_ends_with_the_process_that_asked(number, tmp_path):
+    (tmp_path / "parent.py").write_text(PARENT)
+    path = tmp_path / "pids"
+    parent = subprocess.Popen(
+        [sys.executable, tmp_path / "parent.py", path],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        while not path.exists() or len(path.read_text().split()) < 2:
+            assert parent.poll() is None
+            time.sleep(0.02)
+        parent.send_signal(number)
+        parent.wait(10)
+        assert ends(*path.read_text().split())
+    finally:
+        parent.kill()
+        parent.wait()
