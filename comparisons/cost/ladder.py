@@ -7,6 +7,7 @@ that keeps their names.
 
 from dataclasses import dataclass, replace
 
+from heuristic.heuristics import PHONG, Heuristic
 from heuristic.interpolation import Interpolation
 from reference.planning.effects import Effect
 
@@ -125,6 +126,13 @@ def ladder(scope, interpolations=tuple(Interpolation), depths=DEPTHS):
         monte_carlo = not distinct.is_kernel and (scope.random or distinct.max_depth != 2)
         rungs[distinct] = Rung((*names, name), distinct, monte_carlo)
     return tuple(rungs.values())
+
+
+def shaded_by(heuristic: Heuristic, rung: Rung) -> Rung:
+    """Return a rung of the kernel with a name that tells of a heuristic other than Phong."""
+    if heuristic is PHONG or not rung.method.is_kernel:
+        return rung
+    return replace(rung, names=(f"{rung.name}: {heuristic.label}", *rung.names))
 
 
 def _methods(max_depth, interpolations, depths):

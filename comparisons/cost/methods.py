@@ -3,10 +3,11 @@
 from dataclasses import replace
 from functools import cache
 
-from comparisons.cost.ladder import DEPTHS, ladder, scope
+from comparisons.cost.ladder import DEPTHS, ladder, scope, shaded_by
 from comparisons.cost.pairs import Pairs
 from comparisons.effects.between import OF_BSDFS, Between
 from heuristic.errors import InputError
+from heuristic.heuristics import named
 from heuristic.interpolation import Interpolation
 from reference.pairing.halves import INTEGRATOR, with_sampler
 from reference.planning.effects import Effect
@@ -35,7 +36,8 @@ class Methods:
         self.scope = scope(
             ready.plan, ready.pair, self.between.differences, self.between.has_occlusion
         )
-        self.rungs = ladder(self.scope, self._interpolations(), depths)
+        rungs = ladder(self.scope, self._interpolations(), depths)
+        self.rungs = tuple(shaded_by(named(options.heuristic), rung) for rung in rungs)
         self._asked_for = options.interpolation
         self._kernel_scene = cache(self._make_kernel_scene)
 
