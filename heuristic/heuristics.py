@@ -60,10 +60,8 @@ class Parameter:
     def checked(self, value: float) -> float:
         """Return a value that lies within the bounds; raise InputError for any other."""
         if not (isinstance(value, Real) and self.low <= value <= self.high):
-            raise InputError(
-                f"{self.name} = {value!r} is not allowed: give a number from {self.low:g} to"
-                f" {self.high:g}."
-            )
+            allowed = f"{self.low:g} to {self.high:g}"
+            raise InputError(f"{self.name} = {value!r} is not allowed: give one from {allowed}.")
         return float(value)
 
 
@@ -111,12 +109,9 @@ class Heuristic:
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
             )
-        unknown = sorted(set(self.needs) - set(INPUTS))
-        if unknown:
-            raise InputError(
-                f"heuristic {self.name} needs {', '.join(unknown)}: choose among"
-                f" {', '.join(INPUTS)}."
-            )
+        if unknown := ", ".join(sorted(set(self.needs) - set(INPUTS))):
+            known = ", ".join(INPUTS)
+            raise InputError(f"heuristic {self.name} needs {unknown}: choose among {known}.")
         names = [parameter.name for parameter in self.parameters]
         if len(set(names)) < len(names):
             raise InputError(f"heuristic {self.name} has two parameters of one name: {names}.")
@@ -132,10 +127,10 @@ class Heuristic:
         return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
 
     def evaluate(
-        self, given: Given, uv: Array, parameters: dict[str, Array], prepared: Any = None
+        self, given: Given, uv: Array, parameters: dict[str, Array], prepared: Any
     ) -> Array:
         """Return the colour at points; the arguments are what :class:`Point` hands on."""
-        return self.shade(Point(given, self.needs, SimpleNamespace(**parameters), prepared, uv))
+        return self.shade(Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared))
 
 
 _declared: dict[str, Heuristic] = {}

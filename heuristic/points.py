@@ -50,37 +50,22 @@ class LightAtPoint:
     toward: Array
     distance: Array
     intensity: Array
-    _ray: Callable[[Array, Array], Array] | None = None
+    _point: "Point"
 
     def visible(self) -> Array:
-        """Return the mask of points that the light reaches, by a shadow ray.
-
-        Raises
-        ------
-        InputError
-            When the heuristic does not declare that it needs ``visible``.
-        """
-        if self._ray is None:
-            raise _undeclared("visible")
-        return self._ray(self.toward, self.distance)
+        """Return the mask of points that the light reaches, by a shadow ray, which is a need."""
+        self._point.require("visible")
+        return self._point.given.visible(self.toward, self.distance)
 
 
 def _input(read: Callable[["Point"], Any]) -> cached_property:
     """Make an attribute of :class:`Point` that a heuristic can read if it declares to need it."""
 
     def checked(point: "Point") -> Any:
-        if read.__name__ not in point.needs:
-            raise _undeclared(read.__name__)
+        point.require(read.__name__)
         return read(point)
 
-    checked.__doc__ = read.__doc__
     return cached_property(checked)
-
-
-def _undeclared(name: str) -> InputError:
-    return InputError(
-        f"The heuristic reads {name!r}, which it does not declare: add it to its needs."
-    )
 
 
 @dataclass(frozen=True)
@@ -93,13 +78,18 @@ class Point:
         The heuristic's parameters by name, as attributes.
     prepared
         What the heuristic's ``prepare`` returned for the scene; None without it.
+
+    Raises
+    ------
+    InputError
+        When the heuristic reads what is not among its needs.
     """
 
-    given: Given
     needs: frozenset[str]
+    given: Given
+    _uv: Array
     parameters: SimpleNamespace
     prepared: Any = None
-    _uv: Array = None
 
     @_input
     def position(self) -> Array:
@@ -149,9 +139,11 @@ class Point:
 
     def _light(self, light: Any) -> LightAtPoint:
         toward, intensity, distance = light.illuminate(self.given.position)
-        ray = self.given.visible
-        if "visible" in self.needs:
-            return LightAtPoint(toward, distance, intensity, ray)
-        if ray is not None:
-            intensity = dr.select(ray(toward, distance), intensity, 0)
-        return LightAtPoint(toward, distance, intensity)
+        if self.given.visible is not None and "visible" not in self.needs:
+            intensity = dr.select(self.given.visible(toward, distance), intensity, 0)
+        return LightAtPoint(toward, distance, intensity, self)
+
+    def require(self, name: str) -> None:
+        """Raise InputError for an input that is not among the heuristic's needs."""
+        if name not in self.needs:
+            raise InputError(f"{name!r} is read, but not declared: add it to what is needed.")

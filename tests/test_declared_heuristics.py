@@ -320,13 +320,13 @@ def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):
 def test_what_is_not_declared_to_be_needed_cannot_be_read(rgb, declared, shade, missing):
     declare(Heuristic("hasty", shade, needs={"position", "lights"}))
     loaded = mi.load_dict(checks.with_film(scene("hasty"), 8, 1), optimize=False)
-    with pytest.raises(InputError, match=f"'{missing}', which it does not declare"):
+    with pytest.raises(InputError, match=f"'{missing}' is read, but not declared"):
         Renderer(loaded, None, 1, "image").render(0)
 
 
 def test_the_material_is_that_of_a_plain_lobe(rgb):
     given = heuristics.Given(0, 0, 0, Material(k_s=0.5, n=10, normalised=True), [])
-    point = Point(given, frozenset({"material"}), SimpleNamespace())
+    point = Point(frozenset({"material"}), given, None, SimpleNamespace())
     assert (point.material.k_s, point.material.normalised) == (3.0, False)
 
 
@@ -362,7 +362,7 @@ def test_an_unknown_name_lists_what_there_is(name):
         (lambda: Heuristic("a", toon, parameters=(Parameter("x", 1, 0, 1),) * 2), "of one name"),
         (lambda: Parameter("ambient", 0, 0, 1), "'ambient' is not allowed"),
         (lambda: Parameter("two words", 0, 0, 1), "'two words' is not allowed"),
-        (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give a number from 0 to 1"),
+        (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give one from 0 to 1"),
         (lambda: declare(Heuristic("phong", toon)), "phong is declared already"),
     ],
 )
@@ -373,7 +373,7 @@ def test_a_wrong_declaration_is_refused(make, message):
 
 @pytest.mark.parametrize("value", [1.5, -0.1, float("nan")])
 def test_a_parameter_out_of_bounds_is_refused(rgb, declared, value):
-    with pytest.raises(Exception, match=r"wrap = .* is not allowed: give a number from 0 to 1"):
+    with pytest.raises(Exception, match=r"wrap = .* is not allowed: give one from 0 to 1"):
         mi.load_dict({"type": "heuristic", "model": "wrapped", "wrap": value})
 
 

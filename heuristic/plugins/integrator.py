@@ -113,12 +113,10 @@ def define():
             )
 
         def prepared(self, scene):
-            """Return what the heuristic prepares for a scene, as which its parts count.
-
-            A reference to the scene itself would be a cycle, which nothing frees.
-            """
+            """Return what the heuristic prepares for a scene."""
             if self.model.prepare is None:
                 return None
+            # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
             known, found = self._prepared
             if len(parts) != len(known) or not all(map(is_, parts, known)):

@@ -68,10 +68,7 @@ def define():
             self.parameters_changed()
 
         def material(self, si, active=True, prune=True, form=None):
-            """Return the coefficients at a surface interaction; absent terms are plain zeros.
-
-            A ``form`` takes the place of the material's own.
-            """
+            """Return the material at a surface interaction; absent terms are plain zeros."""
             coefficients = {
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else COEFFICIENTS)

@@ -12,13 +12,7 @@ from heuristic.plugins.phong import COEFFICIENTS
 class SceneMaterials:
     """The ``phong`` BSDFs of a scene, and what they are at a surface interaction.
 
-    Parameters
-    ----------
-    scene : mitsuba.Scene
-    prune
-        Leave out the terms that no material has.
-    form
-        Form of the lobe in place of the materials' own.
+    ``prune`` leaves out the terms that no material has; ``form`` is in place of the materials' own.
 
     Raises
     ------
