@@ -18,6 +18,7 @@ from heuristic.heuristics import BLINN, PHONG, Heuristic, Parameter, declare, na
 from heuristic.interpolation import Interpolation
 from heuristic.mesh_shading import shading_points
 from heuristic.points import Point
+from reference.pairing import halves
 from reference.rendering.renderer import Renderer
 from reports.run.kept import key_of
 from tests import checks, oracle
@@ -447,3 +448,19 @@ def test_a_fit_refuses_other_heuristics(run):
     code, _, said = run("fit", "fig-8-9", "--heuristic", "blinn")
     assert code == 2
     assert "heuristic blinn cannot be fitted" in " ".join(said.split())
+
+
+def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):
+    """The corners between the halves have the same lobe and the same shadows."""
+    source = SCENES["fig-8-9"].source()
+    props = {}
+    for name in ("phong", "blinn", "shadowed"):
+        graph = halves.pair(source, heuristic=name).heuristic
+        (sphere,) = (index for index in graph.nodes(halves.BSDF) if graph.plugin(index) == "phong")
+        integrator = graph.props(graph.nodes(halves.INTEGRATOR)[0])
+        props[name] = graph.props(sphere).get("form", "phong"), integrator["occlusion"]
+    assert props == {
+        "phong": ("phong", False),
+        "blinn": ("blinn", False),
+        "shadowed": ("phong", True),
+    }
