@@ -10,6 +10,7 @@ from typing import Any
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from heuristic.errors import InputError
+from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
 from reference.planning.planner import wants_spectra
@@ -40,6 +41,7 @@ class Request:
     spp: int | None = None
     noise: float | None = None
     resolution: tuple[int, int] | None = None
+    heuristic: str | None = None
     interpolation: str | None = None
     tessellation: int | None = None
     everything: bool = False
@@ -119,6 +121,7 @@ class Case:
             resolution=asked.resolution,
             convention=Convention(asked.pairing),
             heuristic_variant=asked.heuristic_variant,
+            heuristic=asked.heuristic or PHONG.name,
             interpolation=Interpolation(asked.interpolation or "phong"),
             tessellation=asked.tessellation,
             everything=asked.everything,

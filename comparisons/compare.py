@@ -138,6 +138,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         "scene": source.name,
         "variant": reference.variant,
         "heuristic_variant": heuristic.variant,
+        "heuristic": options.heuristic,
         "interpolation": options.interpolation.value,
         "seed": options.seed,
         "resolution": [width, height],
@@ -177,6 +178,7 @@ def _pair(source, options):
         options.tessellation,
         prune=not options.everything,
         sensor=options.sensor,
+        heuristic=options.heuristic,
     )
 
 

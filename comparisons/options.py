@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
+from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
@@ -27,6 +28,8 @@ class Options:
         ``(width, height)`` in place of the film's own.
     convention
         How roughplastic and phong are paired.
+    heuristic
+        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     interpolation, tessellation
         How the heuristic half shades its surfaces, and how fine the meshes for it are.
     viewing
@@ -42,8 +45,8 @@ class Options:
     Raises
     ------
     InputError
-        For fewer than 2 samples, a noise target that is not positive, a negative seed, or a
-        resolution below 1.
+        For fewer than 2 samples, a noise target that is not positive, a negative seed, a
+        resolution below 1, or a heuristic that is not declared.
     """
 
     seed: int = 0
@@ -51,6 +54,7 @@ class Options:
     noise: float | None = None
     resolution: tuple[int, int] | None = None
     convention: Convention = Convention.MATCHED
+    heuristic: str = heuristics.PHONG.name
     interpolation: Interpolation = Interpolation.PHONG
     tessellation: int | None = None
     viewing: Viewing = DEFAULT_VIEWING
@@ -59,6 +63,7 @@ class Options:
     sensor: int = 0
 
     def __post_init__(self):
+        heuristics.named(self.heuristic)
         if self.spp is not None and self.spp < 2:
             raise InputError(
                 f"spp = {self.spp} is not allowed: the noise needs at least 2 samples."

@@ -74,7 +74,15 @@ def shading_points(mesh, interpolation):
 
 
 def shade_mesh(
-    mesh, interpolation, viewer, material, lights, ambient=0, visible=None, twosided=False
+    mesh,
+    interpolation,
+    viewer,
+    material,
+    lights,
+    ambient=0,
+    visible=None,
+    twosided=False,
+    model=shade,
 ):
     """Evaluate the model (8.10) at a mesh's vertices or faces, and store it with the mesh.
 
@@ -88,6 +96,8 @@ def shade_mesh(
         As of :func:`heuristic.shade`; Dr.Jit values hold one entry, or one a vertex or face.
     twosided
         Store the values of the back, with reversed normals, beside those of the front.
+    model : callable
+        What shades, with the arguments of :func:`heuristic.shade`.
 
     Returns
     -------
@@ -105,7 +115,7 @@ def shade_mesh(
     components = 0
     for back in (False, True)[: 1 + twosided]:
         facing = -normal if back else normal
-        colour = shade(position, facing, view, material, lights, ambient, visible)
+        colour = model(position, facing, view, material, lights, ambient, visible)
         components = _store(mesh, interpolation, colour, back, dr.width(position))
     return components
 

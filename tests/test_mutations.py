@@ -12,7 +12,6 @@ import pytest
 
 from comparisons.gallery.builtin import SCENES
 from heuristic import DirectionalLight, Material, shading, terms
-from heuristic.plugins import integrator
 from tests import checks
 from tests.test_figures import everything
 
@@ -21,7 +20,6 @@ right = shading.shade
 
 def put_in_place(monkeypatch, wrong):
     monkeypatch.setattr(shading, "shade", wrong)
-    monkeypatch.setattr(integrator, "shade", wrong)
 
 
 def without_horizon(monkeypatch):

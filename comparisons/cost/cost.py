@@ -103,6 +103,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         "scene": source.name,
         "variant": ready.reference.variant,
         "heuristic_variant": methods.heuristic_variant,
+        "heuristic": options.heuristic,
         "interpolation": options.interpolation.value,
         "seed": options.seed,
         "resolution": [width, height],

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from comparisons.cost.rungs import DEPTHS, Family, Kernel, Physical, Rung, rungs
+from heuristic.heuristics import PHONG, Heuristic
 from heuristic.interpolation import Interpolation
 from reference.effects.effect import Effect
 from reference.effects.enumeration import EFFECTS
@@ -112,6 +113,15 @@ def ladder(
     return tuple(
         Distinct(merged, method, _is_random(method, scope)) for method, merged in found.items()
     )
+
+
+def shaded_by(heuristic: Heuristic, distinct: Distinct) -> Distinct:
+    """Return a method; of the kernel, with a name that tells of a heuristic other than Phong."""
+    if heuristic is PHONG or not isinstance(distinct.method, Kernel):
+        return distinct
+    first = distinct.rungs[0]
+    told = replace(first, name=f"{first.name}: {heuristic.label}")
+    return replace(distinct, rungs=(told, *distinct.rungs))
 
 
 def _is_possible(method, scope, interpolations):

@@ -5,12 +5,13 @@ from functools import cache
 import mitsuba as mi
 
 from comparisons.compare import Prepared
-from comparisons.cost.ladder import ladder, scope
+from comparisons.cost.ladder import ladder, scope, shaded_by
 from comparisons.cost.pairs import Pairs
 from comparisons.cost.rungs import DEPTHS, Kernel, Physical
 from comparisons.effects.between import Between
 from comparisons.options import Options
 from heuristic.errors import InputError
+from heuristic.heuristics import named
 from heuristic.interpolation import Interpolation
 from reference.effects.enumeration import EFFECTS
 from reference.pairing.halves import INTEGRATOR, with_sampler
@@ -44,7 +45,8 @@ class Methods:
         self.pairs = Pairs(source, options, ready)
         self.between = Between(self.pairs.plain(), ready.plan, ready.scene)
         self.scope = scope(ready.plan, self.between.differences, self.between.facts.has_shadows)
-        self.rungs = ladder(self.scope, self._interpolations(), depths)
+        found = ladder(self.scope, self._interpolations(), depths)
+        self.rungs = tuple(shaded_by(named(options.heuristic), rung) for rung in found)
         self._asked_for = options.interpolation
         self._kernel_scene = cache(self._make_kernel_scene)
 

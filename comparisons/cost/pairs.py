@@ -47,5 +47,6 @@ class Pairs:
                 tessellation,
                 prune=not self._options.everything,
                 sensor=self._options.sensor,
+                heuristic=self._options.heuristic,
             )
         return self._known[key]

@@ -21,6 +21,7 @@ from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Fit, FitImages
 from comparisons.options import Options
 from heuristic.errors import InputError, unknown
+from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
 
@@ -111,6 +112,11 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
 
 def _completed(options):
     """Fill in a fit's own defaults."""
+    if options.heuristic != PHONG.name:
+        raise InputError(
+            f"heuristic {options.heuristic} cannot be fitted: the forms of --form are fitted, phong"
+            " and blinn among them. Leave --heuristic out."
+        )
     if options.interpolation is not Interpolation.PHONG:
         raise InputError(
             f"interpolation {options.interpolation.value} cannot be fitted: its values are those of"

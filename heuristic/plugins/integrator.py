@@ -1,8 +1,10 @@
-"""The integrator plugin ``heuristic``: the kernel at the first surface that a camera ray meets.
+"""The integrator plugin ``heuristic``: shading at the first surface that a camera ray meets.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
+``model``           string (phong)      name of the heuristic that shades
+                                        (:mod:`heuristic.heuristics`)
 ``ambient``         spectrum (0)        ``I_a`` of 8.2
 ``interpolation``   string (phong)      ``phong`` shades every point, with the normal that Mitsuba
                                         interpolates; ``gouraud`` the vertices and ``flat`` the
@@ -14,6 +16,8 @@ Parameter           Type (default)      Meaning
                                         nothing
 ==================  ==================  ===========================================================
 
+The parameters that the heuristic declares are floats beside these.
+
 It works on scenes whose BSDFs are ``phong`` and whose lights are ``heuristic_*`` plugins; an
 environment emitter is background only. Films, samplers, cameras, filters and AOVs are Mitsuba's.
 The first thing drawn from the sampler is the camera ray, as in ``direct`` and ``path``, so that
@@ -22,16 +26,19 @@ equal seeds give equal rays. Python::
     {'type': 'heuristic', 'ambient': 1.0}
 """
 
+from operator import is_
+
 import drjit as dr
 import mitsuba as mi
 
+from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins.emitters import FAR
 from heuristic.plugins.interpolated import interpolating
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.plugins.spectra import emitted, may_be_nonzero
-from heuristic.shading import shade
+from heuristic.points import Given
 
 LAYERS = 64
 """Surfaces that a camera ray passes at most: a bound for a tower of empty ones."""
@@ -46,11 +53,19 @@ def define():
         def __init__(self, props):
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
-            self.occlusion = props.get("occlusion", False)
+            self.model = heuristics.named(props.get("model", heuristics.PHONG.name))
+            self.parameters = {
+                known.name: mi.Float(known.checked(props.get(known.name, known.default)))
+                for known in self.model.parameters
+            }
+            self.parameters_changed()
+            self._prepared = [], None
+            self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
             self.prune = props.get("prune", True)
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
+            self.prepared(scene)  # which a symbolic loop could not do
             if any(bsdf.is_clear for bsdf in SceneMaterials(scene).bsdfs):
                 colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
             else:
@@ -69,7 +84,7 @@ def define():
             return colour, hit, si
 
         def surface_colour(self, scene, si, view, active):
-            """Return the value that is seen at what a ray hits: Phong shading (6.37, 6.38)."""
+            """Return the value that is seen at what a ray hits: the normal of 6.37 and 6.38."""
             twosided = self.twosided(scene, si, active)
             normal = SceneMaterials(scene).normal(si, active)
             if twosided is not False:
@@ -78,15 +93,36 @@ def define():
             return dr.select(active & (twosided | (si.wi.z > 0)), colour, 0)
 
         def shaded(self, scene, si, view, normal, active):
-            """Evaluate the kernel at a surface interaction."""
+            """Shade at a surface interaction, whose material is one of several."""
+            model = self.model_at(scene, si)
             lights = self.lights(scene, si, active)
             ambient = self.ambient_at(si, active)
             visible = self.visibility(scene, si, active)
             colour = mi.Spectrum(0)
-            for material, is_here in SceneMaterials(scene, self.prune).at(si, active):
-                value = shade(si.p, normal, view, material, lights, ambient, visible)
+            materials = SceneMaterials(scene, self.prune, self.model.form)
+            for material, is_here in materials.at(si, active):
+                value = model(si.p, normal, view, material, lights, ambient, visible)
                 colour += dr.select(is_here, value, 0)
             return colour
+
+        def model_at(self, scene, si):
+            """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
+            prepared = self.prepared(scene)
+            return lambda *given: self.model.evaluate(
+                Given(*given), si.uv, self.parameters, prepared
+            )
+
+        def prepared(self, scene):
+            """Return what the heuristic prepares for a scene."""
+            if self.model.prepare is None:
+                return None
+            # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
+            parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
+            known, found = self._prepared
+            if len(parts) != len(known) or not all(map(is_, parts, known)):
+                found = self.model.prepare(scene)
+                self._prepared = parts, found
+            return found
 
         def lights(self, scene, si, active):
             """Return the kernel's form of the scene's lights."""
@@ -106,10 +142,15 @@ def define():
             return SceneMaterials(scene).twosided(si, active)
 
         def traverse(self, callback):
-            callback.put("ambient", self.ambient, mi.ParamFlags.Differentiable)
+            for name, value in {"ambient": self.ambient, **self.parameters}.items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys=()):
+            """Make edited numbers opaque, so that a new value compiles nothing."""
+            dr.make_opaque(self.parameters)
 
         def to_string(self):
-            return f"HeuristicIntegrator[ambient = {self.ambient}]"
+            return f"HeuristicIntegrator[model = {self.model.name}, ambient = {self.ambient}]"
 
     interpolating_class = interpolating(HeuristicIntegrator)
 

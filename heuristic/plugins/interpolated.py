@@ -1,8 +1,8 @@
 """The integrator ``heuristic`` with ``interpolation`` ``flat`` or ``gouraud`` (6.6.1, 6.35, 6.36).
 
-In RGB variants the kernel runs once a vertex or face before the rendering, for the sensor that
+In RGB variants the heuristic runs once a vertex or face before the rendering, for the sensor that
 renders, and Mitsuba interpolates the stored values. Spectral variants draw other wavelengths for
-each ray; there the kernel runs at the corners of the face that a ray meets.
+each ray; there the heuristic runs at the corners of the face that a ray meets.
 """
 
 import drjit as dr
@@ -39,12 +39,13 @@ def interpolating(base):
                     mesh,
                     self.interpolation,
                     viewer,
-                    mesh.bsdf().material(at),
+                    mesh.bsdf().material(at, form=self.model.form),
                     self.lights(scene, at, True),
                     self.ambient_at(at, True),
                     self.visibility(scene, at, True),
                     # Stored for all, because reading cannot tell the shapes apart.
                     twosided=any(shape.bsdf().twosided for shape in scene.shapes()),
+                    model=self.model_at(scene, at),
                 )
 
         def _at_corners(self, scene, si, view, active):

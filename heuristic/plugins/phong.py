@@ -65,8 +65,8 @@ def define():
             self.twosided = props.get("twosided", False)
             self.parameters_changed()
 
-        def material(self, si, active=True, prune=True):
-            """Return the coefficients at a surface interaction; absent terms are plain zeros."""
+        def material(self, si, active=True, prune=True, form=None):
+            """Return the material at a surface interaction; absent terms are plain zeros."""
             coefficients = {
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else COEFFICIENTS)
@@ -74,7 +74,7 @@ def define():
             return Material(
                 **coefficients,
                 n=self.exponent(si, active),
-                form=self.form,
+                form=form or self.form,
                 normalised=self.normalised,
                 n_is_moderate=self.n_is_moderate,
             )

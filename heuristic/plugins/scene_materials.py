@@ -11,14 +11,16 @@ from heuristic.materials import COEFFICIENTS, Material
 class SceneMaterials:
     """The ``phong`` BSDFs of a scene, and what they are at a surface interaction.
 
+    ``prune`` leaves out the terms that no material has; ``form`` is in place of the materials' own.
+
     Raises
     ------
     InputError
         For a BSDF that is no ``phong``.
     """
 
-    def __init__(self, scene, prune=True):
-        self.prune = prune
+    def __init__(self, scene, prune=True, form=None):
+        self.prune, self.form = prune, form
         self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
         for bsdf in self.bsdfs:
             if not hasattr(bsdf, "material"):
@@ -38,12 +40,12 @@ class SceneMaterials:
         if not self.bsdfs:
             return []  # a scene without shapes
         if len(self.bsdfs) == 1:
-            return [(self.bsdfs[0].material(si, active, self.prune), True)]
+            return [(self.bsdfs[0].material(si, active, self.prune, self.form), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         present = present if self.prune else list(COEFFICIENTS)
-        readers = [_reader(bsdf, present) for bsdf in self.bsdfs]
+        readers = [_reader(bsdf, present, self.form) for bsdf in self.bsdfs]
         *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
-        forms = sorted({bsdf.form for bsdf in self.bsdfs})
+        forms = sorted({self.form or bsdf.form for bsdf in self.bsdfs})
         is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
         coefficients = dict(zip(present, values, strict=True))
         return [
@@ -86,15 +88,15 @@ class SceneMaterials:
         return dr.gather(mi.UInt32, mi.UInt32(self.table), bsdf, active)
 
 
-def _reader(bsdf, present):
+def _reader(bsdf, present, form):
     """Return the function that reads one BSDF's coefficients, normalisation applied."""
 
     def read(si, active):
-        material = bsdf.material(si, active)
+        material = bsdf.material(si, active, form=form)
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if bsdf.normalised and "k_s" in values:
-            values["k_s"] *= terms.normalisation(bsdf.form, material.n)
-        return (*values.values(), mi.Float(material.n), mi.Bool(bsdf.form == "blinn"))
+            values["k_s"] *= terms.normalisation(material.form, material.n)
+        return (*values.values(), mi.Float(material.n), mi.Bool(material.form == "blinn"))
 
     return read
 

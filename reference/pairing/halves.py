@@ -13,6 +13,7 @@ import numpy as np
 
 from heuristic import meshes
 from heuristic.errors import InputError
+from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
 from heuristic.plugins.interpolated import viewpoint
@@ -77,7 +78,8 @@ def pair(
     tessellation=None,
     prune=True,
     sensor=0,
-):
+    heuristic: str = PHONG.name,
+) -> Pair:
     """Derive both halves of a scene, for the current variant.
 
     Parameters
@@ -97,28 +99,32 @@ def pair(
         Whether the kernel leaves out the terms that no material has.
     sensor
         Number of the sensor among those of the scene.
+    heuristic
+        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
 
     Raises
     ------
     InputError
-        When Mitsuba cannot read the scene or make it, or it has no such sensor.
+        When Mitsuba cannot read the scene or make it, it has no such sensor, or the heuristic is
+        not declared.
     """
     register()
     graph = source.parse()
     settings = preparation.prepare(graph, resolution, sensor)
     geometry = cache(_bare(graph).instantiate)
 
-    heuristic = graph.copy()
-    given_physical = bsdfs.to_heuristic(heuristic, convention)
-    emitters, radiance = lights.to_heuristic(heuristic, geometry, settings.hide_emitters)
+    model, half = named(heuristic), graph.copy()
+    given_physical = bsdfs.to_heuristic(half, convention)
+    for index in half.nodes(BSDF) if model.form else ():
+        if half.plugin(index) == "phong":
+            half.props(index)["form"] = model.form
+    emitters, radiance = lights.to_heuristic(half, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    _set_integrator(heuristic, ambient, settings, interpolation, prune)
+    _set_integrator(half, ambient, settings, interpolation, prune, model)
     if interpolation is not Interpolation.PHONG:
         viewpoint(geometry().sensors()[0])  # refuses what has none before anything renders
     if interpolation is not Interpolation.PHONG or tessellation is not None:
-        meshing.replace_shapes(
-            heuristic, geometry(), tessellation or meshes.RESOLUTION, interpolation
-        )
+        meshing.replace_shapes(half, geometry(), tessellation or meshes.RESOLUTION, interpolation)
 
     physical = graph.copy()
     emitters += areas.add_glowing_shapes(physical)
@@ -130,7 +136,7 @@ def pair(
     records = (*given_physical, *given_heuristic)
     return Pair(
         name=source.name,
-        heuristic=heuristic,
+        heuristic=half,
         physical=physical,
         hide_emitters=settings.hide_emitters,
         max_depth=settings.max_depth,
@@ -138,7 +144,7 @@ def pair(
         bsdfs=records,
         emitters=tuple(emitters),
         misses=tuple(miss for record in records for miss in record.misses),
-        warnings=tuple(_energy_warnings(heuristic)),
+        warnings=tuple(_energy_warnings(half)),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
         media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
@@ -166,13 +172,14 @@ def with_sampler(graph, plugin):
     return copy
 
 
-def _set_integrator(graph, ambient, settings, interpolation, prune):
+def _set_integrator(graph, ambient, settings, interpolation, prune, model):
     props = properties(
         "heuristic",
         hide_emitters=settings.hide_emitters,
-        occlusion=settings.occlusion,
+        occlusion=settings.occlusion or "visible" in model.needs,
         interpolation=interpolation.value,
         prune=prune,
+        model=model.name,
     )
     if ambient is not None:
         props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient

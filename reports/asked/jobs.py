@@ -74,6 +74,9 @@ def rendering_options(command):
                      help="Samples a pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=Resolution(),
                      help="Width and height in place of the film's own."),
+        click.option("--heuristic", metavar="NAME",
+                     help="Which heuristic shades: phong, blinn, or one that a package declares."
+                     " [default: phong]"),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
                      help="Shading of polygons in the heuristic half. [default: the scene's own,"
                      " else phong]"),

@@ -12,6 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from comparisons.store import Entry
+from heuristic.heuristics import named
 
 INTERVAL_S = 10.0
 """Seconds from one writing to the next, at least: short runs write nothing."""
@@ -60,8 +61,9 @@ def of_scene(folder, name, case):
 def key_of(source, options, variant, versions):
     """Return a digest of all that the passes of a comparison depend on.
 
-    These are the scene as Mitsuba reads it, the content of every file that it reads, the options
-    but for the ones that only say how long to go on, variant and versions.
+    These are the scene as Mitsuba reads it, the content of every file that it reads, the code of
+    the heuristic, the options but for the ones that only say how long to go on, variant and
+    versions.
     """
     digest = hashlib.sha256()
     graph = source.parse()
@@ -75,5 +77,6 @@ def key_of(source, options, variant, versions):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
+    told["heuristic code"] = named(options.heuristic).digest()
     digest.update(json.dumps(told, sort_keys=True).encode())
     return digest.hexdigest()

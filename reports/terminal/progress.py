@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from heuristic.heuristics import PHONG
 from reports.terminal import verbosity
 from reports.terminal.printing import seconds
 from reports.terminal.tables import printed, ruled
@@ -66,6 +67,8 @@ def summary(records):
         )
     yield from printed(table)
     for record in records:
+        if record.get("heuristic", PHONG.name) != PHONG.name:
+            yield f"{record['scene']}: heuristic {record['heuristic']}"
         if "noise_target" in record:
             yield _noise(record)
 

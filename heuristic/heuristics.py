@@ -1,0 +1,185 @@
+"""Heuristics: ways to shade the first half of a pair, each one declaration.
+
+A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
+``blinn`` are built in. A program declares its own with :func:`declare`, a package by an entry point
+of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are no
+heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interpolation`).
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import entry_points
+from numbers import Real
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from heuristic.errors import InputError
+from heuristic.materials import check_form
+from heuristic.points import INPUTS, Array, Given, Point
+
+GROUP = "fotismos.heuristics"
+
+RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
+"""Parameters of the integrator ``heuristic``, which those of heuristics stand beside."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a heuristic can be tuned by.
+
+    Parameters
+    ----------
+    name
+        A Python name: of the attribute in ``point.parameters`` and of the integrator's parameter.
+    default, low, high
+        In the heuristic's own unit; both bounds are allowed.
+
+    Raises
+    ------
+    InputError
+        For a default outside the bounds, or a name that cannot be used.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier() or self.name in RESERVED:
+            raise InputError(
+                f"parameter {self.name!r} is not allowed: give a Python name other than"
+                f" {', '.join(RESERVED)}."
+            )
+        self.checked(self.default)
+
+    def checked(self, value: float) -> float:
+        """Return a value that lies within the bounds; raise InputError for any other."""
+        if not (isinstance(value, Real) and self.low <= value <= self.high):
+            allowed = f"{self.low:g} to {self.high:g}"
+            raise InputError(f"{self.name} = {value!r} is not allowed: give one from {allowed}.")
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Heuristic:
+    """A way to shade the heuristic half.
+
+    Parameters
+    ----------
+    name
+        In commands, records and messages: lower case, digits and hyphens.
+    shade
+        ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
+        viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
+        each point: no Python ``if`` on arrays, but ``drjit.select``.
+    label
+        For people; the name where it is not given.
+    needs
+        Which of :data:`INPUTS` it reads: all but ``visible`` where it is not given. One that needs
+        ``visible`` casts its shadows itself; for others the integrator may (``occlusion``).
+    parameters
+        Numbers that it can be tuned by.
+    prepare
+        ``prepare(scene)`` is called once for a Mitsuba scene, before its first sample, and returns
+        anything: a table, a depth image. Later edits of the scene do not call it again.
+    form
+        Form of the specular lobe that materials are read with; None for their own.
+
+    Raises
+    ------
+    InputError
+        For a name that is not of that kind, unknown needs or form, or two parameters of one name.
+    """
+
+    name: str
+    shade: Callable[[Point], Array]
+    label: str = ""
+    needs: frozenset[str] = frozenset(INPUTS) - {"visible"}
+    parameters: tuple[Parameter, ...] = ()
+    prepare: Callable[[Any], Any] | None = None
+    form: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name.replace("-", "").isalnum() or self.name != self.name.lower():
+            raise InputError(
+                f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
+            )
+        if unknown := ", ".join(sorted(set(self.needs) - set(INPUTS))):
+            known = ", ".join(INPUTS)
+            raise InputError(f"heuristic {self.name} needs {unknown}: choose among {known}.")
+        names = [parameter.name for parameter in self.parameters]
+        if len(set(names)) < len(names):
+            raise InputError(f"heuristic {self.name} has two parameters of one name: {names}.")
+        if self.form is not None:
+            check_form(self.form)
+        object.__setattr__(self, "needs", frozenset(self.needs))
+        object.__setattr__(self, "label", self.label or self.name)
+
+    def digest(self) -> str:
+        """Return a digest of the files that ``shade`` and ``prepare`` are in."""
+        modules = {function.__module__ for function in (self.shade, self.prepare) if function}
+        files = [getattr(sys.modules[module], "__file__", None) for module in sorted(modules)]
+        return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
+
+    def evaluate(
+        self, given: Given, uv: Array, parameters: dict[str, Array], prepared: Any
+    ) -> Array:
+        """Return the colour at points; the arguments are what :class:`Point` hands on."""
+        return self.shade(Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared))
+
+
+_declared: dict[str, Heuristic] = {}
+
+
+def declare(heuristic: Heuristic) -> Heuristic:
+    """Make a heuristic known by its name, in this process, and return it.
+
+    Raises
+    ------
+    InputError
+        When another one has the name.
+    """
+    if _declared.setdefault(heuristic.name, heuristic) != heuristic:
+        raise InputError(f"heuristic {heuristic.name} is declared already: choose another name.")
+    return heuristic
+
+
+def named(name: str) -> Heuristic:
+    """Return a declared heuristic.
+
+    Raises
+    ------
+    InputError
+        When none has the name, or an entry point cannot be loaded.
+    """
+    if name not in _declared:
+        _load()
+    if name not in _declared:
+        raise InputError(
+            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(_declared))}. A"
+            f" package declares its own by an entry point of the group {GROUP}, a program by"
+            " heuristic.heuristics.declare."
+        )
+    return _declared[name]
+
+
+@cache
+def _load() -> None:
+    """Declare what installed packages bring."""
+    for entry in entry_points(group=GROUP):
+        try:
+            declare(entry.load())
+        except Exception as error:
+            raise InputError(
+                f"heuristic {entry.name}: the entry point {entry.value} cannot be loaded: {error}"
+            ) from error
+
+
+_READ = frozenset(INPUTS) - {"uv", "visible"}
+PHONG = declare(Heuristic("phong", Point.textbook, "Phong", _READ))
+BLINN = declare(Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn"))

@@ -1,0 +1,149 @@
+"""What a heuristic reads of the points that it shades: positions, directions, material, lights."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+from heuristic import shading, terms, vectors
+from heuristic.errors import InputError
+from heuristic.materials import Material
+
+INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "visible")
+"""What a heuristic may need of a point; ``visible`` is a shadow ray to a light."""
+
+Array = Any
+"""A Dr.Jit array of the current variant, one entry a point; a plain number where all are equal."""
+
+
+class Given(NamedTuple):
+    """The arguments of :func:`heuristic.shade`."""
+
+    position: Array
+    normal: Array
+    view: Array
+    material: Material
+    lights: list[Any]
+    ambient: Array = 0
+    visible: Callable[[Array, Array], Array] | None = None
+
+
+@dataclass(frozen=True)
+class LightAtPoint:
+    """A light as it arrives at a point.
+
+    Attributes
+    ----------
+    toward
+        Unit vector from the point towards the light, in world space; zero on the light itself.
+    distance
+        To the light, in units of the scene; infinite for parallel light.
+    intensity
+        ``I_p``, display-linear, attenuation and cone applied: a white diffuse surface that faces
+        the light has this value. Where the integrator has ``occlusion``, and the heuristic does not
+        need ``visible``, it is 0 at points that the light does not reach.
+    """
+
+    toward: Array
+    distance: Array
+    intensity: Array
+    _point: "Point"
+
+    def visible(self) -> Array:
+        """Return the mask of points that the light reaches, by a shadow ray, which is a need."""
+        self._point.require("visible")
+        return self._point.given.visible(self.toward, self.distance)
+
+
+def _input(read: Callable[["Point"], Any]) -> cached_property:
+    """Make an attribute of :class:`Point` that a heuristic can read if it declares to need it."""
+
+    def checked(point: "Point") -> Any:
+        point.require(read.__name__)
+        return read(point)
+
+    return cached_property(checked)
+
+
+@dataclass(frozen=True)
+class Point:
+    """The points to shade, all at once: what a heuristic reads.
+
+    Attributes
+    ----------
+    parameters
+        The heuristic's parameters by name, as attributes.
+    prepared
+        What the heuristic's ``prepare`` returned for the scene; None without it.
+
+    Raises
+    ------
+    InputError
+        When the heuristic reads what is not among its needs.
+    """
+
+    needs: frozenset[str]
+    given: Given
+    _uv: Array
+    parameters: SimpleNamespace
+    prepared: Any = None
+
+    @_input
+    def position(self) -> Array:
+        """Position in world space, in units of the scene."""
+        return self.given.position
+
+    @_input
+    def normal(self) -> Array:
+        """Unit shading normal in world space, towards the viewer's side of two-sided surfaces."""
+        return vectors.normalise(self.given.normal)
+
+    @_input
+    def view(self) -> Array:
+        """Unit vector towards the viewer, in world space."""
+        return vectors.normalise(self.given.view)
+
+    @_input
+    def uv(self) -> Array:
+        """Texture coordinates, two components."""
+        return self._uv
+
+    @_input
+    def material(self) -> Material:
+        """``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation.
+
+        A coefficient that no material of the scene has is a plain 0.
+        """
+        material = self.given.material
+        if not material.normalised:
+            return material
+        k_s = material.k_s * terms.normalisation(material.form, material.n)
+        return replace(material, k_s=k_s, normalised=False)
+
+    @_input
+    def ambient(self) -> Array:
+        """``I_a``, display-linear."""
+        return self.given.ambient
+
+    @_input
+    def lights(self) -> tuple[LightAtPoint, ...]:
+        """The scene's lights at the points, in the order of the scene."""
+        return tuple(map(self._light, self.given.lights))
+
+    def textbook(self) -> Array:
+        """Return the chapters' model at the points, :func:`heuristic.shade`."""
+        return shading.shade(*self.given)
+
+    def _light(self, light: Any) -> LightAtPoint:
+        toward, intensity, distance = light.illuminate(self.given.position)
+        if self.given.visible is not None and "visible" not in self.needs:
+            intensity = dr.select(self.given.visible(toward, distance), intensity, 0)
+        return LightAtPoint(toward, distance, intensity, self)
+
+    def require(self, name: str) -> None:
+        """Raise InputError for an input that is not among the heuristic's needs."""
+        if name not in self.needs:
+            raise InputError(f"{name!r} is read, but not declared: add it to what is needed.")
