@@ -12,7 +12,7 @@ import pytest
 from comparisons.compare import prepare
 from comparisons.cost.cost import cost
 from comparisons.cost.effort import WIDTH, Effort, reduced
-from comparisons.cost.ladder import Method, ladder
+from comparisons.cost.ladder import ladder
 from comparisons.cost.methods import Methods
 from comparisons.cost.pairs import Pairs
 from comparisons.departure.metrics import delta_e_2000
@@ -21,7 +21,8 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference.planning.effects import Effect
+from reference.effects.enumeration import EFFECTS
+from reference.effects.shadows import OCCLUSION
 from reference.rendering.renderer import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
@@ -173,27 +174,22 @@ def test_merged_rungs_are_equal_images(rgb, name):
     methods = Methods(source, chosen, ready)
     merged = [rung for rung in methods.rungs if len(rung.names) > 1]
     assert merged
-    # A scope that has everything tells all methods apart.
-    full = replace(
-        methods.scope,
-        occlusion=True,
-        interreflection=True,
-        kernel_occlusion=False,
-        exact_bsdfs=False,
-    )
-    apart = {rung.names[0]: rung.method for rung in ladder(full)}
+    # A plan that calls for all, and a scope that has all, tell all methods apart.
+    asked = tuple(replace(decision, called_for=True) for decision in ready.plan.decisions)
+    telling = Methods(source, chosen, replace(ready, plan=replace(ready.plan, decisions=asked)))
+    full = replace(methods.scope, effects=frozenset(EFFECTS), kernel_shadows=False)
+    apart = {rung.name: rung.method for rung in ladder(full)}
+    assert "direct" in apart
     for rung in merged:
         expected = whole(methods.renderer(rung.method, 16))
-        methods.scope, before = full, methods.scope
         for other in set(rung.names) & set(apart):
-            found = whole(methods.renderer(apart[other], 16), seed=80)
+            found = whole(telling.renderer(apart[other], 16), seed=80)
             noise = np.hypot(expected.standard_error, found.standard_error)
             # Five standard errors of eight passes, and the pixel filter's own spread at edges.
             difference = np.abs(expected.mean - found.mean)
             assert (difference > 7 * noise + 1e-5).mean() < 5e-3, (rung.name, other)
             mean = np.abs((expected.mean - found.mean).mean())
             assert mean < 4 * np.sqrt(np.mean(noise**2) / noise.size) + 1e-6, (rung.name, other)
-        methods.scope = before
 
 
 def test_a_scene_that_has_everything_keeps_its_rungs_apart(rgb):
@@ -277,7 +273,7 @@ def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
         between = Between(ready.pair, ready.plan, ready.scene)
         everything = set(between.differences)
         lit = whole(Shown(between, everything, 64)).mean
-        unshadowed = whole(Shown(between, everything - {Effect.OCCLUSION}, 64))
+        unshadowed = whole(Shown(between, everything - {OCCLUSION}, 64))
         images[key] = lit, unshadowed
     assert images["open"][0].max() > 0.1
     assert images["hidden"][0].max() < 1e-6
@@ -310,11 +306,6 @@ def test_sample_counts_are_powers_of_four():
     assert Effort(largest=2).counts == (2,)
     with pytest.raises(InputError, match="rounds"):
         Effort(rounds=1)
-
-
-def test_a_kernel_draws_no_random_numbers():
-    assert Method(Interpolation.FLAT).is_kernel
-    assert not Method().is_kernel
 
 
 def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
@@ -351,7 +342,7 @@ def test_all_rungs_are_of_the_sensor_that_was_asked_for(rgb):
     pairs = Pairs(source, seen, prepare(source, seen))
     first, flat = (
         pair.heuristic.instantiate().sensors()[0].world_transform().matrix.numpy()
-        for pair in (pairs.as_asked(), pairs.interpolated(Interpolation.FLAT))
+        for pair in (pairs.interpolated(seen.interpolation), pairs.interpolated(Interpolation.FLAT))
     )
     other = prepare(source, Options()).pair.heuristic.instantiate().sensors()[0]
     np.testing.assert_array_equal(first, flat)

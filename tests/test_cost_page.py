@@ -80,17 +80,6 @@ def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
     assert rows[-1] == "." * 12
 
 
-def test_every_effect_with_a_price_has_a_colour_of_its_own():
-    from comparisons.effects import between
-    from reference.planning.effects import Effect
-    from reports.charts.price_chart import COLOURS
-
-    heuristic_only = {Effect.EMISSION, Effect.AMBIENT, Effect.DIFFUSE, Effect.SPECULAR}
-    assert set(COLOURS) == set(Effect) - heuristic_only
-    assert set(between.OF_LIGHT.values()) <= set(COLOURS)
-    assert len(set(COLOURS.values())) == len(COLOURS)
-
-
 def test_the_overview_takes_the_most_samples_and_marks_what_is_merged():
     (row,) = cost_overview.rows([cost_records.data()])
     cells = dict(zip(cost_overview.METHODS, row["cells"], strict=True))

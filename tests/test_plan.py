@@ -8,7 +8,10 @@ import pytest
 from comparisons.compare import Options, prepare
 from comparisons.gallery.builtin import SCENES
 from comparisons.verification import verify
-from reference.planning.effects import Effect
+from reference.effects.bsdf_forms import TRANSMISSION
+from reference.effects.enumeration import EFFECTS
+from reference.effects.interreflection import INTERREFLECTION
+from reference.effects.shadows import OCCLUSION
 from reference.planning.planner import wants_spectra
 from reference.planning.structure import examine
 from reference.rendering.environment import AlbedoTable
@@ -155,9 +158,7 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
     if name in CHEAP:
         assert ready.plan.integrator == "direct_all"
     else:
-        assert ready.plan.calls_for(Effect.OCCLUSION) or ready.plan.calls_for(
-            Effect.INTERREFLECTION
-        )
+        assert ready.plan.calls_for(OCCLUSION) or ready.plan.calls_for(INTERREFLECTION)
     result = verify(source, Options(spp=512))
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
@@ -166,7 +167,7 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
 def test_nothing_is_pruned_where_light_may_come_through_glass(rgb):
     pane = {"type": "rectangle", "bsdf": {"type": "dielectric"}}
     ready = prepare(Source("glass", scene(object=ball(), pane=pane, light=lamp((0, 0, 5)))))
-    for effect in (Effect.TRANSMISSION, Effect.OCCLUSION, Effect.INTERREFLECTION):
+    for effect in (TRANSMISSION, OCCLUSION, INTERREFLECTION):
         assert ready.plan.calls_for(effect)
     assert (ready.plan.integrator, ready.plan.max_depth) == ("path", -1)
 
@@ -181,9 +182,9 @@ def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr("reference.planning.rules.occlusion", lambda structure: (False, "wrong"))
+    monkeypatch.setattr("reference.effects.shadows.occlusion", lambda structure: (False, "wrong"))
     monkeypatch.setattr(
-        "reference.planning.rules.interreflection", lambda structure: (False, "wrong")
+        "reference.effects.interreflection.interreflection", lambda structure: (False, "wrong")
     )
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
     assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
@@ -229,7 +230,7 @@ def test_a_figure_is_planned_without_random_numbers(rgb):
     assert (plan.integrator, plan.max_depth, plan.shadows) == ("direct_all", 2, False)
     assert plan.tabulate_environment
     assert plan.kernel_terms == ("k_a", "k_d", "k_s")
-    assert [decision.effect for decision in plan.decisions] == list(Effect)
+    assert [decision.effect for decision in plan.decisions] == list(EFFECTS)
 
 
 def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled(rgb):
@@ -289,3 +290,45 @@ def test_the_table_of_the_environment_agrees_with_sampling(rgb):
         weight = np.array(bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), point)[1][0], float)
         error = weight.std() / count**0.5
         assert abs(np.array(table.at(mi.Float(mu)))[0, 0] - weight.mean()) < 5 * error + 2e-4
+
+
+def test_a_plan_simulates_what_is_asked_for_and_nothing_else(rgb):
+    parts = {"ball": ball(bsdf={"type": "roughplastic"}), "floor": floor(), "lamp": lamp((0, 0, 4))}
+    plan = prepare(Source("parts", scene(**parts))).plan
+    assert plan.integrator == "path"
+    everything = set(EFFECTS)
+    assert plan.simulating(everything) is plan
+
+    lit_once = plan.simulating(everything - {INTERREFLECTION})
+    assert (lit_once.integrator, lit_once.max_depth) == ("direct_all", 2)
+    assert (lit_once.shadows, lit_once.bsdf_samples) == (True, 1)
+    assert plan.simulating(everything, max_depth=2) == lit_once
+
+    unshadowed = plan.simulating(everything - {OCCLUSION})
+    assert (unshadowed.integrator, unshadowed.max_depth) == ("direct_all", -1)
+    assert (unshadowed.shadows, unshadowed.bsdf_samples) == (False, 0)
+
+    neither = plan.simulating(everything - {OCCLUSION}, max_depth=2)
+    assert neither == plan.simulating(everything - {OCCLUSION, INTERREFLECTION})
+    assert (neither.max_depth, neither.shadows) == (2, False)
+
+    shallow = plan.simulating(everything, max_depth=3)
+    assert (shallow.integrator, shallow.max_depth) == ("path", 3)
+    assert plan.simulating(everything - {OCCLUSION}, max_depth=3).integrator == "direct_all"
+
+
+def test_leaving_out_what_is_not_called_for_changes_nothing(rgb):
+    plan = prepare(SCENES["fig-8-9"].source()).plan
+    assert plan.simulating(()) is plan
+    assert plan.simulating((), max_depth=3) is plan
+    assert plan.directly() == plan
+
+
+@pytest.mark.parametrize("name", ["fig-8-9", "cornell-box"])
+def test_a_plan_that_is_not_pruned_is_the_one_for_everything(rgb, name):
+    source, size = SCENES[name].source(), (8, 8)
+    pruned, whole = (
+        prepare(source, Options(resolution=size, everything=choice)).plan
+        for choice in (False, True)
+    )
+    assert pruned.unpruned() == whole != pruned

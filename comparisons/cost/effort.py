@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import count as count_from
 from itertools import takewhile
 
-from comparisons.cost.ladder import DEPTHS
+from comparisons.cost.rungs import DEPTHS
 from comparisons.effects import shapley
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size

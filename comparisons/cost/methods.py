@@ -1,16 +1,21 @@
 """From rungs to renderers: which scene and integrator each method takes."""
 
-from dataclasses import replace
 from functools import cache
 
-from comparisons.cost.ladder import DEPTHS, ladder, scope
+import mitsuba as mi
+
+from comparisons.compare import Prepared
+from comparisons.cost.ladder import ladder, scope
 from comparisons.cost.pairs import Pairs
-from comparisons.effects.between import OF_BSDFS, Between
+from comparisons.cost.rungs import DEPTHS, Kernel, Physical
+from comparisons.effects.between import Between
+from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
+from reference.effects.enumeration import EFFECTS
 from reference.pairing.halves import INTEGRATOR, with_sampler
-from reference.planning.effects import Effect
 from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.scene.source import Source
 
 
 class Methods:
@@ -20,67 +25,59 @@ class Methods:
     ----------
     source, options
         As of :func:`comparisons.compare.compare`.
-    ready : comparisons.compare.Prepared
+    ready
         The scene, paired and planned.
     depths
         Depths of ``path`` that are rungs.
     """
 
-    def __init__(self, source, options, ready, depths=DEPTHS):
+    def __init__(
+        self,
+        source: Source,
+        options: Options,
+        ready: Prepared,
+        depths: tuple[int, ...] = DEPTHS,
+    ):
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
 
         self.pairs = Pairs(source, options, ready)
         self.between = Between(self.pairs.plain(), ready.plan, ready.scene)
-        self.scope = scope(
-            ready.plan, ready.pair, self.between.differences, self.between.has_occlusion
-        )
+        self.scope = scope(ready.plan, self.between.differences, self.between.facts.has_shadows)
         self.rungs = ladder(self.scope, self._interpolations(), depths)
         self._asked_for = options.interpolation
         self._kernel_scene = cache(self._make_kernel_scene)
 
-    def renderer(self, method, spp):
-        """Return a renderer of a method, with samples a pixel a pass."""
-        if method.is_kernel:
+    def renderer(self, method: Kernel | Physical, spp: int) -> Renderer:
+        """Return a renderer of a method, with samples per pixel of a pass."""
+        if isinstance(method, Kernel):
             with variant(self.heuristic_variant):
                 scene, integrator = self._kernel_scene(method.interpolation), self._kernel(method)
                 return Renderer(scene, integrator, spp, "image of the kernel")
-        scene = self._physical_scene(method.physical_bsdfs)
-        integrator = physical_integrator(self._plan(method), scene, self.ready.pair.hide_emitters)
+        simulated = set(EFFECTS) - method.without
+        plan = self.ready.plan.simulating(simulated, method.max_depth)
+        scene = self.between.of(simulated)
+        integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
         return Renderer(scene, integrator, spp, "image of a rung")
 
-    def forget(self):
-        """Let go of the scenes of rungs."""
+    def forget(self) -> None:
+        """Release the scenes of rungs."""
         self._kernel_scene.cache_clear()
         self.between.forget()
 
-    def _make_kernel_scene(self, interpolation):
+    def _make_kernel_scene(self, interpolation: Interpolation) -> mi.Scene:
         if interpolation is self._asked_for:
             return self.ready.heuristic.scene
         graph = self.pairs.interpolated(interpolation).heuristic
         return with_sampler(graph, self.ready.plan.sampler).instantiate()
 
-    def _kernel(self, method):
+    def _kernel(self, method: Kernel) -> mi.Integrator:
         """Return the integrator alone: a scene of its own would slow all others."""
         graph = self.pairs.interpolated(method.interpolation).heuristic.copy()
-        graph.props(graph.nodes(INTEGRATOR)[0])["occlusion"] = method.occlusion
+        graph.props(graph.nodes(INTEGRATOR)[0])["occlusion"] = method.shadows
         return graph.instantiate().integrator()
 
-    def _physical_scene(self, physical_bsdfs):
-        if physical_bsdfs:
-            return self.ready.scene
-        return self.between.of(set(Effect) - OF_BSDFS)
-
-    def _plan(self, method):
-        """Return the plan of a method: its own depth, as the scene's plan has it for the rest."""
-        plan = self.ready.plan
-        if method.max_depth == self.scope.max_depth or not self.scope.interreflection:
-            return plan
-        if method.max_depth == 2:
-            return replace(plan, integrator="direct_all", max_depth=2, shadows=self.scope.occlusion)
-        return replace(plan, integrator="path", max_depth=method.max_depth)
-
-    def _interpolations(self):
+    def _interpolations(self) -> tuple[Interpolation, ...]:
         """Return the interpolations that shapes and sensor allow: some make no meshes."""
         allowed = []
         for interpolation in Interpolation:

@@ -22,10 +22,6 @@ class Pairs:
         key = ready.reference.variant, options.interpolation, options.tessellation
         self._known = {key: ready.pair}
 
-    def as_asked(self):
-        """Return the pair as the options ask for it."""
-        return self.interpolated(self._options.interpolation)
-
     def interpolated(self, interpolation):
         """Return the pair with another interpolation, and meshes as fine as asked for.
 

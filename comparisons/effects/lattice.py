@@ -12,8 +12,10 @@ import numpy as np
 
 from comparisons.effects.between import Between
 from heuristic.interpolation import Interpolation
+from reference.effects.enumeration import EFFECTS
+from reference.effects.polygons import POLYGONS
+from reference.effects.wavelengths import SPECTRAL
 from reference.pairing.halves import with_sampler
-from reference.planning.effects import Effect
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Renderer, variant
 
@@ -60,10 +62,10 @@ class Lattice:
         options = self._options
         found = set(self._between[self.variant].differences)
         if options.interpolation is not Interpolation.PHONG or options.tessellation is not None:
-            found.add(Effect.POLYGONS)
+            found.add(POLYGONS)
         if self.heuristic_variant != self.variant:
-            found.add(Effect.SPECTRAL)
-        return tuple(effect for effect in Effect if effect in found)
+            found.add(SPECTRAL)
+        return tuple(effect for effect in EFFECTS if effect in found)
 
     def render(self, wanted):
         """Render what is not known yet, image by image.
@@ -100,8 +102,8 @@ class Lattice:
             return self.of(KERNEL)
         if effects == frozenset(self.effects):
             return self.of(REFERENCE)
-        if Effect.POLYGONS not in self.effects or Effect.POLYGONS in effects:
-            return self.of(effects - {Effect.POLYGONS})
+        if POLYGONS not in self.effects or POLYGONS in effects:
+            return self.of(effects - {POLYGONS})
         found, kernels = self.of(effects), [self.of(key) for key in (KERNEL, PLAIN_KERNEL)]
         return Replicates(
             found.images + (kernels[0].images - kernels[1].images),
@@ -114,8 +116,8 @@ class Lattice:
             return [KERNEL]
         if frozenset(effects) == frozenset(self.effects):
             return [REFERENCE]
-        kernels = [KERNEL, PLAIN_KERNEL] if Effect.POLYGONS in self.effects else []
-        return [*kernels, frozenset(effects) - {Effect.POLYGONS}]
+        kernels = [KERNEL, PLAIN_KERNEL] if POLYGONS in self.effects else []
+        return [*kernels, frozenset(effects) - {POLYGONS}]
 
     def _by_variant(self, keys):
         """Group keys by the variant that renders them, equal scenes next to each other."""
@@ -129,14 +131,14 @@ class Lattice:
             return self.variant
         if key in (KERNEL, PLAIN_KERNEL):
             return self.heuristic_variant
-        is_current = Effect.SPECTRAL in key or Effect.SPECTRAL not in self.effects
+        is_current = SPECTRAL in key or SPECTRAL not in self.effects
         return self.variant if is_current else self.heuristic_variant
 
     def _scene_name(self, key):
         if isinstance(key, str):
             return key
         scene = self._between[self.variant].scene_key(key)
-        return " ".join(sorted(effect.name for effect in scene))
+        return " ".join(sorted(effect.label for effect in scene))
 
     def _replicates(self, key):
         """Render an image in the current variant, which is its own."""

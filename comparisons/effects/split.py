@@ -23,15 +23,9 @@ import numpy as np
 
 from comparisons.departure.metrics import delta_e_2000
 from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
-from reference.planning.effects import Effect
+from reference.effects.effect import PARTS
+from reference.effects.polygons import POLYGONS
 
-LIGHTS = {Effect.ATTENUATION, Effect.CONE, Effect.EXTENDED, Effect.ENVIRONMENT}
-STEPS = (
-    ("spectral", {Effect.SPECTRAL}),
-    ("visibility", {Effect.OCCLUSION}),
-    ("light form", LIGHTS),
-    ("BSDF form", {Effect.MICROFACETS, Effect.TRANSMISSION}),
-)
 ALWAYS = ("implementation", "BSDF form", "transport")
 
 
@@ -77,15 +71,16 @@ def _chain(lattice):
     """Return ``(name of the step that leads there, image)`` from the kernel to the reference."""
     effects = set(lattice.effects)
     chain = [("", KERNEL)]
-    if Effect.POLYGONS in effects:
-        chain.append(("interpolation", PLAIN_KERNEL))
+    if POLYGONS in effects:
+        chain.append((POLYGONS.part, PLAIN_KERNEL))
     simulated = frozenset()
     chain.append(("implementation", simulated))
-    for name, added in STEPS:
-        if added & effects or name in ALWAYS:
-            simulated = simulated | (added & effects)
+    for name in PARTS[1:-1]:
+        added = {effect for effect in effects if effect.part == name}
+        if added or name in ALWAYS:
+            simulated |= added
             chain.append((name, simulated))
-    chain.append(("transport", REFERENCE))
+    chain.append((PARTS[-1], REFERENCE))
     return chain
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
+from reference.effects.enumeration import EFFECTS
 
 
 @dataclass(frozen=True)
@@ -13,6 +14,11 @@ class Column:
     meaning: str
     kind: type = float
 
+
+STEPPED = tuple(effect for effect in EFFECTS if effect.step)
+STEPS = ("form", *(effect.label for effect in STEPPED))
+"""What lies between the halves, in the order in which it is added to the heuristic image: the form
+of BSDFs and lights, and then one effect after the other."""
 
 LUMINANCE = "display-linear, 1 for a white diffuse surface that faces the light"
 IDENTITY = {
@@ -36,10 +42,9 @@ RESULTS = {
     "dE_CAM16UCS": Column("1", "distance in CAM16-UCS, mean"),
     "rmse": Column("1", "root mean square difference, display-linear"),
     "log2_luminance": Column("stops", "mean ratio of luminances, heuristic to reference"),
-    "form": Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
-    "occlusion": Column("1", "RMS change by shadows"),
-    "interreflection": Column("1", "RMS change by light reflected more than once"),
-    "dominant": Column("", "the largest of form, occlusion and interreflection", str),
+    STEPS[0]: Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
+    **{effect.label: Column("1", f"RMS change by {effect.step}") for effect in STEPPED},
+    "dominant": Column("", f"the largest of {', '.join(STEPS[:-1])} and {STEPS[-1]}", str),
     "specular_heuristic": Column(
         "1", "the heuristic's specular part (scene lobe: in the mirror direction)"
     ),

@@ -1,16 +1,17 @@
 """A point that is rendered: both halves with the same camera rays, and the steps between them."""
 
-from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
 
 from comparisons.case import RGB, open_case
+from comparisons.study.columns import STEPPED, STEPS
 from comparisons.study.editing import Kept, set_values
 from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
+from reference.effects.enumeration import EFFECTS
 from reference.pairing import halves
 from reference.planning.planner import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
@@ -22,16 +23,12 @@ PASSES = 4
 """Few passes of many samples: small images cost a launch each, and the samples of one pass are
 stratified. Four are enough to see what noise is left."""
 
-STEPS = ("form", "occlusion", "interreflection")
-"""What lies between the halves, in the order in which it is added to the heuristic image: the form
-of BSDFs and lights, shadows, and light reflected more than once."""
-
 
 def row(part, point):
     """Render a point and return its columns.
 
-    ``form``, ``occlusion`` and ``interreflection`` are the root mean square changes of the image as
-    each of :data:`STEPS` is simulated too; ``dominant`` names the largest.
+    Under the names of :data:`comparisons.study.columns.STEPS` are the root mean square changes of
+    the image as each of them is simulated too; ``dominant`` names the largest.
 
     Raises
     ------
@@ -46,16 +43,7 @@ def row(part, point):
     chosen = plan(pair, physical)
     heuristic = kept[0].scene(halves.with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES
-    direct = replace(
-        chosen, integrator="direct_all", max_depth=2, shadows=False, tabulate_environment=False
-    )
-    plans = {"form": direct}
-    if chosen.shadows:
-        plans["occlusion"] = replace(direct, shadows=True)
-    if chosen.max_depth != 2:
-        plans["interreflection"] = chosen
-    else:
-        plans[list(plans)[-1]] = chosen
+    plans = _plans(chosen)
     renderers = [Renderer(heuristic, None, spp, "heuristic image")]
     for stage in plans.values():
         integrator = physical_integrator(stage, physical, pair.hide_emitters)
@@ -94,6 +82,18 @@ def _opened(scene):
 def _kept(scene):
     """Return the scenes at hand of both halves, for all points of a scene in this process."""
     return Kept(), Kept()
+
+
+def _plans(chosen):
+    """Return the plan of each step that changes something; the last is the one chosen."""
+    simulated = set(EFFECTS) - set(STEPPED)
+    plans = {STEPS[0]: chosen.simulating(simulated)}
+    for effect in STEPPED:
+        simulated.add(effect)
+        more = chosen.simulating(simulated)
+        if more != list(plans.values())[-1]:
+            plans[effect.label] = more
+    return plans
 
 
 def _render(renderers, seed):

@@ -22,129 +22,92 @@ pixel filter is left to sample; the same samples are then better in few passes o
 they are stratified, and four passes are enough to see what noise is left.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import mitsuba as mi
 
 from heuristic.interpolation import Interpolation
-from reference.pairing.nearest import WRAPPERS
+from reference.effects.effect import Decision
+from reference.effects.enumeration import EFFECTS
+from reference.effects.interreflection import INTERREFLECTION
+from reference.effects.light_forms import is_exact
+from reference.effects.shadows import OCCLUSION
+from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
-from reference.planning import rules
-from reference.planning.effects import Decision, Effect
+from reference.planning.facts import Facts
+from reference.planning.plan import PASSES, SAMPLER, STOCK_RR_DEPTH, STOCK_SAMPLER, Plan
 from reference.planning.structure import BSDF, EMITTER, examine
 from reference.rendering.indirect import RR_DEPTH
-from reference.scene import values
-
-SAMPLER = "multijitter"
-"""Of the stock samplers the one of least noise for its time, on figures and the Cornell box alike:
-at 64 samples a pixel, 10 times the efficiency of ``independent`` there (``stratified`` 5 times)."""
+from reference.scene.graph import Graph
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
-
-EXACT_LIGHTS = ("point", "spot", "directional")
-"""Lights that need no random number."""
-
-STOCK_SAMPLER = "independent"
-SPP = 256
-PASSES, DETERMINISTIC_PASSES = 16, 4
+DETERMINISTIC_PASSES = 4
 
 
-@dataclass(frozen=True)
-class Plan:
-    """How both halves are rendered.
-
-    Attributes
-    ----------
-    decisions
-        One for each effect, in the order of the enumeration.
-    kernel_terms
-        The terms that the heuristic kernel holds.
-    integrator, max_depth
-        Of the reference; ``max_depth`` counts as Mitsuba's: 2 is direct light, -1 no limit.
-    sampler, spp, passes
-        Of both halves; ``spp`` over all passes, unless the user gives another.
-    rr_depth
-        Of ``path``: where Russian roulette begins to end paths.
-    shadows, tabulate_environment
-        Parameters of ``direct_all``.
-    """
-
-    decisions: tuple[Decision, ...]
-    kernel_terms: tuple[str, ...]
-    integrator: str
-    max_depth: int
-    sampler: str
-    spp: int
-    passes: int
-    rr_depth: int = 5
-    shadows: bool = True
-    tabulate_environment: bool = False
-
-    def calls_for(self, effect):
-        """Tell whether an effect is called for."""
-        return next(d.called_for for d in self.decisions if d.effect is effect)
-
-
-def sampler(everything=False):
+def sampler(everything: bool = False) -> str:
     """Return the sampler of a plan; it is known before the scene is, which is made with it."""
     return STOCK_SAMPLER if everything else SAMPLER
 
 
-def plan(pair, scene, interpolation=Interpolation.PHONG, everything=False):
+def plan(
+    pair: Pair,
+    scene: mi.Scene,
+    interpolation: Interpolation = Interpolation.PHONG,
+    everything: bool = False,
+) -> Plan:
     """Decide on each effect, and choose the reference.
 
     Parameters
     ----------
-    pair : reference.pairing.halves.Pair
+    pair
         Both halves.
-    scene : mitsuba.Scene
+    scene
         The physical half, instantiated.
-    interpolation : Interpolation
+    interpolation
         Of the heuristic half.
     everything
         Switch all pruning off: what a user of Mitsuba gets without thinking, ``path`` with the
         independent sampler.
     """
-    if everything:
-        decisions = tuple(Decision(effect, True, "asked", "--everything") for effect in Effect)
-        terms = ("k_i", "k_a", "k_d", "k_s")
-        stock = _stock(pair)
-        return Plan(decisions, terms, stock, pair.max_depth, sampler(True), SPP, PASSES)
-    structure = examine(pair.physical, scene)
-    occlusion, interreflection = rules.occlusion(structure), rules.interreflection(structure)
-    decisions = _decisions(pair, structure, interpolation, occlusion, interreflection)
-    terms = tuple(name for name in ("k_i", "k_a", "k_d", "k_s") if _present(pair.heuristic, name))
-    exact = [light for light in structure.lights if light.kind in EXACT_LIGHTS]
-    rr_depth = pair.rr_depth or RR_DEPTH
-    is_clear = any(not shape.opaque for shape in structure.shapes)
-    if pair.media or is_clear or 0 <= pair.max_depth < 2:
-        stock = _stock(pair)
-        return Plan(decisions, terms, stock, pair.max_depth, SAMPLER, SPP, PASSES, rr_depth)
-    if interreflection[0] and pair.max_depth != 2 and len(exact) > 1 and _diffuse(pair.physical):
-        return Plan(decisions, terms, "direct_all", pair.max_depth, SAMPLER, SPP, PASSES)
-    if interreflection[0] and pair.max_depth != 2:
-        return Plan(decisions, terms, "path", pair.max_depth, SAMPLER, SPP, PASSES, rr_depth)
-    tabulated = not occlusion[0] and _can_tabulate(pair.physical)
-    random = [
-        light
-        for light in structure.lights
-        if light.kind not in EXACT_LIGHTS and not (tabulated and light.kind == "constant")
-    ]
-    passes = PASSES if random or mi.is_spectral else DETERMINISTIC_PASSES
-    return Plan(
-        decisions,
-        terms,
-        "direct_all",
-        2,
-        SAMPLER,
-        SPP,
-        passes,
-        shadows=occlusion[0],
+    facts = Facts(pair, examine(pair.physical, scene), interpolation)
+    decisions = tuple(effect.decide(facts) for effect in EFFECTS)
+    chosen = _reference(facts, decisions)
+    return chosen.unpruned() if everything else chosen
+
+
+def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
+    """Return the cheapest plan that is right, by the table of the module's docstring."""
+    pair, graph = facts.pair, facts.pair.physical
+    stock = Plan(
+        decisions=decisions,
+        kernel_terms=facts.kernel_terms,
+        integrator=_stock(pair),
+        max_depth=pair.max_depth,
+        stock_integrator=_stock(pair),
+        scene_depth=pair.max_depth,
+        rr_depth=pair.rr_depth or RR_DEPTH,
+    )
+    if pair.media or facts.is_clear or 0 <= pair.max_depth < 2:
+        return stock
+    if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
+        exact = [light for light in facts.structure.lights if is_exact(light.kind)]
+        if len(exact) > 1 and _diffuse(graph):
+            return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
+        return replace(stock, integrator="path")
+    tabulated = not stock.calls_for(OCCLUSION) and _can_tabulate(graph)
+    is_random = mi.is_spectral or any(
+        not is_exact(light.kind) and not (tabulated and light.kind == "constant")
+        for light in facts.structure.lights
+    )
+    return replace(
+        stock.directly(),
+        rr_depth=STOCK_RR_DEPTH,
+        passes=PASSES if is_random else DETERMINISTIC_PASSES,
         tabulate_environment=tabulated,
     )
 
 
-def _stock(pair):
+def _stock(pair: Pair) -> str:
     """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media."""
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator
@@ -160,7 +123,7 @@ def _stock(pair):
     return "volpathmis" if coloured else "volpath"
 
 
-def wants_spectra(graph):
+def wants_spectra(graph: Graph) -> bool:
     """Tell whether a scene holds spectra that three numbers cannot stand for.
 
     Those are tabulated spectra, black bodies and spectral films; uniform values, RGB and Mitsuba's
@@ -177,98 +140,14 @@ def wants_spectra(graph):
     )
 
 
-def _decisions(pair, structure, interpolation, occlusion, interreflection):
-    """Return a decision for each effect."""
-
-    def structural(effect, called_for, evidence):
-        rule = "simulated" if called_for and effect in _UNDECIDED else "structural"
-        return Decision(effect, bool(called_for), rule, evidence)
-
-    heuristic, physical = pair.heuristic, pair.physical
-    kinds = [light.kind for light in structure.lights]
-    listing = ", ".join(sorted(set(kinds))) or "none"
-    plugins = {physical.plugin(index) for index in physical.nodes(BSDF)}
-    has_environment = any(
-        light.shape is None and light.kind not in (*EXACT_LIGHTS, "projector")
-        for light in structure.lights
-    )
-    found = {
-        Effect.EMISSION: _coefficient(heuristic, "k_i"),
-        Effect.AMBIENT: _coefficient(heuristic, "k_a")
-        if "ambient" in heuristic.props(heuristic.nodes(mi.ObjectType.Integrator)[0])
-        else (False, "no ambient light"),
-        Effect.DIFFUSE: _coefficient(heuristic, "k_d"),
-        Effect.SPECULAR: _coefficient(heuristic, "k_s"),
-        Effect.ATTENUATION: _attenuation(heuristic),
-        Effect.CONE: ("spot" in kinds or _spots(heuristic), f"lights: {listing}"),
-        Effect.POLYGONS: (
-            interpolation is not Interpolation.PHONG,
-            f"interpolation {interpolation.value}",
-        ),
-        Effect.OCCLUSION: occlusion,
-        Effect.MICROFACETS: (
-            bool(plugins - {"diffuse", "null", *WRAPPERS}),
-            f"BSDFs: {', '.join(sorted(plugins))}",
-        ),
-        Effect.EXTENDED: (
-            any(light.shape is not None for light in structure.lights),
-            f"lights: {listing}",
-        ),
-        Effect.ENVIRONMENT: (has_environment, f"lights: {listing}"),
-        Effect.INTERREFLECTION: interreflection,
-        Effect.TRANSMISSION: (
-            any(not shape.opaque for shape in structure.shapes),
-            "a BSDF may let light through"
-            if any(not shape.opaque for shape in structure.shapes)
-            else "every BSDF is opaque",
-        ),
-        Effect.SPECTRAL: (mi.is_spectral, f"variant {mi.variant()}"),
-    }
-    return tuple(structural(effect, *found[effect]) for effect in Effect)
-
-
-_UNDECIDED = (Effect.OCCLUSION, Effect.INTERREFLECTION, Effect.TRANSMISSION)
-"""Effects whose rule proves absence only: called for means that no proof was found."""
-
-
-def _present(graph, name):
-    return any(
-        values.may_be_nonzero(graph.props(index)[name])
-        for index in graph.nodes(BSDF)
-        if graph.plugin(index) == "phong" and name in graph.props(index)
-    )
-
-
-def _coefficient(graph, name):
-    present = _present(graph, name)
-    return present, f"{name} is {'not 0 in some material' if present else '0 in every material'}"
-
-
-def _attenuation(graph):
-    """Distance attenuation: any point or spot whose ``f_att`` is not 1."""
-    attenuated = [
-        graph.label(index)
-        for index in graph.nodes(EMITTER)
-        if graph.plugin(index) in ("heuristic_point", "heuristic_spot")
-        and (graph.props(index).get("k1", 0.0), graph.props(index).get("k2", 0.0)) != (0.0, 0.0)
-    ]
-    if attenuated:
-        return True, f"{attenuated[0]} falls off with distance"
-    return False, "no light of the heuristic half falls off with distance"
-
-
-def _spots(graph):
-    return any(graph.plugin(index) == "heuristic_spot" for index in graph.nodes(EMITTER))
-
-
-def _diffuse(graph):
+def _diffuse(graph: Graph) -> bool:
     return all(graph.plugin(index) in ("diffuse", "twosided") for index in graph.nodes(BSDF))
 
 
-def _can_tabulate(graph):
+def _can_tabulate(graph: Graph) -> bool:
     """Tell whether the environment can be tabulated: one plain BSDF, one constant light, RGB."""
     shapes = graph.nodes(mi.ObjectType.Shape)
     extended = [graph.plugin(i) for i in graph.nodes(EMITTER)]
-    extended = [plugin for plugin in extended if plugin not in EXACT_LIGHTS]
+    extended = [plugin for plugin in extended if not is_exact(plugin)]
     textures = graph.nodes(mi.ObjectType.Texture)
     return len(shapes) == 1 and extended == ["constant"] and not textures and mi.is_rgb

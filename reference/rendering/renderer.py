@@ -216,18 +216,17 @@ def variant(name):
 def physical_integrator(plan, scene, hide_emitters):
     """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
+    description = {
+        "type": plan.integrator,
+        "hide_emitters": hide_emitters,
+        "max_depth": plan.max_depth,
+    }
     if plan.integrator in PATHS:
-        description = {"type": plan.integrator, "hide_emitters": hide_emitters}
-        return mi.load_dict(description | {"max_depth": plan.max_depth, "rr_depth": plan.rr_depth})
-    integrator = mi.load_dict(
-        {
-            "type": plan.integrator,
-            "hide_emitters": hide_emitters,
-            "shadows": plan.shadows,
-            "max_depth": plan.max_depth,
-        }
-    )
-    if plan.tabulate_environment:
+        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
+    own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
+    integrator = mi.load_dict(description | own)
+    # An effect that is left out may be the environment itself.
+    if plan.tabulate_environment and scene.environment() is not None:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
 

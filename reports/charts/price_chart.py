@@ -1,6 +1,6 @@
 """How effects are shown: a colour each, and their prices as a chart."""
 
-from reference.planning.effects import Effect
+from reference.effects.enumeration import EFFECTS
 
 TITLE = "Effects"
 """Of the map of what dominates where."""
@@ -8,28 +8,12 @@ TITLE = "Effects"
 WIDTH, STEP = 340, 30
 """Pixels of the plot, and of one effect's row."""
 
-COLOURS = {
-    Effect.OCCLUSION: "#0072b2",
-    Effect.INTERREFLECTION: "#e69f00",
-    Effect.MICROFACETS: "#cc79a7",
-    Effect.EXTENDED: "#56b4e9",
-    Effect.ENVIRONMENT: "#009e73",
-    Effect.ATTENUATION: "#d55e00",
-    Effect.POLYGONS: "#f0e442",
-    Effect.CONE: "#999933",
-    Effect.TRANSMISSION: "#44aa99",
-    Effect.SPECTRAL: "#882255",
-}
+COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
 """Of the effects that have a price: the seven of Okabe and Ito for what often comes together, and
 three of Tol's muted scheme. Both are made to be told apart with the common colour deficiencies."""
 
 NO_EFFECT = "#dee2e6"
 """Where no effect removes enough to be seen."""
-
-
-def colour(name):
-    """Return the colour of an effect by its label."""
-    return next(colour for effect, colour in COLOURS.items() if effect.label == name)
 
 
 def price_chart(data):
@@ -59,7 +43,7 @@ def price_chart(data):
         "legend": None,
         "scale": {
             "domain": [row["effect"] for row in rows],
-            "range": [colour(row["effect"]) for row in rows],
+            "range": [COLOURS[row["effect"]] for row in rows],
         },
     }
     point = {"type": "point", "filled": False, "size": 45, "color": "currentColor"}

@@ -128,7 +128,7 @@ def _effect_map(study):
         "width": places.shape[1],
         "height": places.shape[0],
         "names": list(study.effects),
-        "colours": [price_chart.colour(name) for name in study.effects],
+        "colours": [price_chart.COLOURS[name] for name in study.effects],
         "map": "".join(letters[int(place)] for place in places.ravel()),
     }
 

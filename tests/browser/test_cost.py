@@ -65,7 +65,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
     study = report.study
     known = dominating(study.effects, study.counted)[place(*pixel)]
     names = [*study.effects, "", "none to be seen"]
-    colours = [*map(price_chart.colour, study.effects), "#82888f", price_chart.NO_EFFECT]
+    colours = [*map(price_chart.COLOURS.get, study.effects), "#82888f", price_chart.NO_EFFECT]
     shown = visitor.inspected()["effect"]
     assert shown == (names[known] or "–") or (shown == "" and not names[known])
     x, y = pixel[0] + (2 if pixel[0] != 23 else -2), pixel[1]  # beside the mark

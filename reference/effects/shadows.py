@@ -1,16 +1,21 @@
-"""The structural rules of planning: each returns whether light is blocked or exchanged, and why.
+"""Shadows: whether light may be blocked.
 
-A rule that says *no* is a proof, written in its docstring. A rule that says *yes* only means that
-no proof was found, and the effect is simulated.
+The rule that says *no* is a proof, written in its docstring. Where it says *yes*, no proof was
+found, and shadows are simulated.
 """
 
+from dataclasses import replace
+
 import numpy as np
+
+from reference.effects.effect import Effect
+from reference.planning.structure import LightFacts, ShapeFacts, Structure
 
 FAR = 1e6
 """Where the shadow of a directional light begins, in multiples of the scene's size."""
 
 
-def occlusion(structure):
+def occlusion(structure: Structure) -> tuple[bool, str]:
     """Whether a shape may hide a light from another shape, or from itself.
 
     *Proof of no.* Light from a point ``y`` reaches a surface point ``x`` along a segment, which
@@ -42,36 +47,9 @@ def occlusion(structure):
     return False, "no shape can stand between a light and a reflecting surface"
 
 
-def interreflection(structure):
-    """Whether light that one surface reflects may reach another surface that reflects.
-
-    *Proof of no.* A second reflection needs two surface points, both on shapes whose BSDFs reflect,
-    that see each other. Two points of one convex shape never do. Two points of different shapes do
-    not where one of the shapes is flat, reflects on one side, and the other lies behind it. A shape
-    that reflects nothing takes no part. A camera inside a convex shape would see its inside, where
-    the first argument fails.
-    """
-    reflecting = [shape for shape in structure.shapes if shape.reflects]
-    for shape in structure.shapes:
-        if not shape.opaque:
-            return True, f"{shape.name}: its BSDF may let light through"
-    for shape in reflecting:
-        if not shape.convex:
-            return True, f"{shape.name}: not convex, or with smoothed normals, so may light itself"
-        if shape.plane is None and any(_inside(camera, shape) for camera in structure.cameras):
-            return True, f"{shape.name}: a camera may look at it from inside"
-    for number, first in enumerate(reflecting):
-        for second in reflecting[number + 1 :]:
-            if first.may_face(second) and second.may_face(first):
-                return True, f"{first.name} and {second.name} may see each other"
-    if not reflecting:
-        return False, "nothing reflects"
-    if len(reflecting) == 1:
-        return False, f"only {reflecting[0].name} reflects, and it is convex"
-    return False, "no two reflecting shapes see each other"
-
-
-def _may_hide(structure, light, receiver, obstacle):
+def _may_hide(
+    structure: Structure, light: LightFacts, receiver: ShapeFacts, obstacle: ShapeFacts
+) -> bool:
     """Tell whether an obstacle may be met on the way from a light to a receiver."""
     if light.shape == obstacle.name and obstacle.convex:
         return False  # a convex light does not hide its own near side
@@ -93,5 +71,18 @@ def _may_hide(structure, light, receiver, obstacle):
     return bool(np.all(low <= obstacle.high) and np.all(obstacle.low <= high))
 
 
-def _inside(point, shape):
-    return bool(np.all(point >= shape.low) and np.all(point <= shape.high))
+OCCLUSION = Effect(
+    order=80,
+    label="occlusion",
+    heuristic="none, or where asked for",
+    reference="shadow rays",
+    cost="a ray a light",
+    rule=lambda facts: occlusion(facts.structure),
+    undecided=True,
+    part="visibility",
+    colour="#0072b2",
+    differs=lambda facts, called_for: called_for and not facts.has_shadows,
+    # A sample of the BSDF would meet what hides a light.
+    without=lambda plan: replace(plan, shadows=False, bsdf_samples=0),
+    step="shadows",
+)

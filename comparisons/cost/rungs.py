@@ -1,0 +1,160 @@
+"""The rungs of the ladder, each declared once: here, or from outside the package.
+
+A rung is a name and a method: the heuristic kernel with options, or the plan of a scene with some
+effects left out or paths of limited depth. One from outside stands before the full plan::
+
+    from comparisons.cost.rungs import Physical, Rung, declare
+    from reference.effects.shadows import OCCLUSION
+
+    declare(Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION}), 2)))
+
+or is named by an installed package as an entry point of the group ``fotismos.rungs``.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Literal
+
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from reference.effects.effect import Effect
+from reference.effects.enumeration import EFFECTS
+from reference.effects.interreflection import INTERREFLECTION
+
+GROUP = "fotismos.rungs"
+
+DEPTHS = (3, 4, 5)
+"""Depths of ``path`` that are rungs, as Mitsuba counts: 2 is direct light."""
+
+Family = Literal["kernel", "phong BSDF", "physical"]
+"""What shades: charts give each family a colour and a shape."""
+
+BSDF_FORMS = frozenset(effect for effect in EFFECTS if effect.part == "BSDF form")
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """The heuristic kernel, without random numbers but the pixel filter's.
+
+    Attributes
+    ----------
+    interpolation
+        Of its shading.
+    shadows
+        Whether it traces shadow rays.
+    """
+
+    interpolation: Interpolation = Interpolation.PHONG
+    shadows: bool = False
+
+
+@dataclass(frozen=True)
+class Physical:
+    """Mitsuba's integrators, as the scene's plan has them.
+
+    Attributes
+    ----------
+    without
+        Effects to leave out.
+    max_depth
+        Limit of path length as Mitsuba counts, None for the scene's own.
+
+    Raises
+    ------
+    InputError
+        When an effect cannot be left out: it takes the kernel, or another image beside this one.
+    """
+
+    without: frozenset[Effect] = frozenset()
+    max_depth: int | None = None
+
+    def __post_init__(self) -> None:
+        allowed = {e for e in EFFECTS if e.without or (e.graft and not e.glow)}
+        for effect in self.without - allowed:
+            labels = ", ".join(e.label for e in EFFECTS if e in allowed)
+            raise InputError(
+                f"a rung without {effect.label} is not possible: those that can be left out are"
+                f" {labels}."
+            )
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A method of the ladder.
+
+    Attributes
+    ----------
+    name
+        As tables and charts call it.
+    family
+        What shades.
+    method
+        What is simulated.
+    """
+
+    name: str
+    family: Family
+    method: Kernel | Physical
+
+
+KERNELS = (
+    Rung("flat kernel", "kernel", Kernel(Interpolation.FLAT)),
+    Rung("Gouraud kernel", "kernel", Kernel(Interpolation.GOURAUD)),
+    Rung("Phong kernel", "kernel", Kernel()),
+    Rung("kernel with shadows", "kernel", Kernel(shadows=True)),
+)
+PHONG_BSDF = Rung("phong BSDF, full transport", "phong BSDF", Physical(BSDF_FORMS))
+DIRECT = Rung("direct", "physical", Physical(frozenset({INTERREFLECTION})))
+FULL_PLAN = Rung("full plan", "physical", Physical())
+
+_declared: dict[str, Rung] = {}
+
+
+def declare(rung: Rung) -> None:
+    """Add a rung to the ladder of every scene, in place of one of its name that was declared.
+
+    Raises
+    ------
+    InputError
+        When a rung of the package has the name.
+    """
+    if any(rung.name == own.name for own in _own(DEPTHS)):
+        raise InputError(f"the name {rung.name!r} is taken by a rung of fotismos: give another.")
+    _declared[rung.name] = rung
+
+
+def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:
+    """Return all rungs, cheapest idea first.
+
+    Parameters
+    ----------
+    depths
+        Depths of ``path`` that are rungs.
+
+    Raises
+    ------
+    InputError
+        When an entry point cannot be loaded, or its rung not declared.
+    """
+    _load()
+    *cheaper, full = _own(depths)
+    return (*cheaper, *_declared.values(), full)
+
+
+def _own(depths: tuple[int, ...]) -> tuple[Rung, ...]:
+    paths = [Rung(f"path {depth}", "physical", Physical(max_depth=depth)) for depth in depths]
+    return (*KERNELS, PHONG_BSDF, DIRECT, *paths, FULL_PLAN)
+
+
+@cache
+def _load() -> None:
+    for entry in entry_points(group=GROUP):
+        try:
+            found = entry.load()
+        except Exception as error:  # whatever the code of another package raises
+            raise InputError(
+                f"{entry.value}, an entry point of {GROUP}, cannot be loaded: {error}. Mend or"
+                " uninstall the package that names it."
+            ) from error
+        declare(found)

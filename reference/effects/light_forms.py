@@ -1,0 +1,182 @@
+"""What lights have in another form in the two halves: fall-off, cone, extent, surroundings."""
+
+from collections.abc import Iterable
+
+import mitsuba as mi
+
+from reference.effects.effect import Effect
+from reference.effects.grafting import graft
+from reference.planning.facts import Facts
+from reference.planning.structure import EMITTER, SHAPE
+from reference.scene.graph import Graph
+
+
+def is_exact(plugin: str) -> bool:
+    """Tell whether a light has a single point or direction, and so needs no random number."""
+    return plugin in ("point", "spot", "directional")
+
+
+def is_heuristic(plugin: str) -> bool:
+    """Tell whether a light is one of the heuristic model's own."""
+    return plugin in ("heuristic_point", "heuristic_spot", "heuristic_directional")
+
+
+def _has_cone(plugin: str) -> bool:
+    return plugin in ("spot", "heuristic_spot")
+
+
+def _is_attenuated(plugin: str) -> bool:
+    return plugin in ("heuristic_point", "heuristic_spot")
+
+
+def _is_surrounding(plugin: str) -> bool:
+    return not is_exact(plugin) and plugin != "projector"
+
+
+def _inexact(facts: Facts, with_cone: bool) -> list[str]:
+    """Return the keys of the scene's lights whose two forms differ by cone, or by fall-off alone.
+
+    A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
+    """
+    heuristic, physical = facts.pair.heuristic, dict(facts.pair.physical.children(0, EMITTER))
+    inexact = {record.name for record in facts.pair.emitters if not record.exact}
+    return [
+        key
+        for key, index in heuristic.children(0, EMITTER)
+        if key in physical
+        and _is_attenuated(heuristic.plugin(index))
+        and _has_cone(heuristic.plugin(index)) is with_cone
+        and heuristic.label(index) in inexact
+    ]
+
+
+def _replace(graph: Graph, facts: Facts, keys: Iterable[str]) -> None:
+    """Put the heuristic half's lights in the place of those under some keys of the scene."""
+    lights = dict(facts.pair.heuristic.children(0, EMITTER))
+    for key in keys:
+        graph.attach(0, key, graft(graph, facts.pair.heuristic, lights[key]))
+
+
+def _attenuated(facts: Facts) -> tuple[bool, str]:
+    """Distance attenuation: any point or spot whose ``f_att`` is not 1."""
+    graph = facts.pair.heuristic
+    attenuated = [
+        graph.label(index)
+        for index in graph.nodes(EMITTER)
+        if _is_attenuated(graph.plugin(index))
+        and (graph.props(index).get("k1", 0.0), graph.props(index).get("k2", 0.0)) != (0.0, 0.0)
+    ]
+    if attenuated:
+        return True, f"{attenuated[0]} falls off with distance"
+    return False, "no light of the heuristic half falls off with distance"
+
+
+def _coned(facts: Facts) -> tuple[bool, str]:
+    halves = facts.pair.heuristic, facts.pair.physical
+    found = any(_has_cone(half.plugin(index)) for half in halves for index in half.nodes(EMITTER))
+    return found, facts.lights_in_words
+
+
+def _shining(facts: Facts) -> list[int]:
+    """Return the shapes of the physical half that are lights."""
+    graph = facts.pair.physical
+    return [shape for shape in graph.nodes(SHAPE) if graph.children(shape, EMITTER)]
+
+
+def _replace_shining(graph: Graph, facts: Facts) -> None:
+    """Put the heuristic half's points and spots in the place of area lights."""
+    for shape in _shining(facts):
+        for key, _ in graph.children(shape, EMITTER):
+            graph.detach(shape, key)
+            if facts.pair.hide_emitters:
+                graph.remove(shape)
+    given = dict(facts.pair.physical.children(0, EMITTER))
+    lights = facts.pair.heuristic.children(0, EMITTER)
+    _replace(graph, facts, (key for key, _ in lights if key not in given))
+
+
+def _surroundings(facts: Facts) -> list[str]:
+    """Return the keys of the physical half's lights that have no single point or direction."""
+    graph = facts.pair.physical
+    children = graph.children(0, EMITTER)
+    return [key for key, index in children if not is_exact(graph.plugin(index))]
+
+
+def _surrounded(facts: Facts) -> tuple[bool, str]:
+    lights = [light for light in facts.structure.lights if light.shape is None]
+    return any(_is_surrounding(light.kind) for light in lights), facts.lights_in_words
+
+
+def _detach_surroundings(graph: Graph, facts: Facts) -> None:
+    for key in _surroundings(facts):
+        graph.detach(0, key)
+
+
+def _emitted(phong: mi.Properties, facts: Facts) -> dict:
+    return {"k_i": phong["k_i"]} if "k_i" in phong else {}
+
+
+def _ambient(phong: mi.Properties, facts: Facts) -> dict:
+    if "k_a" not in phong or "ambient" not in facts.kernel:
+        return {}
+    return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
+
+
+ATTENUATION = Effect(
+    order=50,
+    label="distance attenuation",
+    heuristic="f_att (6.1, 8.6)",
+    reference="1 / d^2",
+    cost="a division a light",
+    rule=_attenuated,
+    part="light form",
+    colour="#d55e00",
+    differs=lambda facts, called_for: bool(_inexact(facts, with_cone=False)),
+    graft=lambda graph, facts: _replace(graph, facts, _inexact(facts, with_cone=False)),
+)
+
+CONE = Effect(
+    order=60,
+    label="spot cone",
+    heuristic="6.2-6.4",
+    reference="spot",
+    cost="a comparison and a power a light",
+    rule=_coned,
+    part="light form",
+    colour="#999933",
+    differs=lambda facts, called_for: bool(_inexact(facts, with_cone=True)),
+    graft=lambda graph, facts: _replace(graph, facts, _inexact(facts, with_cone=True)),
+)
+
+EXTENDED = Effect(
+    order=100,
+    label="extended lights",
+    heuristic="a spot or point",
+    reference="sampled area lights",
+    cost="samples, two rays each",
+    rule=lambda facts: (
+        any(light.shape is not None for light in facts.structure.lights),
+        facts.lights_in_words,
+    ),
+    part="light form",
+    colour="#56b4e9",
+    sampled=True,
+    differs=lambda facts, called_for: bool(_shining(facts)),
+    graft=_replace_shining,
+    glow=_emitted,
+)
+
+ENVIRONMENT = Effect(
+    order=110,
+    label="environment",
+    heuristic="ambient light",
+    reference="light from everywhere",
+    cost="samples, or a table",
+    rule=_surrounded,
+    part="light form",
+    colour="#009e73",
+    sampled=True,
+    differs=lambda facts, called_for: bool(_surroundings(facts)),
+    graft=_detach_surroundings,
+    glow=_ambient,
+)

@@ -1,0 +1,91 @@
+"""Rungs from outside the package: found on the ladder, in the study, and in its tables."""
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from comparisons.compare import prepare
+from comparisons.cost import rungs
+from comparisons.cost.cost import cost
+from comparisons.cost.methods import Methods
+from comparisons.cost.rungs import Kernel, Physical, Rung, declare
+from comparisons.gallery.builtin import SCENES
+from comparisons.options import Options
+from heuristic.errors import InputError
+from reference.effects.light_forms import EXTENDED
+from reference.effects.shadows import OCCLUSION
+from reports.terminal import cost_tables, tables
+from tests.test_cost import TINY
+
+TOY = Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION}), max_depth=2))
+
+
+@pytest.fixture(autouse=True)
+def only_here(monkeypatch):
+    """Forget afterwards what a test declares."""
+    monkeypatch.setattr(rungs, "_declared", {})
+    rungs._load.cache_clear()
+    yield
+    rungs._load.cache_clear()
+
+
+def named(name):
+    source = SCENES[name].source()
+    chosen = Options(resolution=(12, 12))
+    return [rung.names for rung in Methods(source, chosen, prepare(source, chosen), (3,)).rungs]
+
+
+def test_a_declared_rung_is_in_the_study_and_its_tables(rgb):
+    declare(TOY)
+    study = cost(SCENES["cornell-box"].source(), Options(resolution=(12, 12)), TINY)
+    points = {point["rung"]: point for point in study.data["points"]}
+    assert TOY.name in points
+    # Light that passes through boxes is brighter than with shadows.
+    assert study.rungs[TOY.name].mean() > 1.02 * study.rungs["direct"].mean()
+    assert any(TOY.name in line for line in cost_tables.lines(study.data))
+    _, rows = tables.methods(study.data)
+    assert any(TOY.name in map(str, row) for row in rows)
+
+
+def test_a_declared_rung_stands_before_the_full_plan(rgb):
+    declare(TOY)
+    assert named("plastic-spheres")[-2:] == [(TOY.name,), ("full plan",)]
+
+
+def test_a_declared_rung_that_the_scene_cannot_tell_apart_is_merged(rgb):
+    """Nothing shadows the one ball of the figure."""
+    declare(TOY)
+    assert named("fig-8-9")[-1] == ("direct", "path 3", TOY.name, "full plan")
+
+
+def test_declaring_a_name_again_replaces_the_rung():
+    declare(TOY)
+    again = Rung(TOY.name, "kernel", Kernel(shadows=True))
+    declare(again)
+    assert rungs.rungs()[-2] == again
+    assert rungs.rungs()[-2:] == (again, rungs.FULL_PLAN)
+
+
+def test_the_packages_own_names_are_refused():
+    with pytest.raises(InputError, match=r"'direct' is taken .* give another"):
+        declare(Rung("direct", "physical", Physical()))
+
+
+def test_what_no_integrator_leaves_out_is_refused():
+    with pytest.raises(InputError, match=r"without extended lights .* occlusion, microfacets"):
+        Physical(frozenset({EXTENDED}))
+
+
+def test_an_installed_package_can_name_a_rung(monkeypatch):
+    entry = EntryPoint("toy", "tests.test_declared_rungs:TOY", rungs.GROUP)
+    monkeypatch.setattr(
+        rungs, "entry_points", lambda group: [entry] if group == entry.group else []
+    )
+    assert rungs.rungs()[-2] == TOY
+
+
+def test_an_entry_point_that_cannot_be_loaded_says_which(monkeypatch):
+    entry = EntryPoint("toy", "tests.test_declared_rungs:MISSING", rungs.GROUP)
+    monkeypatch.setattr(rungs, "entry_points", lambda group: [entry])
+    with pytest.raises(InputError, match=r"MISSING, an entry point of fotismos\.rungs, cannot be"):
+        rungs.rungs()
