@@ -336,8 +336,11 @@ def test_a_camera_without_a_viewpoint_has_no_flat_and_gouraud_rungs(rgb):
 
 
 def test_all_rungs_are_of_the_sensor_that_was_asked_for(rgb):
-    source = Source("several", CORPUS / "sensor-several.xml")
-    seen = Options(sensor=1)
+    several = described(ball={"type": "sphere"}, size=32)
+    view = mi.ScalarTransform4f().look_at((4, 0, 1), (0, 0, 0), (0, 0, 1))
+    film = {"type": "hdrfilm", "width": 16, "height": 24, "rfilter": {"type": "box"}}
+    several["second"] = {"type": "perspective", "to_world": view, "film": film}
+    source, seen = Source("several", several), Options(sensor=1)
     assert reduced(source, seen, 1000) != reduced(source, Options(), 1000)
     pairs = Pairs(source, seen, prepare(source, seen))
     first, flat = (
