@@ -53,8 +53,7 @@ def test_every_effect_that_tells_the_halves_apart_has_a_part_and_a_colour_of_its
 
 
 def test_what_is_grafted_or_left_out_also_says_where_the_halves_differ():
+    nowhere = kernel_terms.EMISSION.differs
     for effect in EFFECTS:
-        if effect.graft or effect.without:
-            assert effect.differs.__name__ != "_nowhere", effect
-        if effect.glow:
-            assert effect.graft, effect
+        assert (effect.differs is not nowhere) is bool(effect.graft or effect.without), effect
+        assert effect.graft or not effect.glow, effect

@@ -11,10 +11,6 @@ PARTS = ("interpolation", "spectral", "visibility", "light form", "BSDF form", "
 """The parts of a departure that effects make, in the order in which they are split off."""
 
 
-def _nowhere(facts: Facts, called_for: bool) -> bool:
-    return False
-
-
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Effect:
     """An effect of light. Two are equal only if they are the same.
@@ -60,7 +56,7 @@ class Effect:
     part: str | None = None
     colour: str | None = None
     sampled: bool = False
-    differs: Callable[[Facts, bool], bool] = _nowhere
+    differs: Callable[[Facts, bool], bool] = lambda facts, called_for: False
     graft: Callable[[Graph, Facts], None] | None = None
     glow: Callable[[Any, Facts], dict] | None = None
     without: Callable[[Any], Any] | None = None

@@ -72,23 +72,17 @@ class Plan:
         max_depth
             Of paths, in place of the plan's own; at 2 interreflection is left out.
         """
-        omitted = [
-            effect
-            for effect in EFFECTS
-            if effect.without is not None
-            and self.calls_for(effect)
-            and (effect not in effects or (effect is INTERREFLECTION and max_depth == 2))
-        ]
+        if max_depth == 2:
+            effects = set(effects) - {INTERREFLECTION}
+        omitted = [e for e in EFFECTS if e.without and e not in effects and self.calls_for(e)]
         plan = self.directly() if omitted else self
         for effect in omitted:
             plan = effect.without(plan)
-        if max_depth is None or INTERREFLECTION in omitted or max_depth == plan.max_depth:
-            return plan
-        if not self.calls_for(INTERREFLECTION):
+        is_limited = self.calls_for(INTERREFLECTION) and INTERREFLECTION not in omitted
+        if max_depth in (None, plan.max_depth) or not is_limited:
             return plan
         # Without shadows there is no `path`.
-        integrator = "direct_all" if omitted else "path"
-        return replace(plan, integrator=integrator, max_depth=max_depth)
+        return replace(plan, integrator="direct_all" if omitted else "path", max_depth=max_depth)
 
     def directly(self) -> "Plan":
         """Return this plan with ``direct_all``, which can leave out what ``path`` cannot."""
