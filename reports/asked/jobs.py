@@ -41,22 +41,14 @@ def output_option(default):
     )
 
 
-def figures_option(command):
-    """Add the option that writes figures for print."""
-    return click.option(
-        "--figures",
-        is_flag=True,
-        help="Write figures for print, as SVG and PDF, to OUTPUT/figures.",
-    )(command)
-
-
-def fresh_option(command):
-    """Add the option that renders what is finished already."""
-    return click.option(
-        "--fresh",
-        is_flag=True,
-        help="Render all scenes; without it, finished ones are found again in OUTPUT.",
-    )(command)
+figures_option = click.option(
+    "--figures", is_flag=True, help="Write figures for print, as SVG and PDF, to OUTPUT/figures."
+)
+fresh_option = click.option(
+    "--fresh",
+    is_flag=True,
+    help="Render all scenes; without it, finished ones are found again in OUTPUT.",
+)
 
 
 def rendering_options(command):
