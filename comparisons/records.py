@@ -19,7 +19,7 @@ VERSION = 2
 Kind = TypeVar("Kind")
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Something that is written as a JSON object."""
 
 

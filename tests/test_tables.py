@@ -6,10 +6,13 @@ from io import StringIO
 
 import pytest
 from markdown_it import MarkdownIt
+from msgspec import structs
 
+from comparisons.effects.prices import Price
+from comparisons.intervals import Estimated
 from reports.run import output
 from reports.terminal import tables
-from tests import records
+from tests import cost_records, records
 
 
 def two_records():
@@ -52,16 +55,18 @@ def test_a_scene_takes_no_name_of_a_folder_of_the_run():
 
 
 def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
-    amount = {"value": 1.5, "low": 1.25, "high": 1.75}
-    price = {"effect": "occlusion", "removes": amount, "adds_s": amount, "alone": -0.5, "last": 3.0}
-    seconds = {"median": 0.25, "low": 0.125, "high": 0.5}
-    point = {"rung": "direct", "spp": 4, "seconds": seconds, "pareto": True}
-    data = {
-        "points": [point | {"error": 12.75, "error_stderr": 0.03125}],
-        "prices": {"effects": [price]},
-    }
-    tables.write_cost(tmp_path / "tables", "box", data)
-    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").iterdir()}
+    amount = Estimated(1.5, 1.25, 1.75)
+    price = Price("occlusion", amount, -0.5, 3.0, amount, 0.0)
+    found = cost_records.record()
+    seconds = structs.replace(found.points[0].seconds, median=0.25, low=0.125, high=0.5)
+    point = structs.replace(
+        found.points[0], rung="direct", spp=4, seconds=seconds, error=12.75, error_stderr=0.03125
+    )
+    prices = structs.replace(found.prices, effects=(price,))
+    tables.write_cost(
+        tmp_path / "tables", "box", structs.replace(found, points=(point,), prices=prices)
+    )
+    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
     assert sorted(read) == ["box-cost.csv", "box-cost.md", "box-prices.csv", "box-prices.md"]
     assert "\ndirect,4,0.25,0.125,0.5,12.75,0.03125,yes\n" in read["box-cost.csv"]
     assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-prices.csv"]

@@ -17,6 +17,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import METRICS
 from comparisons.record import Comparison
 from reports.charts import error_over_time, histograms
@@ -69,10 +70,10 @@ def write_run(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     write_chart(folder, "departures", departures(list(records)))
 
 
-def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
     ownership.folder(folder)
-    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(data))
+    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(record))
 
 
 def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:

@@ -22,14 +22,17 @@ from urllib.parse import quote
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from msgspec import structs
 
 from comparisons.departure.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
 from comparisons.departure.spaces import luminance
+from comparisons.records import plain
 from heuristic.equations import Entry
 from reports.charts import histograms, price_chart, vega
 from reports.files import images
 from reports.page import cost_overview, overview
 from reports.page.legends import legends
+from reports.run.cost_files import CostView
 from reports.run.stages import Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
 
@@ -95,6 +98,7 @@ def render(
         {"id": overview.identifier(name, taken), "name": name, "message": message}
         for name, message in failures
     ]
+    costs = [scene["cost"].record for scene in scenes if scene["cost"]]
     charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
     scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
@@ -114,8 +118,8 @@ def render(
             equations=equations,
             hard_cases=hard_cases,
             verifications=verifications,
-            cost_methods=cost_overview.METHODS,
-            cost_rows=cost_overview.rows(s["cost"]["record"] for s in scenes if s["cost"]),
+            cost_methods=cost_overview.methods(costs),
+            cost_rows=cost_overview.rows(costs),
             run=run,
         )
     )
@@ -141,10 +145,12 @@ def _scene(comparison: Mapping[str, Any], taken: set[str]) -> dict[str, Any]:
     }
 
 
-def _cost(view: Mapping[str, Any] | None) -> dict[str, Any] | None:
+def _cost(view: CostView | None) -> CostView | None:
+    """Turn the pictures into addresses."""
     if view is None:
         return None
-    return {**view, "images": {name: _data_uri(png) for name, png in view["images"].items()}}
+    uris = {name: _data_uri(png) for name, png in view.images.items()}
+    return structs.replace(view, images=uris)
 
 
 def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
@@ -177,7 +183,7 @@ def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
         "exposure": record["viewing"]["exposure"],
         "regions": record.get("regions", []),
         "images": embedded.manifest() if embedded else None,
-        "effects": scene["cost"]["effects"] if scene["cost"] else None,
+        "effects": plain(scene["cost"].effects) if scene["cost"] else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
         "failed": False,

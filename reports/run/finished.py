@@ -10,9 +10,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from markupsafe import Markup
+from msgspec import ValidationError, convert
 
+from comparisons.records import plain
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded, Plane
+from reports.run.cost_files import CostView
 
 FILE = "view.json"
 
@@ -38,7 +41,7 @@ def text(view, key):
             "key": key,
             "embedded": asdict(view["embedded"]),
             "charts": [asdict(figure) for figure in view["charts"]],
-            "cost": study and study | {"images": _encoded(study["images"])},
+            "cost": study and plain(study),
         }
     )
 
@@ -59,10 +62,10 @@ def load(place, key):
                 "charts": [
                     Figure(**figure | {"svg": Markup(figure["svg"])}) for figure in view["charts"]
                 ],
-                "cost": study and study | {"images": _decoded(study["images"])},
+                "cost": study and convert(study, CostView),
             }
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ValidationError):
         return None  # nothing there, or nothing of ours
 
 

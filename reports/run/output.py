@@ -94,7 +94,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         ),
         "embedded": embedding.embed(exr.channels(layers), shown.counted),
         "files": {file: f"{name}/{file}" for file in links},
-        "charts": cost_files.figures(study.data) if study else (),
+        "charts": cost_files.figures(study.record) if study else (),
         "cost": cost_files.view(study, priced) if study else None,
     }
     with ownership.replacing_folder(folder / name, keep=None if study else COST_FILES) as place:

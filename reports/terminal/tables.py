@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import METRICS
 from reports.files import ownership
 from reports.terminal.printing import number, percent
@@ -53,44 +54,44 @@ def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     ownership.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
 
 
-def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
     ownership.folder(folder)
-    for part, (headings, rows) in {"cost": methods(data), "prices": prices(data)}.items():
+    for part, (headings, rows) in {"cost": methods(record), "prices": prices(record)}.items():
         ownership.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
         shown = [[_shown(cell) for cell in row] for row in rows]
         ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(headings, shown)) + "\n")
 
 
-def methods(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+def methods(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
     """Return headings and rows of a study's methods: seconds for one image, and mean ΔE2000."""
     headings = ("method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front")
     rows = [
         [
-            point["rung"],
-            point["spp"],
-            *(point["seconds"][key] for key in ("median", "low", "high")),
-            point["error"],
-            point["error_stderr"],
-            "yes" if point["pareto"] else "no",
+            point.rung,
+            point.spp,
+            *(point.seconds.median, point.seconds.low, point.seconds.high),
+            point.error,
+            point.error_stderr,
+            "yes" if point.pareto else "no",
         ]
-        for point in data["points"]
+        for point in record.points
     ]
     return headings, rows
 
 
-def prices(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+def prices(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
     """Return headings and rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
     headings = ("effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s")
     rows = [
         [
-            price["effect"],
-            *(price["removes"][key] for key in ("value", "low", "high")),
-            price["alone"],
-            price["last"],
-            price["adds_s"]["value"],
+            price.effect,
+            *(price.removes.value, price.removes.low, price.removes.high),
+            price.alone,
+            price.last,
+            price.adds_s.value,
         ]
-        for price in data["prices"]["effects"]
+        for price in record.prices.effects
     ]
     return headings, rows
 

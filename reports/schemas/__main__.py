@@ -1,0 +1,23 @@
+"""Write the published schemas: ``python -m reports.schemas``."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from comparisons import records
+from comparisons.cost.cost_record import Cost
+
+FOLDER = Path(__file__).parent
+
+PUBLISHED: dict[str, Any] = {"cost": Cost}
+"""The type of each record that is written to a file, by the name of its schema."""
+
+
+def text(name: str) -> str:
+    """Return the content of a schema's file."""
+    return json.dumps(records.schema(PUBLISHED[name]), indent=2, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    for name in PUBLISHED:
+        (FOLDER / f"{name}.schema.json").write_text(text(name), encoding="utf-8")
