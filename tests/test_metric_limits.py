@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import METRICS, log2_luminance_ratio, require_finite, rmse
+from comparisons.departure.metrics import METRICS, log2_luminance_ratio, rmse
 from comparisons.departure.spaces import Viewing
 from heuristic.errors import NonFiniteError
+from reference.rendering.finite import require_finite
 
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
 COLOURS = {

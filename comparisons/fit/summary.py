@@ -6,7 +6,7 @@ from math import exp, sqrt
 import mitsuba as mi
 import numpy as np
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import drawn
 from comparisons.departure.statistics import noise_floor
 from comparisons.fit.identify import AT_BOUND, COVERAGE
 from heuristic.terms import normalisation
@@ -42,9 +42,9 @@ def departure(before, after, reference, counted, noise, viewing):
         The metric after the fit, (H, W).
     """
     data, maps = {}, {}
-    for name, metric in METRICS.items():
+    for name, metric in drawn().items():
         first, maps[name] = (metric(image, reference, viewing) for image in (before, after))
-        means = [float(values[counted].mean()) for values in (first, maps[name])]
+        means = [metric.mean(values[counted]) for values in (first, maps[name])]
         data[name] = {
             "before": means[0],
             "after": means[1],

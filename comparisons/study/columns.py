@@ -24,18 +24,19 @@ PARAMETERS = {
     for scene in SCENES.values()
     for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
 }
+LEAD = LEADING.label
+DEPARTURE = {
+    f"{LEADING.name}_p95": Column("1", f"{LEAD}, 95th percentile"),
+    f"{LEADING.name}_noise": Column("1", f"{LEAD} that the comparison's noise alone would give"),
+    f"{LEADING.name}_shape": Column("1", f"{LEAD}, mean, after the best exposure"),
+    "exposure": Column("1", f"factor on the heuristic image that makes {LEAD} smallest"),
+    **{name: Column("1", metric.heading) for name, metric in METRICS.items()},
+    RATIO.name: Column(RATIO.unit, "mean ratio of luminances, heuristic to reference"),
+}
 RESULTS = {
     "heuristic": Column("1", f"mean of the heuristic image, {LUMINANCE}"),
     "reference": Column("1", f"mean of the reference, {LUMINANCE}"),
-    "dE2000": Column("1", "CIE DE2000, mean"),
-    "dE2000_p95": Column("1", "CIE DE2000, 95th percentile"),
-    "dE2000_noise": Column("1", "CIE DE2000 that the noise of the comparison alone would give"),
-    "dE2000_shape": Column("1", "CIE DE2000, mean, after the best exposure"),
-    "exposure": Column("1", "factor on the heuristic image that makes CIE DE2000 smallest"),
-    "dE_ITP": Column("1", "ΔE ITP (ITU-R BT.2124) at 203 cd/m² for white, mean"),
-    "dE_CAM16UCS": Column("1", "distance in CAM16-UCS, mean"),
-    "rmse": Column("1", "root mean square difference, display-linear"),
-    "log2_luminance": Column("stops", "mean ratio of luminances, heuristic to reference"),
+    **DEPARTURE,
     "form": Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
     "occlusion": Column("1", "RMS change by shadows"),
     "interreflection": Column("1", "RMS change by light reflected more than once"),

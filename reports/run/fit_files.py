@@ -7,12 +7,9 @@ from pathlib import Path
 import matplotlib
 from PIL import Image, ImageDraw, ImageFont
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING, drawn
 from reports.files import images, ownership
 from reports.terminal.tables import printed, ruled
-
-SHOWN = "dE2000"
-"""The metric of the residual map in the picture."""
 
 SMALLEST_TILE = 256
 """Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
@@ -36,13 +33,12 @@ def picture(fit):
     Pictures as a display shows them; the map is over the metric's fixed range.
     """
     exposure = fit.data["viewing"]["exposure"]
-    metric = METRICS[SHOWN]
-    high = metric.map_range[1]
+    high, residual = LEADING.map_range[1], fit.images.maps[LEADING.name]
     tiles = {
         "paired": images.tonemap(fit.images.before, exposure),
         "reference": images.tonemap(fit.images.reference, exposure),
         f"fitted ({_form(_best(fit.data))})": images.tonemap(fit.images.after, exposure),
-        f"{metric.label} left, 0 to {high:g}": images.error_map(fit.images.maps[SHOWN], high),
+        f"{LEADING.label} left, 0 to {high:g}": images.error_map(residual, high),
     }
     width, height = next(iter(tiles.values())).size
     factor = max(1, -(-SMALLEST_TILE // min(width, height)))
@@ -86,13 +82,13 @@ def markdown(records, scenes):
         " give (*floor*). *Parameter error* is before less after, *model error* is after."
     )
     yield ""
-    labels = [metric.label for metric in METRICS.values()]
+    labels = [metric.label for metric in drawn().values()]
     heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
     yield from _row([*heading, "parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"])
     yield from _row(["---"] * 2 + ["---:"] * (len(labels) + 3))
     for data in records:
         best, seconds = _best(data), sum(data["time"].values())
-        departures = [best["departure"][name] for name in METRICS]
+        departures = [best["departure"][name] for name in drawn()]
         cells = [
             f"{d['before']:.3f} → {d['after']:.3f} ({d['noise_floor']:.3f})" for d in departures
         ]
@@ -127,16 +123,16 @@ def _form(fit):
 
 
 def _departures(data):
-    table = ruled("mean of", *(metric.label for metric in METRICS.values()), "loss")
+    table = ruled("mean of", *(metric.label for metric in drawn().values()), "loss")
     first = data["fits"][0]["departure"]
-    table.add_row("paired", *(f"{first[name]['before']:.3f}" for name in METRICS), "")
+    table.add_row("paired", *(f"{first[name]['before']:.3f}" for name in drawn()), "")
     for fit in data["fits"]:
-        means = [f"{fit['departure'][name]['after']:.3f}" for name in METRICS]
+        means = [f"{fit['departure'][name]['after']:.3f}" for name in drawn()]
         table.add_row(_form(fit), *means, f"{fit['loss']:.4g}")
-    table.add_row("noise floor", *(f"{first[name]['noise_floor']:.3f}" for name in METRICS), "")
+    table.add_row("noise floor", *(f"{first[name]['noise_floor']:.3f}" for name in drawn()), "")
     best = _best(data)["departure"]
     for key in ("parameter_error", "model_error"):
-        means = [_three(best[name][key]) for name in METRICS]
+        means = [_three(best[name][key]) for name in drawn()]
         table.add_row(key.replace("_", " "), *means, "")
     return table
 
