@@ -9,10 +9,10 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons import record, render
+from comparisons.circumstances import Pixels
 from comparisons.comparison import (
     ComparisonRecord,
     NoiseTarget,
-    Pixels,
     Significant,
     TimeSpent,
 )

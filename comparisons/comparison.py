@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from comparisons.amounts import Amount, Count, Positive, Resolution, Share, Size
+from comparisons.circumstances import Pixels, Versions
 from comparisons.departure.histogram import Histogram
 from comparisons.departure.limits import LimitCounts
 from comparisons.departure.regions import Region
@@ -17,7 +18,7 @@ Depth = Annotated[
 ]
 
 
-class Decision(Record, frozen=True):
+class Decision(Record):
     """Whether a scene calls for an effect, and why: a structural proof or a measurement."""
 
     name: str
@@ -25,7 +26,7 @@ class Decision(Record, frozen=True):
     rule: str
 
 
-class Simulation(Record, frozen=True):
+class Simulation(Record):
     """What is simulated of a scene, and with how many samples."""
 
     kernel_terms: Annotated[
@@ -42,13 +43,13 @@ class Simulation(Record, frozen=True):
     sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
 
 
-class PlanRecord(Simulation, frozen=True):
+class PlanRecord(Simulation, kw_only=True):
     """Which effects the scene calls for, and what was simulated."""
 
     effects: tuple[Decision, ...]
 
 
-class Significant(Record, frozen=True):
+class Significant(Record):
     """Pixels whose difference is more than the noise of both renderings."""
 
     fraction: Share
@@ -58,14 +59,7 @@ class Significant(Record, frozen=True):
     ]
 
 
-class Pixels(Record, frozen=True):
-    """Pixels that the statistics are over: those whose centre sees a surface."""
-
-    counted: Count
-    total: Size
-
-
-class BsdfPair(Record, frozen=True):
+class BsdfPair(Record):
     """A BSDF and its partner; colours of one value are that value."""
 
     name: str
@@ -74,7 +68,7 @@ class BsdfPair(Record, frozen=True):
     parameters: dict[str, Any]
 
 
-class EmitterPair(Record, frozen=True):
+class EmitterPair(Record):
     """A light and its partner, and the factor between their intensities."""
 
     name: str
@@ -85,7 +79,7 @@ class EmitterPair(Record, frozen=True):
     note: str = ""
 
 
-class Missed(Record, frozen=True):
+class Missed(Record):
     """A quantity that no partner reaches."""
 
     what: str
@@ -93,7 +87,7 @@ class Missed(Record, frozen=True):
     reached: float
 
 
-class Pairing(Record, frozen=True):
+class Pairing(Record):
     """How heuristic and physical materials and lights correspond."""
 
     convention: str
@@ -102,7 +96,7 @@ class Pairing(Record, frozen=True):
     misses: tuple[Missed, ...]
 
 
-class Times(Record, frozen=True):
+class Times(Record):
     """Wall times of one rendering in seconds, evaluated and synchronised."""
 
     median_s: Annotated[Amount, Meta(description="Median of a pass, once compiled.")]
@@ -112,7 +106,7 @@ class Times(Record, frozen=True):
     compile_s: Annotated[Amount | None, Meta(description="Code generation and back end.")]
 
 
-class TimeSpent(Record, frozen=True):
+class TimeSpent(Record):
     """Times of both renderings, and of other work by its name."""
 
     heuristic: Times
@@ -120,7 +114,7 @@ class TimeSpent(Record, frozen=True):
     stages: dict[str, float]
 
 
-class Unrepresentable(Record, frozen=True):
+class Unrepresentable(Record):
     """What the heuristic model has no form for; compared nevertheless."""
 
     name: Annotated[str, Meta(description="Id, or place in the file.")]
@@ -129,7 +123,7 @@ class Unrepresentable(Record, frozen=True):
     nearest: Annotated[str, Meta(description="What is taken in its place, and by which rule.")]
 
 
-class Override(Record, frozen=True):
+class Override(Record):
     """What the scene asks for and does not get, and what it gets instead."""
 
     what: str
@@ -137,7 +131,7 @@ class Override(Record, frozen=True):
     used: str
 
 
-class NoiseTarget(Record, frozen=True):
+class NoiseTarget(Record):
     """Where a run with a noise target ended.
 
     Both are 95th percentiles of the noise in ΔE2000 over the counted pixels: as asked for, and
@@ -150,7 +144,7 @@ class NoiseTarget(Record, frozen=True):
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
 
 
-class ComparisonRecord(Record, frozen=True):
+class ComparisonRecord(Record, kw_only=True):
     """One scene by textbook shading (heuristic) and by physically based rendering (reference).
 
     Times are in seconds; linear values are in units of display white; every number is finite.
@@ -184,7 +178,7 @@ class ComparisonRecord(Record, frozen=True):
     integrator_given: Annotated[str | None, Meta(description="The scene's own integrator.")]
     overridden: tuple[Override, ...]
     warnings: tuple[str, ...]
-    versions: dict[str, str]
+    versions: Versions
     command: Annotated[str, Meta(description="What repeats this comparison.")]
     noise_target: NoiseTarget | None = None
     record_version: int = VERSION

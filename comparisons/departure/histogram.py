@@ -15,7 +15,7 @@ from comparisons.records import Record
 DECADES, BINS_A_DECADE = (-2, 3), 12
 
 
-class Histogram(Record, frozen=True):
+class Histogram(Record):
     """Counts of pixels in bins of equal ratio.
 
     Bin i of n holds ``low·(high/low)^(i/n) <= value < low·…^((i+1)/n)``.

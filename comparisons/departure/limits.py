@@ -45,7 +45,7 @@ FIREFLY_CONTRAST = 8.0
 NEIGHBOURHOOD = 5
 
 
-class LimitCounts(Record, frozen=True):
+class LimitCounts(Record):
     """Counted pixels where the reference itself is at fault, by limit; they may overlap."""
 
     clamped: Count

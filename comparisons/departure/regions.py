@@ -28,7 +28,7 @@ CONTRAST = 1.25
 MOST, LEAST_SHARE = 4, 0.04
 
 
-class Region(Record, frozen=True):
+class Region(Record):
     """A box of pixels: x, y count from the top left, and include the first pixel."""
 
     x: Count

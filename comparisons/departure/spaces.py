@@ -28,7 +28,7 @@ PQ_PEAK = 10_000.0
 _BLOCK = 32_768
 
 
-class Viewing(Record, frozen=True):
+class Viewing(Record):
     """How linear values are looked at; printed with every number that depends on it.
 
     Raises `InputError` for a value that is not positive and finite.

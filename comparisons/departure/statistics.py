@@ -29,7 +29,7 @@ from comparisons.records import Record
 _BLOCK_PIXELS = 2**20
 
 
-class Exposed(Record, frozen=True):
+class Exposed(Record):
     """A metric after the factor `exposure` on the test image that makes its mean smallest."""
 
     exposure: Annotated[Positive, Meta(description="Linear factor; 1 is none.")]
@@ -39,7 +39,7 @@ class Exposed(Record, frozen=True):
     max: Amount
 
 
-class Summary(Record, frozen=True):
+class Summary(Record):
     """A metric over the counted pixels, in the metric's own unit."""
 
     mean: Annotated[Amount, Meta(description="Mean; of rmse, the root of the mean square.")]
@@ -55,7 +55,7 @@ class Summary(Record, frozen=True):
     after_exposure: Exposed
 
 
-class RatioSummary(Record, frozen=True):
+class RatioSummary(Record):
     """The signed luminance ratio, heuristic over reference, over the counted pixels, in stops."""
 
     mean: float

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 
 
@@ -24,19 +25,11 @@ PARAMETERS = {
     for scene in SCENES.values()
     for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
 }
-LEAD = LEADING.label
-DEPARTURE = {
-    f"{LEADING.name}_p95": Column("1", f"{LEAD}, 95th percentile"),
-    f"{LEADING.name}_noise": Column("1", f"{LEAD} that the comparison's noise alone would give"),
-    f"{LEADING.name}_shape": Column("1", f"{LEAD}, mean, after the best exposure"),
-    "exposure": Column("1", f"factor on the heuristic image that makes {LEAD} smallest"),
-    **{name: Column("1", metric.heading) for name, metric in METRICS.items()},
-    RATIO.name: Column(RATIO.unit, "mean ratio of luminances, heuristic to reference"),
-}
-RESULTS = {
+MEANS = {
     "heuristic": Column("1", f"mean of the heuristic image, {LUMINANCE}"),
     "reference": Column("1", f"mean of the reference, {LUMINANCE}"),
-    **DEPARTURE,
+}
+EFFECTS = {
     "form": Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
     "occlusion": Column("1", "RMS change by shadows"),
     "interreflection": Column("1", "RMS change by light reflected more than once"),
@@ -60,3 +53,18 @@ RESULTS = {
     "miss": Column("1", "largest relative miss of the pairing, 0 where it is met"),
     "error": Column("", "why there is no result; empty where there is one", str),
 }
+
+
+def results():
+    """Return the columns of results; those of the departure are those of the metrics."""
+    name, label = LEADING.name, LEADING.label
+    departure = {
+        name: Column("1", LEADING.heading),
+        f"{name}_p95": Column("1", f"{label}, 95th percentile"),
+        f"{name}_noise": Column("1", f"{label} that the noise of the comparison alone would give"),
+        f"{name}_shape": Column("1", f"{label}, mean, after the best exposure"),
+        "exposure": Column("1", f"factor on the heuristic image that makes {label} smallest"),
+    }
+    departure |= {name: Column("1", metric.heading) for name, metric in METRICS.items()}
+    departure[RATIO.name] = Column(RATIO.unit, "mean ratio of luminances, heuristic to reference")
+    return MEANS | departure | EFFECTS
