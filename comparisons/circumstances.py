@@ -1,10 +1,10 @@
-"""What every record says of its circumstances: pixels, machine, and how values are looked at."""
+"""What every record says of its circumstances."""
 
 from typing import Annotated
 
 from msgspec import Meta
 
-from comparisons.amounts import Count, Positive, Size
+from comparisons.amounts import Count, Size
 from comparisons.records import Record
 
 Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
@@ -23,14 +23,3 @@ class Machine(Record):
     processor: str
     cores: Size
     system: str
-
-
-class Viewed(Record):
-    """How linear values are looked at; see :class:`comparisons.departure.spaces.Viewing`."""
-
-    exposure: Positive
-    white: str
-    white_luminance: Positive
-    ambient_illuminance: Positive
-    background: Positive
-    surround: str

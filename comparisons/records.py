@@ -67,6 +67,8 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
                 f"{where}: this record is {found}, and version {VERSION} is read. Make it again."
             )
         return msgspec.convert(content, kind)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{where}: this is not JSON: {error}. Make it again.") from error
     except (ValueError, msgspec.ValidationError) as error:
         raise InputError(f"{where}: {error}. Make it again.") from error
 

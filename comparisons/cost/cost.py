@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.circumstances import Machine, Pixels, Viewed
+from comparisons.circumstances import Machine, Pixels
 from comparisons.compare import prepare
 from comparisons.cost.cost_record import Converged, Cost, Pictures, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
@@ -119,8 +119,8 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         **_compared(measured),
         prices=priced.prices,
         split=Split(tuple(part for part, _ in parts), whole),
-        viewing=Viewed(**options.viewing.record()),
-        pixels=Pixels(int(counted.sum()), width * height),
+        viewing=options.viewing,
+        pixels=Pixels(counted=int(counted.sum()), total=width * height),
         machine=Machine(**record.machine()),
         versions=record.versions(),
         command=command,

@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from comparisons.amounts import Count, Resolution
-from comparisons.circumstances import Machine, Pixels, Versions, Viewed
+from comparisons.circumstances import Machine, Pixels, Versions
 from comparisons.cost.front import Reached, Within
 from comparisons.cost.timing import Measured
+from comparisons.departure.spaces import Viewing
 from comparisons.effects.prices import Prices
 from comparisons.effects.split import Part
 from comparisons.records import VERSION, Record
@@ -70,7 +71,7 @@ class Cost(Record, kw_only=True):
     equal_error: tuple[Reached, ...]
     prices: Prices
     split: Split
-    viewing: Viewed
+    viewing: Viewing
     pixels: Pixels
     machine: Machine
     versions: Versions

@@ -52,8 +52,8 @@ def headline(result):
     first, *others = result.check.moved
     more = f", and {len(others)} more" if others else ""
     return _clean(
-        f"{first.before.name} moved from {first.before.value:.6g} to {first.after.value:.6g}"
-        f" (p = {first.corrected:.1g}){more}"
+        f"{first.quantity} moved from {first.before:.6g} to {first.after:.6g}"
+        f" (p = {first.p_corrected:.1g}){more}"
     )
 
 

@@ -5,11 +5,17 @@ from pathlib import Path
 from typing import Any
 
 from comparisons import records
+from comparisons.check.baseline import Baseline
 from comparisons.cost.cost_record import Cost
+from reports.ci.check_record import Checks
 
 FOLDER = Path(__file__).parent
 
-PUBLISHED: dict[str, Any] = {"cost": Cost}
+PUBLISHED: dict[str, Any] = {
+    "baseline": Baseline,
+    "check": Checks,
+    "cost": Cost,
+}
 """The type of each record that is written to a file, by the name of its schema."""
 
 

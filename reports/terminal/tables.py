@@ -20,11 +20,12 @@ from reports.terminal.printing import number, percent
 WIDTH = 120
 
 
-def ruled(*headings: str) -> Table:
-    """Return an empty table with these headings, without lines."""
+def ruled(*headings: str, right: int | None = None) -> Table:
+    """Return an empty table with these headings, without lines; set to the right from a column."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
+    for place, heading in enumerate(headings):
+        justify = "left" if right is None or place < right else "right"
+        table.add_column(heading, overflow="fold", justify=justify)
     return table
 
 
@@ -37,11 +38,11 @@ def printed(table: Table) -> Iterator[str]:
 
 
 def markdown(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], right: bool = True
+    headings: Sequence[str], rows: Iterable[Sequence[str]], right: int = 1
 ) -> Iterator[str]:
-    """Yield the lines of a table in Markdown, all columns but the first set to the right."""
+    """Yield the lines of a table in Markdown, set to the right from a column on."""
     yield _row(headings)
-    yield _row(["---"] + ["---:" if right else "---"] * (len(headings) - 1))
+    yield _row(["---"] * right + ["---:"] * (len(headings) - right))
     for row in rows:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
