@@ -7,6 +7,7 @@ from typing import Any
 from comparisons import records
 from comparisons.check.baseline import Baseline
 from comparisons.cost.cost_record import Cost
+from comparisons.fit.fit_record import FitRecord
 from reports.ci.check_record import Checks
 
 FOLDER = Path(__file__).parent
@@ -15,6 +16,7 @@ PUBLISHED: dict[str, Any] = {
     "baseline": Baseline,
     "check": Checks,
     "cost": Cost,
+    "fit": FitRecord,
 }
 """The type of each record that is written to a file, by the name of its schema."""
 
