@@ -1,7 +1,5 @@
 """``fotismos plan``: which effects a scene calls for."""
 
-import json
-
 import click
 
 from reports.asked import jobs
@@ -24,6 +22,7 @@ def plan(scene, as_json, verify, **rendering):
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
     from comparisons.case import open_case
+    from comparisons.records import to_json
     from reports.terminal import plan_lines, progress
 
     case = open_case(scene, jobs.request(rendering))
@@ -31,14 +30,15 @@ def plan(scene, as_json, verify, **rendering):
         from comparisons.verification import verify as run
 
         with progress.shown() as bar:
-            data = run(case.source, case.options, bar.of(case.name)).data()
-        lines = plan_lines.verification_lines([data])
+            found = run(case.source, case.options, bar.of(case.name))
+        lines = plan_lines.verification_lines([found])
     else:
         from comparisons.compare import prepare
 
-        data = plan_lines.data(case.name, prepare(case.source, case.options), case.variant)
-        lines = plan_lines.lines(data)
+        ready = prepare(case.source, case.options)
+        found = plan_lines.report(case.name, ready, case.variant)
+        lines = plan_lines.lines(found)
     if as_json:
-        lines = [json.dumps(data, indent=2, ensure_ascii=False)]
+        lines = [to_json(found).rstrip()]
     for line in lines:
         click.echo(line)

@@ -1,26 +1,26 @@
 """Finished scenes, found again in their files instead of rendered once more.
 
 ``view.json``, in the folder of a scene's results, holds what the page shows of the scene and the
-key of all that it depends on. It is written with the other results, whole or not at all.
+key of all that it depends on. It is written with the other results, atomically.
 """
 
-import json
-from base64 import b64decode, b64encode
-from dataclasses import asdict
 from pathlib import Path
 
-from markupsafe import Markup
-from msgspec import ValidationError, convert
+import msgspec
 
-from comparisons.records import plain
-from reports.charts.vega import Figure
-from reports.page.embedding import Embedded, Plane
-from reports.run.cost_files import CostView
+from comparisons.departure.metrics import METRICS
+from comparisons.records import VERSION, Record, plain
+from heuristic.errors import InputError
+from reports.page.scene_view import SceneView
 
 FILE = "view.json"
 
-PICTURES = ("images", "thumbnails")
-"""Of a view: PNG bytes by name."""
+
+class Finished(Record):
+    """A view, and the key of all that it depends on."""
+
+    key: str
+    view: SceneView
 
 
 def key_of(passes, options, with_cost, figures):
@@ -28,55 +28,20 @@ def key_of(passes, options, with_cost, figures):
 
     ``passes`` is what `reports.run.kept.key_of` returns.
     """
-    return f"{passes} noise={options.noise} cost={with_cost} figures={figures}"
+    written = f"version={VERSION} metrics={','.join(METRICS)} cost={with_cost} figures={figures}"
+    return f"{passes} noise={options.noise} {written}"
 
 
 def text(view, key):
-    """Return the content of the file for a view, as `reports.run.output.write_scene` returns it."""
-    study = view["cost"]
-    return json.dumps(
-        view
-        | {name: _encoded(view[name]) for name in PICTURES}
-        | {
-            "key": key,
-            "embedded": asdict(view["embedded"]),
-            "charts": [asdict(figure) for figure in view["charts"]],
-            "cost": study and plain(study),
-        }
-    )
+    """Return the content of the file for a view."""
+    return msgspec.json.encode(plain(Finished(key=key, view=view))).decode()
 
 
 def load(place, key):
     """Return the view of the results in a folder; None where they are not those of the key."""
     try:
-        view = json.loads((place / FILE).read_text(encoding="utf-8"))
-        linked = [place.parent / file for file in view["files"].values()]
-        if view.pop("key") != key or not all(map(Path.is_file, linked)):
-            return None
-        study = view["cost"]
-        return (
-            view
-            | {name: _decoded(view[name]) for name in PICTURES}
-            | {
-                "embedded": _embedded(view["embedded"]),
-                "charts": [
-                    Figure(**figure | {"svg": Markup(figure["svg"])}) for figure in view["charts"]
-                ],
-                "cost": study and convert(study, CostView),
-            }
-        )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, ValidationError):
+        found = msgspec.json.decode((place / FILE).read_bytes(), type=Finished)
+    except (OSError, msgspec.MsgspecError, InputError):
         return None  # nothing there, or nothing of ours
-
-
-def _embedded(given):
-    planes = tuple(Plane(**plane) for plane in given["planes"])
-    return Embedded(**given | {"planes": planes})
-
-
-def _encoded(pictures):
-    return {name: b64encode(png).decode("ascii") for name, png in pictures.items()}
-
-
-def _decoded(pictures):
-    return {name: b64decode(text, validate=True) for name, text in pictures.items()}
+    linked = [place.parent / file for file in found.view.files.values()]
+    return found.view if found.key == key and all(map(Path.is_file, linked)) else None

@@ -6,17 +6,21 @@ from typing import Any
 
 from comparisons import records
 from comparisons.check.baseline import Baseline
+from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
 from reports.ci.check_record import Checks
+from reports.run.stages import RunRecord
 
 FOLDER = Path(__file__).parent
 
 PUBLISHED: dict[str, Any] = {
     "baseline": Baseline,
     "check": Checks,
+    "comparison": ComparisonRecord,
     "cost": Cost,
     "fit": FitRecord,
+    "run": RunRecord,
 }
 """The type of each record that is written to a file, by the name of its schema."""
 

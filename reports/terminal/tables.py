@@ -11,8 +11,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import METRICS
+from comparisons.records import plain
 from reports.files import ownership
 from reports.terminal.printing import number, percent
 
@@ -47,7 +49,7 @@ def markdown(
         yield _row([cell.replace("|", "\\|") for cell in row])
 
 
-def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
     """Write ``metrics.csv`` and ``metrics.md`` of the records of a run to a folder."""
     ownership.folder(folder)
     records = list(records)
@@ -97,26 +99,28 @@ def prices(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
     return headings, rows
 
 
-def metrics_csv(records: Iterable[Mapping[str, Any]]) -> str:
+def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
     """Return a line for each scene and metric, with every number of the record in full.
 
     Columns are named as in ``comparison.json``; ``after_exposure.`` begins those of the shape.
-    The root mean square error in linear light has ``value`` as its mean and no percentiles.
     """
-    columns = ("mean", "p50", "p95", "max", "noise_floor")
-    after = ("exposure", "mean", "p50", "p95", "max")
-    headings = (*columns, *(f"after_exposure.{name}" for name in after), "significant")
-    rows = []
-    for record in records:
-        significant = record["metrics"]["significant"]["fraction"]
-        for name in (*METRICS, "rmse"):
-            metric = record["metrics"][name]
-            exposed = metric["after_exposure"]
-            whole = {"mean": metric.get("value")} | metric
-            shape = {"mean": exposed.get("value")} | exposed
-            cells = [whole.get(key, "") for key in columns] + [shape.get(key, "") for key in after]
-            rows.append([record["scene"], name, *cells, significant])
-    return comma_separated(("scene", "metric", *headings), rows)
+    rows = [
+        {"scene": record.scene, "metric": name}
+        | dict(_flat(plain(summary)))
+        | {"significant": record.significant.fraction}
+        for record in records
+        for name, summary in record.metrics.items()
+    ]
+    headings = list(dict.fromkeys(key for row in rows for key in row))
+    return comma_separated(headings, [[row.get(key, "") for key in headings] for row in rows])
+
+
+def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in record.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
 
 
 def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
@@ -128,27 +132,22 @@ def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> s
     return text.getvalue()
 
 
-def metrics_markdown(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
     """Yield the lines of a table of a run: each metric's mean, its shape and its noise floor."""
-    labels = [metric.label for metric in METRICS.values()]
-    rows = []
-    for record in records:
-        metrics = record["metrics"]
-        cells = [
-            f"{number(m['mean'])} ({number(m['after_exposure']['mean'])};"
-            f" {number(m['noise_floor'])})"
-            for m in (metrics[name] for name in METRICS)
+    rows = [
+        [
+            record.scene,
+            *(
+                f"{number(m.mean)} ({number(m.after_exposure.mean)}; {number(m.noise_floor)})"
+                for m in (record.metrics[name] for name in METRICS)
+            ),
+            percent(record.significant.fraction),
+            f"{record.plan.spp}",
         ]
-        rows.append(
-            [
-                record["scene"],
-                *cells,
-                number(metrics["rmse"]["value"]),
-                percent(metrics["significant"]["fraction"]),
-                f"{record['plan']['spp']}",
-            ]
-        )
-    yield from markdown(["scene", *labels, "RMSE", "significant", "samples a pixel"], rows)
+        for record in records
+    ]
+    labels = [metric.label for metric in METRICS.values()]
+    yield from markdown(["scene", *labels, "significant", "samples per pixel"], rows)
     yield ""
     yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
     yield "that makes it smallest, and what the reference's noise alone would give."
