@@ -41,9 +41,8 @@ def way() -> list[str]:
     arguments = ["compare", SCENE, "--resolution", "16x16", "-q"]
     with TemporaryDirectory() as folder:
         sys.argv = ["fotismos", *arguments, "-o", folder]
-        with watched() as files:
-            with suppress(SystemExit):
-                cli.main()
+        with watched() as files, suppress(SystemExit):
+            cli.main()
     paths = [Path(file).relative_to(ROOT) for file in files]
     return [str(path) for path in paths if path.parts[0] in FLOORS]
 

@@ -6,7 +6,6 @@ Values keep 8 significant digits, far below what rounding can change, and errors
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -18,6 +17,7 @@ from comparisons.amounts import Amount
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
 from comparisons.circumstances import Versions
 from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
+from comparisons.layout import laid_out
 from comparisons.records import VERSION, Record
 from heuristic.errors import InputError
 
@@ -78,7 +78,7 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
 
     def text(self) -> str:
         """Return the file's content."""
-        return _laid_out(records.plain(self)) + "\n"
+        return laid_out(records.plain(self)) + "\n"
 
 
 def of(
@@ -159,24 +159,3 @@ def _rounded_metric(metric):
 
 def _rounded(value, digits):
     return float(f"{value:.{digits}g}")
-
-
-def _laid_out(value, depth=0):
-    """Return JSON in which what is inside an object's entries stands on one line, if it is flat."""
-    if (depth > 1 and _height(value) < 3) or _height(value) == 0:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
-    if isinstance(value, dict):
-        (first, last), items = "{}", [(f"{json.dumps(key)}: ", i) for key, i in value.items()]
-    else:
-        (first, last), items = "[]", [("", item) for item in value]
-    indent = "  " * depth
-    lines = (f"{indent}  {key}{_laid_out(item, depth + 1)}" for key, item in items)
-    return f"{first}\n" + ",\n".join(lines) + f"\n{indent}{last}"
-
-
-def _height(value):
-    """Return how many objects and arrays are inside one another."""
-    if not isinstance(value, (dict, list, tuple)):
-        return 0
-    items = value.values() if isinstance(value, dict) else value
-    return 1 + max(map(_height, items), default=0)

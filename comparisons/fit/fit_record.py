@@ -1,8 +1,6 @@
 """The record of a fit, ``fit.json``."""
 
-from typing import Annotated, Any, Literal
-
-from msgspec import Meta
+from typing import Any, Literal
 
 from comparisons.amounts import Amount, Count, Resolution, Size
 from comparisons.circumstances import Pixels, Versions
@@ -12,44 +10,63 @@ from comparisons.records import VERSION, Record
 
 
 class Departure(Record):
-    """Means of a metric over the counted pixels, in its unit."""
+    """Means of a metric over the counted pixels, in its unit.
 
-    before: Annotated[Amount, Meta(description="With the paired parameters.")]
-    after: Annotated[Amount, Meta(description="With the fitted ones.")]
+    Attributes
+    ----------
+    before, after
+        With the paired parameters, and with the fitted ones.
+    noise_floor
+        What the reference's noise alone would give.
+    parameter_error
+        ``before - after``: what better parameters remove.
+    model_error
+        ``after``: what no parameters remove.
+    """
+
+    before: Amount
+    after: Amount
     p95_after: Amount
-    noise_floor: Annotated[Amount, Meta(description="What the reference's noise alone gives.")]
-    parameter_error: Annotated[float, Meta(description="before - after")]
-    model_error: Annotated[Amount, Meta(description="after: what no parameters remove.")]
+    noise_floor: Amount
+    parameter_error: float
+    model_error: Amount
 
 
 class Fitted(Record, kw_only=True):
-    """A parameter in the terms of the chapters, and of this form of the lobe."""
+    """A parameter in the terms of the chapters, and of this form of the lobe.
+
+    Attributes
+    ----------
+    channel
+        Of a coefficient that has a number for each; otherwise empty.
+    is_factor
+        Whether the numbers are factors: on a texture, or on a paired intensity.
+    paired
+        By the pairing table.
+    fitted
+        The best value; null where the image does not tell it.
+    stopped_at
+        Where the search ended; of a parameter that is not identifiable, any value would do.
+    interval
+        95 %, by the reference's noise alone; null at a bound, and where not identifiable.
+    reason
+        Why it is not identifiable, otherwise empty.
+    partners
+        Parameters that make up for it.
+    """
 
     name: Literal["k_a", "k_d", "k_s", "n", "intensity"]
-    channel: Annotated[
-        Literal["", "R", "G", "B"],
-        Meta(description="Of a coefficient that has a number for each; otherwise empty."),
-    ] = ""
-    is_factor: Annotated[
-        bool, Meta(description="On a texture, or on a paired intensity, in place of a value.")
-    ]
-    paired: Annotated[float, Meta(description="By the pairing table.")]
-    fitted: Annotated[
-        float | None, Meta(description="The best value; null where the image does not tell it.")
-    ]
-    stopped_at: Annotated[
-        float,
-        Meta(description="Where the search ended; if not identifiable, any value would do."),
-    ]
-    interval: Annotated[
-        tuple[float, float] | None,
-        Meta(description="95 %, by noise alone; null at a bound, and where not identifiable."),
-    ]
+    channel: Literal["", "R", "G", "B"] = ""
+    is_factor: bool
+    paired: float
+    fitted: float | None
+    stopped_at: float
+    interval: tuple[float, float] | None
     bounds: tuple[float, float]
     at_bound: bool
     identifiable: bool
-    reason: Annotated[str, Meta(description="Why it is not identifiable, otherwise empty.")]
-    partners: Annotated[tuple[str, ...], Meta(description="Parameters that make up for it.")] = ()
+    reason: str
+    partners: tuple[str, ...] = ()
 
 
 class FittedLight(Fitted, kw_only=True):
@@ -59,29 +76,43 @@ class FittedLight(Fitted, kw_only=True):
 
 
 class FittedMaterial(Record):
-    """A material: what was fitted, and what it is in the reference."""
+    """A material.
+
+    Attributes
+    ----------
+    reference
+        Plugin and plain parameters of the material in the reference.
+    pixels
+        Counted pixels that see it.
+    """
 
     name: str
-    reference: Annotated[
-        dict[str, Any] | None, Meta(description="Plugin and plain parameters in the reference.")
-    ]
-    pixels: Annotated[Count, Meta(description="Counted pixels that see it.")]
+    reference: dict[str, Any] | None
+    pixels: Count
     parameters: tuple[Fitted, ...]
 
 
 class FormFit(Record):
-    """The best fit of one form of the lobe; a form and its normalised variant are one fit."""
+    """The best fit of one form of the lobe; a form and its normalised variant are one fit.
+
+    Attributes
+    ----------
+    normalised
+        Whether k_s is the lobe's albedo at normal incidence.
+    loss
+        At the best parameters, in the loss's own unit.
+    lights
+        Factors on intensities; empty where they were not fitted.
+    convergence
+        All searches.
+    """
 
     form: Literal["phong", "blinn"]
-    normalised: Annotated[
-        bool, Meta(description="Whether k_s is the lobe's albedo at normal incidence.")
-    ]
-    loss: Annotated[Amount, Meta(description="At the best parameters, in the loss's own unit.")]
+    normalised: bool
+    loss: Amount
     departure: dict[str, Departure]
     materials: tuple[FittedMaterial, ...]
-    lights: Annotated[
-        tuple[FittedLight, ...], Meta(description="Empty where intensities were not fitted.")
-    ]
+    lights: tuple[FittedLight, ...]
     convergence: tuple[Start, ...]
 
 
@@ -105,7 +136,15 @@ class FitTimes(Record):
 
 
 class FitRecord(Record, kw_only=True):
-    """The heuristic parameters that come nearest to one scene's reference, and what they leave."""
+    """The heuristic parameters that come nearest to one scene's reference, and what they leave.
+
+    Attributes
+    ----------
+    best
+        Index in fits of the form with the least loss.
+    command
+        Repeats the fit.
+    """
 
     record_version: int = VERSION
     scene: str
@@ -120,11 +159,11 @@ class FitRecord(Record, kw_only=True):
     intensities: bool
     pixels: Pixels
     fits: tuple[FormFit, ...]
-    best: Annotated[Count, Meta(description="Index in fits of the form with the least loss.")]
+    best: Count
     warnings: tuple[str, ...]
     versions: Versions
     time: FitTimes
-    command: Annotated[str, Meta(description="Repeats the fit.")]
+    command: str
 
     @property
     def nearest(self) -> FormFit:

@@ -43,8 +43,13 @@ LARGEST_DAMPING = 1e12
 class Start(Record):
     """One search: where it began, where it ended, and what it took.
 
-    ``loss`` is that of :meth:`Residuals.loss`; None at the end where a start was worse than others
-    and not followed. ``n`` is None for the paired parameters.
+    Attributes
+    ----------
+    n
+        Exponent of the start; null for the paired parameters.
+    loss, final_loss
+        Where it began and ended (:meth:`Residuals.loss`); null where it was not followed, since
+        others began better.
     """
 
     n: float | None

@@ -1,6 +1,5 @@
 """Write the published schemas: ``python -m reports.schemas``."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ from comparisons.check.baseline import Baseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
+from comparisons.layout import laid_out
 from reports.ci.check_record import Checks
 from reports.run.stages import RunRecord
 
@@ -27,7 +27,7 @@ PUBLISHED: dict[str, Any] = {
 
 def text(name: str) -> str:
     """Return the content of a schema's file."""
-    return json.dumps(records.schema(PUBLISHED[name]), indent=2, ensure_ascii=False) + "\n"
+    return laid_out(records.schema(PUBLISHED[name])) + "\n"
 
 
 if __name__ == "__main__":
