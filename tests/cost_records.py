@@ -104,7 +104,7 @@ def _record(scene):
             "parts": [part(name, 0.0123 * (place + 1)) for place, name in enumerate(PARTS)],
             "departure": part("departure", 0.0987),
         },
-        "viewing": records.record()["viewing"],
+        "viewing": records.data()["viewing"],
         "pixels": {"counted": WIDTH * (HEIGHT - 1), "total": WIDTH * HEIGHT},
         "machine": {"processor": "a processor <b>", "cores": 2, "system": "Linux x86_64"},
         "versions": {"mitsuba": "3.9.1"},

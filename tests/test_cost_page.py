@@ -8,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from reports.page import cost_overview, page
+from reports.page.scene_view import SceneView
 from reports.run import cost_files, output
 from reports.run.stages import Run
 from tests import cost_records, records
@@ -26,12 +27,11 @@ def study():
 def shown(study, record=None, **more):
     """The page of one scene with its study."""
     made = cost_files.documents(study)
-    view = {
-        "record": record or records.record(),
-        "images": {},
-        "charts": cost_files.figures(study.record),
-        "cost": cost_files.view(study, made),
-    }
+    view = SceneView(
+        record=record or records.record(),
+        charts=tuple(cost_files.figures(study.record)),
+        cost=cost_files.view(study, made),
+    )
     return page.render([view], **more)
 
 
@@ -59,7 +59,7 @@ def test_the_figures_on_the_page_are_those_of_the_json(study):
 
 
 def test_a_page_without_a_study_says_nothing_of_cost():
-    html = page.render([{"record": records.record(), "images": {}}])
+    html = page.render([SceneView(record=records.record())])
     for text in ("What accuracy costs", "Cost of accuracy", "Price of an effect", "Ladder"):
         assert text not in html
 
@@ -67,7 +67,7 @@ def test_a_page_without_a_study_says_nothing_of_cost():
 def test_names_from_files_stay_text(study):
     machine = structs.replace(study.record.machine, processor=HOSTILE)
     hostile = replace(study, record=structs.replace(study.record, machine=machine))
-    html = shown(hostile, records.record() | {"scene": HOSTILE})
+    html = shown(hostile, records.record(scene=HOSTILE))
     assert HOSTILE not in html
     assert HOSTILE in Page(html).text
 
@@ -130,10 +130,10 @@ def test_the_stages_of_a_run_add_up_and_stand_on_the_page(study):
     run = Run("fotismos report")
     with run.timing("cost"):
         pass
-    run.compared(records.record(), 100.0)
+    run.compared(records.record().time, 100.0)
     run.begin_page()
     html = shown(study, run=run)
-    stages = run.data()["stages"]
+    stages = run.record().stages
     assert stages["rendering"] + stages["metrics"] == pytest.approx(100.0)
     assert stages["rendering"] == pytest.approx(0.375 + 2.79)
     values = {value for value, _ in Page(html).values}

@@ -10,16 +10,17 @@ from msgspec import structs
 
 from comparisons.effects.prices import Price
 from comparisons.intervals import Estimated
+from comparisons.records import plain
 from reports.run import output
 from reports.terminal import tables
 from tests import cost_records, records
 
 
 def two_records():
-    other = records.record()
+    other = records.data()
     other["scene"] = 'a "b", c | d'
     other["metrics"]["dE2000"]["mean"] = 99.5
-    return [records.record(), other]
+    return [records.record(), records.of(other)]
 
 
 def test_csv_holds_every_number_in_full():
@@ -27,18 +28,15 @@ def test_csv_holds_every_number_in_full():
     rows = list(csv.DictReader(StringIO(tables.metrics_csv(made))))
     assert len(rows) == 8
     for row in rows:
-        (record,) = [each for each in made if each["scene"] == row["scene"]]
-        metric = record["metrics"][row["metric"]]
-        if row["metric"] == "rmse":
-            assert float(row["mean"]) == metric["value"]
-            assert float(row["after_exposure.mean"]) == metric["after_exposure"]["value"]
-            assert row["p95"] == ""
-        else:
-            for name in ("mean", "p50", "p95", "max", "noise_floor"):
-                assert float(row[name]) == metric[name]
-            for name, value in metric["after_exposure"].items():
-                assert float(row[f"after_exposure.{name}"]) == value
-        assert float(row["significant"]) == record["metrics"]["significant"]["fraction"]
+        (record,) = [each for each in made if each.scene == row["scene"]]
+        metric = plain(record.metrics[row["metric"]])
+        for name in ("mean", "p50", "p95", "max", "noise_floor"):
+            assert float(row[name]) == metric[name]
+        for part in ("after_exposure", "visible"):
+            for name, value in metric[part].items():
+                assert float(row[f"{part}.{name}"]) == value
+        assert float(row["significant"]) == record.significant.fraction
+    assert {row["visible.5"] for row in rows if row["metric"] == "rmse"} == {""}
 
 
 def test_markdown_is_a_table_with_a_row_a_scene():
