@@ -27,10 +27,10 @@ def plan(scene, as_json, verify, **rendering):
 
     case = open_case(scene, jobs.request(rendering))
     if verify:
-        from comparisons.verification import verify as run
+        from comparisons import verification
 
         with progress.shown() as bar:
-            found = run(case.source, case.options, bar.of(case.name))
+            found = verification.verify(case.source, case.options, bar.of(case.name))
         lines = plan_lines.verification_lines([found])
     else:
         from comparisons.compare import prepare
