@@ -115,7 +115,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
             noise_floor=judge.floor,
             mean_variance=judge.variance,
         ),
-        rungs=tuple(map(_rung, methods.rungs)),
+        rungs=tuple(Rung(r.name, r.names, r.monte_carlo, r.family) for r in methods.rungs),
         **_compared(measured),
         prices=priced.prices,
         split=Split(tuple(part for part, _ in parts), whole),
@@ -168,13 +168,6 @@ def _converged(ready, effort, seed, progress):
     for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
         total.add(one.images[0])
     return total.estimate()
-
-
-def _rung(rung):
-    family = "physical" if rung.method.physical_bsdfs else "phong BSDF"
-    return Rung(
-        rung.name, rung.names, rung.monte_carlo, "kernel" if rung.method.is_kernel else family
-    )
 
 
 def _compared(measured):

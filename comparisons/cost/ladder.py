@@ -63,7 +63,14 @@ class Rung:
     @property
     def name(self):
         """The plainest of the names: of a kernel the first, else the last, such as full plan."""
-        return self.names[0 if self.method.is_kernel else -1]
+        return self.names[0] if self.method.is_kernel else self.names[-1]
+
+    @property
+    def family(self):
+        """What shades: charts give each family a colour and a shape."""
+        if self.method.is_kernel:
+            return "kernel"
+        return "physical" if self.method.physical_bsdfs else "phong BSDF"
 
 
 @dataclass(frozen=True)
