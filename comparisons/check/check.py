@@ -17,7 +17,7 @@ LONGEST = 64
 
 @dataclass(frozen=True)
 class Check:
-    """A scene held against its baseline.
+    """A scene compared with its baseline.
 
     Attributes
     ----------

@@ -146,7 +146,7 @@ def quick(source, options=None, progress=None, command=""):
 
 
 def _measured(methods, effort, judge, seed, progress):
-    """Time and judge the rungs; their scenes are let go of, since they would slow what follows."""
+    """Time and judge the rungs; their scenes are released, since they slow what follows."""
     renderers = {
         (rung.name, spp): methods.renderer(rung.method, spp)
         for rung in methods.rungs

@@ -98,7 +98,7 @@ class Measured(Record):
     Attributes
     ----------
     rung, spp
-        Name of the rung, and samples a pixel as rendered.
+        Name of the rung, and samples per pixel as rendered.
     first_s, compile_s
         Time of the first run, and what LLVM took of it.
     seconds

@@ -30,7 +30,7 @@ class Price(Record):
     alone, last
         The same where it is the first effect to be added, and the last.
     adds_s
-        Seconds that it adds to one rendering with :attr:`Prices.spp` samples a pixel.
+        Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
     sampling_error
         Standard error of ``removes`` from drawing orders, 0 where all subsets were rendered.
     """
@@ -58,7 +58,7 @@ class Prices(Record):
     kernel_s, reference_s
         Seconds that none of the effects and all of them take.
     spp, replicates, orders
-        Samples a pixel of each replicate, their number, and orders drawn (0: every subset).
+        Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
     """
 
     effects: tuple[Price, ...]

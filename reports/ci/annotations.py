@@ -26,7 +26,7 @@ from reports.terminal.tables import markdown
 
 
 def annotate(results, folder, level, environment=None):
-    """Write the files that the service at hand reads, and return the lines that it looks for.
+    """Write the files that the CI service reads, and return the lines that it looks for.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
 
 
 def update(file, case, level=LEVEL, images=False, progress=None):
-    """Measure anew, and write the baseline if anything moved; else its file stays as it is."""
+    """Measure again, and write the baseline if anything moved; else its file stays as it is."""
     begin = perf_counter()
     found = _checked(file, case, level, progress)
     status = "unchanged" if found.passed else "updated"

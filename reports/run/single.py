@@ -53,7 +53,7 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     """
     from comparisons.case import open_case
     from comparisons.compare import compare
-    from reports.charts import figures as prints
+    from reports.charts import figures
     from reports.run import finished, kept, output
 
     done = Done()
@@ -74,7 +74,7 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
             result, study = _priced(case, progress, result)
     with done.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
-            prints.write_scene(folder / output.FIGURES, place, result)
+            figures.write_scene(folder / output.FIGURES, place, result)
         done.view = output.write_scene(folder, place, result, study, key)
     passes.remove()
     return done
