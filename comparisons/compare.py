@@ -2,17 +2,24 @@
 
 import gc
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from time import perf_counter
 
 import mitsuba as mi
 import numpy as np
 
 from comparisons import record, render
+from comparisons.circumstances import Pixels
+from comparisons.comparison import (
+    ComparisonRecord,
+    NoiseTarget,
+    Significant,
+    TimeSpent,
+)
 from comparisons.departure import limits, regions, statistics
 from comparisons.departure.histogram import histogram
 from comparisons.departure.marks import significance
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from heuristic.errors import InputError
@@ -123,7 +130,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
-    metrics, images = _measure(estimates, surface, options)
+    numbers, images = _measure(estimates, surface, options)
     stages.done("metrics")
     faults = limits.find(
         limits.of_scene(ready.scene, width, height),
@@ -132,41 +139,36 @@ def compare(source, options=None, progress=None, command="", kept=None):
         images.counted,
     )
     stages.done("limits of the reference")
-    found = regions.find(images.maps["dE2000"], images.counted)
-
-    data = {
-        "scene": source.name,
-        "variant": reference.variant,
-        "heuristic_variant": heuristic.variant,
-        "heuristic": options.heuristic,
-        "interpolation": options.interpolation.value,
-        "seed": options.seed,
-        "resolution": [width, height],
-        "plan": record.plan_data(ready.plan, reference.spp * estimates.passes, estimates.passes),
-        "viewing": options.viewing.record(),
-        "metrics": metrics,
-        "pixels": {"counted": int(images.counted.sum()), "total": width * height},
-        "limits": faults.data(),
-        "regions": [region.data() for region in found],
-        "histograms": {
-            name: histogram(images.maps[name][images.counted]).data() for name in METRICS
-        },
-        "pairing": record.pairing_data(ready.pair),
-        "time": {
-            "heuristic": record.times_data(heuristic.pass_times()),
-            "reference": record.times_data(reference.pass_times()),
-            "stages": stages.seconds,
-        },
-        "unrepresentable": record.unrepresentable_data(ready.pair),
-        "integrator_given": ready.pair.integrator,
-        "overridden": record.overridden_data(ready.pair, ready.plan, reference.spp * ready.passes),
-        "warnings": list(ready.pair.warnings),
-        "versions": record.versions(),
-        "command": command,
-    }
-    if estimates.stop is not None:
-        data["noise_target"] = asdict(estimates.stop)
-    return Comparison(data, images)
+    made = ComparisonRecord(
+        scene=source.name,
+        variant=reference.variant,
+        heuristic_variant=heuristic.variant,
+        heuristic=options.heuristic,
+        interpolation=options.interpolation.value,
+        seed=options.seed,
+        resolution=(width, height),
+        plan=record.plan_record(ready.plan, reference.spp * estimates.passes, estimates.passes),
+        viewing=options.viewing,
+        pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
+        limits=faults.counts(),
+        regions=regions.find(images.maps[LEADING.name], images.counted),
+        histograms={name: histogram(images.maps[name][images.counted]) for name in drawn()},
+        pairing=record.pairing(ready.pair),
+        time=TimeSpent(
+            heuristic=record.times(heuristic.pass_times()),
+            reference=record.times(reference.pass_times()),
+            stages=stages.seconds,
+        ),
+        unrepresentable=record.unrepresentable(ready.pair),
+        integrator_given=ready.pair.integrator,
+        overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
+        warnings=tuple(ready.pair.warnings),
+        versions=record.versions(),
+        command=command,
+        noise_target=estimates.stop and record.copied(NoiseTarget, estimates.stop),
+        **numbers,
+    )
+    return Comparison(made, images)
 
 
 def _pair(source, options):
@@ -192,7 +194,7 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
 
 
 def _measure(estimates, surface, options):
-    """Compute all metrics and maps over the pixels whose centre sees a surface.
+    """Compute numbers, as fields of the record, and maps over the pixels that see a surface.
 
     The doubt in question is that of the difference: what both halves share cancels in it.
     """
@@ -201,16 +203,14 @@ def _measure(estimates, surface, options):
     counted = surface.hit
     metrics, maps = {}, {}
     for name, metric in METRICS.items():
-        summary, maps[name] = statistics.summarise(
+        metrics[name], found = statistics.summarise(
             metric, test, reference, counted, options.viewing, noise
         )
-        metrics[name] = asdict(summary)
-    metrics["rmse"] = asdict(statistics.summarise_rmse(test, reference, counted, noise))
-    ratio, maps["log2_luminance"] = statistics.summarise_log2_luminance(test, reference, counted)
-    metrics["log2_luminance"] = asdict(ratio)
+        if metric.drawn:
+            maps[name] = found
+    ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
     significant = _significant(estimates, counted)
     fraction = float(significant[counted].mean()) if counted.any() else 0.0
-    metrics["significant"] = {"fraction": fraction, "level": LEVEL}
     images = Images(
         heuristic=test,
         reference=reference,
@@ -221,7 +221,12 @@ def _measure(estimates, surface, options):
         significant=significant,
         counted=counted,
     )
-    return metrics, images
+    numbers = {
+        "metrics": metrics,
+        "log2_luminance": ratio,
+        "significant": Significant(fraction=fraction, level=LEVEL),
+    }
+    return numbers, images
 
 
 def _significant(estimates, counted):

@@ -1,14 +1,27 @@
-"""The record of a comparison: images, and the plain data that ``comparison.json`` holds."""
+"""What a comparison returns, and how its record is made of a pair, a plan and times."""
 
 import os
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 import drjit as dr
 import numpy as np
+from msgspec.structs import replace
 
+from comparisons.comparison import (
+    BsdfPair,
+    ComparisonRecord,
+    Decision,
+    EmitterPair,
+    Missed,
+    Override,
+    Pairing,
+    PlanRecord,
+    Times,
+    Unrepresentable,
+)
 from heuristic import __version__
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
@@ -33,9 +46,9 @@ class Images:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison returns: the data of ``comparison.json``, and the images."""
+    """What a comparison returns: the content of ``comparison.json``, and the images."""
 
-    data: dict
+    record: ComparisonRecord
     images: Images
 
 
@@ -67,67 +80,58 @@ def _processor():
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def pairing_data(pair):
-    """Return how a pair was derived, as plain data."""
-    return {
-        "convention": pair.convention.value,
-        "bsdfs": [
-            {
-                "name": record.name,
-                "given": record.given,
-                "derived": record.derived,
-                "parameters": _plain(record.parameters),
-            }
-            for record in pair.bsdfs
-        ],
-        "emitters": [
-            {key: value for key, value in asdict(record).items() if key != "lost"}
-            for record in pair.emitters
-        ],
-        "misses": [asdict(miss) for miss in pair.misses],
-    }
+def pairing(pair):
+    """Return how a pair was derived."""
+    return Pairing(
+        convention=pair.convention.value,
+        bsdfs=tuple(
+            BsdfPair(
+                name=paired.name,
+                given=paired.given,
+                derived=paired.derived,
+                parameters=_short(paired.parameters),
+            )
+            for paired in pair.bsdfs
+        ),
+        emitters=tuple(copied(EmitterPair, paired) for paired in pair.emitters),
+        misses=tuple(copied(Missed, miss) for miss in pair.misses),
+    )
 
 
-def unrepresentable_data(pair):
+def unrepresentable(pair):
     """Return what the heuristic model has no form for: where it is, and what is taken instead."""
     found = [
-        (record.name, record.given, lost, nearest)
-        for record in pair.bsdfs
-        for lost, nearest in record.lost
+        (paired.name, paired.given, lost, nearest)
+        for paired in pair.bsdfs
+        for lost, nearest in paired.lost
     ]
     found += [
-        (record.name, record.given, record.lost, record.note)
-        for record in pair.emitters
-        if record.lost
+        (paired.name, paired.given, paired.lost, paired.note)
+        for paired in pair.emitters
+        if paired.lost
     ]
     found += [(name, plugin, "participating medium", "left out") for name, plugin in pair.media]
-    names = ("name", "plugin", "lost", "nearest")
-    return [dict(zip(names, entry, strict=True)) for entry in dict.fromkeys(found)]
+    return tuple(
+        Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest)
+        for name, plugin, lost, nearest in dict.fromkeys(found)
+    )
 
 
-def overridden_data(pair, plan, spp):
+def overridden(pair, plan, spp):
     """Return what the scene asks for and does not get, and what it gets instead."""
-    found = [asdict(entry) for entry in pair.overridden]
-    for entry in found:
-        if entry["what"] == "sampler":
-            entry["used"] = f"{plan.sampler}, {spp} samples a pixel"
+    found = [copied(Override, entry) for entry in pair.overridden]
+    used = f"{plan.sampler}, {spp} samples a pixel"
+    found = [replace(entry, used=used) if entry.what == "sampler" else entry for entry in found]
     if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
-        found.append({"what": "rr_depth", "given": str(pair.rr_depth), "used": str(plan.rr_depth)})
-    return found
+        depths = {"given": str(pair.rr_depth), "used": str(plan.rr_depth)}
+        found.append(Override(what="rr_depth", **depths))
+    return tuple(found)
 
 
-def plan_data(plan, spp, passes):
-    """Return a plan as plain data, with the samples and passes that were rendered."""
+def simulation(plan, spp, passes):
+    """Return what a plan simulates, with the samples and passes that were rendered, by field."""
     return {
-        "effects": [
-            {
-                "name": decision.effect.label,
-                "called_for": decision.called_for,
-                "rule": f"{decision.rule}: {decision.evidence}",
-            }
-            for decision in plan.decisions
-        ],
-        "kernel_terms": list(plan.kernel_terms),
+        "kernel_terms": tuple(plan.kernel_terms),
         "integrator": plan.integrator,
         "max_depth": plan.max_depth,
         "shadows": plan.shadows,
@@ -138,21 +142,39 @@ def plan_data(plan, spp, passes):
     }
 
 
-def times_data(times):
+def plan_record(plan, spp, passes):
+    """Return the record of a plan, with the samples and passes that were rendered."""
+    effects = tuple(
+        Decision(
+            name=decision.effect.label,
+            called_for=decision.called_for,
+            rule=f"{decision.rule}: {decision.evidence}",
+        )
+        for decision in plan.decisions
+    )
+    return PlanRecord(effects=effects, **simulation(plan, spp, passes))
+
+
+def times(of_passes):
     """Return the times of one half, in seconds."""
-    return {
-        "median_s": times.median,
-        "passes": times.passes,
-        "first_s": times.first,
-        "total_s": times.total,
-        "compile_s": times.compilation,
-    }
+    return Times(
+        median_s=of_passes.median,
+        passes=of_passes.passes,
+        first_s=of_passes.first,
+        total_s=of_passes.total,
+        compile_s=of_passes.compilation,
+    )
 
 
-def _plain(value):
+def copied(kind, source):
+    """Make a record of an object that has its fields."""
+    return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
+
+
+def _short(value):
     """Turn tuples of equal components into one number, for reading."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _short(item) for key, item in value.items()}
     if isinstance(value, tuple):
         return value[0] if len(set(value)) == 1 else list(value)
     return value

@@ -1,11 +1,13 @@
 """Records: frozen types from which JSON files and their published schemas are made.
 
 A record is a :class:`Record` whose fields are the keys of a JSON object. What a field means stands
-in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, and the schema says
-it too.
+in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, or in the section
+*Attributes* of the docstring, and the schema says it too.
 """
 
+import inspect
 import json
+import re
 from typing import Any, TypeVar
 
 import msgspec
@@ -19,7 +21,7 @@ VERSION = 2
 Kind = TypeVar("Kind")
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Something that is written as a JSON object."""
 
 
@@ -35,10 +37,10 @@ def to_json(record: Any) -> str:
 
 def schema(kind: type) -> dict[str, Any]:
     """Return the JSON Schema of a type of record."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **msgspec.json.schema(kind),
-    }
+    made = msgspec.json.schema(kind)
+    for definition in made["$defs"].values():
+        _describe(definition)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
 
 
 def read(kind: type[Kind], text: str, where: str) -> Kind:
@@ -67,8 +69,23 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
                 f"{where}: this record is {found}, and version {VERSION} is read. Make it again."
             )
         return msgspec.convert(content, kind)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{where}: this is not JSON: {error}. Make it again.") from error
     except (ValueError, msgspec.ValidationError) as error:
         raise InputError(f"{where}: {error}. Make it again.") from error
+
+
+def _describe(definition: dict[str, Any]) -> None:
+    """Hand what the docstring of a type says of its attributes to these."""
+    docstring = inspect.cleandoc(
+        re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
+    )
+    text, _, attributes = docstring.partition("\n\nAttributes\n----------\n")
+    if text:
+        definition["description"] = " ".join(text.split())
+    for names, meaning in re.findall(r"^(\S.*)\n((?:    .*\n?)+)", attributes, re.MULTILINE):
+        for name in names.split(", "):
+            definition["properties"][name].setdefault("description", " ".join(meaning.split()))
 
 
 def _numpy(value: Any) -> Any:

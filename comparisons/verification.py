@@ -5,12 +5,13 @@ sides, and the times are compared at equal noise: the variance of an independent
 time spent, so that ``variance x time`` is what a method costs.
 """
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from comparisons.compare import LEVEL, Options, prepare
 from comparisons.departure.marks import significance
+from comparisons.records import VERSION, Record
 from reference.pairing import halves
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import Stream, pass_seed, passes
@@ -21,8 +22,7 @@ PASSES_WITH_PATHS = 4
 paths carry most of it."""
 
 
-@dataclass(frozen=True)
-class Verification:
+class Verification(Record, kw_only=True):
     """A planned scene against everything simulated.
 
     Attributes
@@ -68,10 +68,7 @@ class Verification:
     gain: float
     planning_s: float
     saved_s: float
-
-    def data(self):
-        """Return plain data."""
-        return asdict(self)
+    record_version: int = VERSION
 
 
 def verify(source, options=None, progress=None, level=LEVEL):

@@ -129,7 +129,7 @@ def _example():
         options = Options(spp=samples, resolution=(256, 256))
         results.append(compare(builtin("cornell-box").source(), options))
     atomic.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
-    replace("reading.md", "example", tables.metrics_markdown(r.data for r in results))
+    replace("reading.md", "example", tables.metrics_markdown(r.record for r in results))
 
 
 def _notebook():

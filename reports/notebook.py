@@ -15,6 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from msgspec import structs
+
 import comparisons.compare
 from comparisons.case import Request, Scene, open_case
 from comparisons.record import Comparison
@@ -29,7 +31,7 @@ HEIGHT = 720
 class Shown:
     """A comparison and the page that shows it.
 
-    `comparison` has the record, ``comparison.data``, and the images, ``comparison.images``.
+    `comparison` has the record, ``comparison.record``, and the images, ``comparison.images``.
     """
 
     comparison: Comparison
@@ -67,4 +69,4 @@ def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:
     comparison = comparisons.compare.compare(case.source, case.options, command=case.command())
     with TemporaryDirectory() as folder:
         view = output.write_scene(Path(folder), "scene", comparison)
-    return Shown(comparison, page.render([view | {"files": {}}]))
+    return Shown(comparison, page.render([structs.replace(view, files={})]))

@@ -1,11 +1,16 @@
 """A study of cost with made-up numbers, each of them different."""
 
 import numpy as np
+from msgspec import convert
 
 from comparisons.cost.cost import Study
+from comparisons.cost.cost_record import Cost
+from comparisons.records import VERSION
 from tests import records
 
 WIDTH, HEIGHT = 12, 8
+DETERMINISTIC = {"monte_carlo": False, "family": "kernel"}
+RANDOM = {"monte_carlo": True, "family": "physical"}
 EFFECTS = ("occlusion", "microfacets and Fresnel", "interreflection")
 PARTS = ("implementation", "visibility", "BSDF form", "transport")
 
@@ -25,8 +30,8 @@ def study(scene="fig-8-9"):
     counted[0] = False
     parts = {name: (place - 1.5) * 0.1 * image for place, name in enumerate(PARTS)}
     return Study(
-        data=data(scene),
-        rungs={rung["name"]: image for rung in data(scene)["rungs"]},
+        record=record(scene),
+        rungs={rung.name: image for rung in record(scene).rungs},
         parts=parts,
         difference=sum(parts.values()),
         effects=effects,
@@ -36,9 +41,14 @@ def study(scene="fig-8-9"):
     )
 
 
-def data(scene="fig-8-9"):
+def record(scene="fig-8-9"):
     """The record of the study."""
+    return convert(_record(scene), Cost)
+
+
+def _record(scene):
     return {
+        "record_version": VERSION,
         "scene": scene,
         "variant": "llvm_ad_rgb",
         "heuristic_variant": "llvm_ad_rgb",
@@ -55,8 +65,8 @@ def data(scene="fig-8-9"):
             "mean_variance": 3.21e-6,
         },
         "rungs": [
-            {"name": "Phong kernel", "names": ["Phong kernel"], "monte_carlo": False},
-            {"name": "full plan", "names": ["direct", "full plan"], "monte_carlo": True},
+            {"name": "Phong kernel", "names": ["Phong kernel"]} | DETERMINISTIC,
+            {"name": "full plan", "names": ["direct", "full plan"]} | RANDOM,
         ],
         "points": [
             point("Phong kernel", 16, 0.00123, 8.765, True),
@@ -94,11 +104,12 @@ def data(scene="fig-8-9"):
             "parts": [part(name, 0.0123 * (place + 1)) for place, name in enumerate(PARTS)],
             "departure": part("departure", 0.0987),
         },
-        "viewing": records.record()["viewing"],
+        "viewing": records.data()["viewing"],
         "pixels": {"counted": WIDTH * (HEIGHT - 1), "total": WIDTH * HEIGHT},
         "machine": {"processor": "a processor <b>", "cores": 2, "system": "Linux x86_64"},
         "versions": {"mitsuba": "3.9.1"},
         "command": "fotismos cost fig-8-9 --seed 7",
+        "pictures": {"part_limit": 0.147, "effect_limit": 6.0},
     }
 
 

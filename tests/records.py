@@ -1,15 +1,30 @@
-"""A record as in ``comparison.json``, with made-up numbers, each of them different."""
+"""A comparison with made-up numbers in its record, each of them different."""
 
-from comparisons.departure.metrics import Viewing
+import msgspec
+import numpy as np
+
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.metrics import RATIO, drawn
+from comparisons.departure.spaces import Viewing
+from comparisons.departure.statistics import Summary
+from comparisons.record import Comparison, Images
+from comparisons.records import VERSION
+from reports.page.scene_view import SceneView
 
 
-def metric(mean):
+def summary(mean):
+    """Return the summary of a metric."""
+    return msgspec.convert(metric(mean), Summary)
+
+
+def metric(mean, visible=("1", "2", "5")):
     after = {"exposure": 1.25 + mean / 100, "mean": 0.71 * mean, "p50": 0.5 * mean}
     return {
         "mean": mean,
         "p50": 0.8 * mean,
         "p95": 2.1 * mean,
         "max": 3.3 * mean,
+        "visible": {limit: 0.0771 * mean / 13 / float(limit) for limit in visible},
         "noise_floor": 0.0123 * mean,
         "after_exposure": after | {"p95": 1.9 * mean, "max": 3.1 * mean},
     }
@@ -19,11 +34,46 @@ def histogram(counts):
     return {"low": 0.01, "high": 1000.0, "counts": counts, "below": 2, "above": 0}
 
 
-def record():
+def of(content):
+    """Return the record with such content."""
+    return msgspec.convert(content, ComparisonRecord)
+
+
+def record(**changes):
+    """Return the made-up record, with other values of some of its fields."""
+    return msgspec.structs.replace(of(data()), **changes)
+
+
+def view(content, **shown):
+    """Return the view of a record with such content."""
+    return SceneView(record=of(content), **shown)
+
+
+def images(height, width, maps=None, **changes):
+    """Return random images of a comparison; maps are random from 0 to 20 where none are given."""
+    rng = np.random.default_rng(0)
+    vectors = dict.fromkeys(
+        ("reference_stderr", "position", "normal"), np.zeros((height, width, 3))
+    )
+    random = {name: 20 * rng.random((height, width)) for name in (*drawn(), RATIO.name)}
+    halves = {half: rng.random((height, width, 3)) for half in ("heuristic", "reference")}
+    masks = {name: np.ones((height, width), bool) for name in ("significant", "counted")}
+    return Images(**vectors | halves | masks | {"maps": random | (maps or {})} | changes)
+
+
+def comparison(height=4, width=6, **changes):
+    """Return a comparison of random images, with the made-up record."""
+    return Comparison(record(**changes), images(height, width))
+
+
+def data():
+    """Return the content of the made-up record."""
     side = {"median_s": 0.0042, "passes": 16, "first_s": 0.31, "total_s": 0.375, "compile_s": None}
     return {
         "scene": "fig-8-9",
         "variant": "llvm_ad_rgb",
+        "heuristic_variant": "llvm_ad_rgb",
+        "interpolation": "phong",
         "seed": 7,
         "resolution": [6, 4],
         "plan": {
@@ -31,6 +81,9 @@ def record():
                 {"name": "diffuse", "called_for": True, "rule": "k_d > 0"},
                 {"name": "emission", "called_for": False, "rule": "no surface emits"},
             ],
+            "kernel_terms": ["k_d"],
+            "shadows": True,
+            "tabulated_environment": False,
             "integrator": "path",
             "max_depth": -1,
             "spp": 256,
@@ -42,14 +95,11 @@ def record():
             "dE2000": metric(4.327),
             "dE_ITP": metric(12.91),
             "dE_CAM16UCS": metric(3.638),
-            "rmse": {
-                "value": 0.04871,
-                "noise_floor": 0.000812,
-                "after_exposure": {"exposure": 1.31, "value": 0.0312},
-            },
-            "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
-            "significant": {"fraction": 0.632, "level": 0.01},
+            "rmse": metric(0.04871, ()),
         },
+        "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
+        "significant": {"fraction": 0.632, "level": 0.01},
+        "limits": {"clamped": 3, "terminator": 4, "energy_loss": 5, "fireflies": 6, "any": 17},
         "pixels": {"counted": 20, "total": 24},
         "regions": [
             {"x": 1, "y": 2, "width": 3, "height": 2, "share": 0.541, "mean_dE2000": 9.13},
@@ -66,8 +116,24 @@ def record():
         "histograms": {"dE2000": histogram([0] * 20 + [5, 9, 4] + [0] * 37)},
         "pairing": {
             "convention": "matched",
-            "bsdfs": [{"id": "ball", "physical": "roughplastic", "k_d": [0.4, 0.3, 0.2]}],
-            "emitters": [{"physical": "point", "intensity": 12.566}],
+            "bsdfs": [
+                {
+                    "name": "ball",
+                    "given": "roughplastic",
+                    "derived": "phong",
+                    "parameters": {"k_d": [0.4, 0.3, 0.2]},
+                }
+            ],
+            "emitters": [
+                {
+                    "name": "lamp",
+                    "given": "point",
+                    "derived": "heuristic_point",
+                    "factor": 0.3183,
+                    "exact": True,
+                    "note": "",
+                }
+            ],
             "misses": [{"what": "specular albedo", "wanted": 0.238, "reached": 0.0562}],
         },
         "time": {
@@ -88,4 +154,5 @@ def record():
         "warnings": ["material reflects more than it receives"],
         "versions": {"mitsuba": "3.9.1"},
         "command": "fotismos compare fig-8-9 --seed 7",
+        "record_version": VERSION,
     }

@@ -70,7 +70,7 @@ def test_notebook_and_command_line_choose_one_variant(rgb):
 
     shown = notebook.compare(spectral_scene, spp=4)
     assert open_case(spectral_scene).variant == "llvm_ad_spectral"
-    assert "--variant llvm_ad_spectral" in shown.comparison.data["command"]
+    assert "--variant llvm_ad_spectral" in shown.comparison.record.command
     assert open_case(mi.cornell_box(), name="box").variant == "llvm_ad_rgb"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from comparisons.check.moved import Move
 from reports import cli
 from reports.ci import annotations, junit
 from tests.schemas import schema
@@ -93,6 +94,7 @@ def test_json_says_what_moved(run, folder, tmp_path):
     change(folder / "fig-8-6b.json")
     code, printed, _ = run("check", folder, "--json", "-o", tmp_path / "out")
     data = json.loads(printed)
+    jsonschema.validate(data, schema("check"))
     assert code == 1
     assert not data["passed"]
     passed, failed = data["checks"]
@@ -111,7 +113,7 @@ def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):
     assert re.search(r"broken +error", printed)
     assert "2 of 3 unmoved" in printed
     assert "1 could not be checked" in printed
-    assert re.search(r"error: .*broken\.json: this is no JSON", messages)
+    assert re.search(r"error: .*broken\.json: this is not JSON", messages)
 
 
 @pytest.mark.parametrize(
@@ -215,16 +217,9 @@ def test_a_scene_in_a_file_is_found_from_anywhere(run, scene_file, tmp_path, mon
 # --- CI services -----------------------------------------------------------------------------
 
 
-def quantity(name, value):
-    return SimpleNamespace(name=name, value=value, half=None, block=None)
-
-
 def failure(name="a%b,c:d", message=""):
     """A result that failed, or an error with a message, without any rendering."""
-    moved = SimpleNamespace(
-        before=quantity("dE2000", 2.0), after=quantity("dE2000", 3.0), standard_errors=9.0, p=1e-9,
-        corrected=1e-7,
-    )  # fmt: skip
+    moved = Move("dE2000", None, None, 2.0, 3.0, 0.1, 9.0, 1e-9, 1e-7)
     check = None if message else SimpleNamespace(moved=(moved,), moves=(moved,))
     return SimpleNamespace(
         name=name, path=Path(f"{name}.json"), scene="s", check=check, message=message, exit_code=1,
@@ -245,7 +240,7 @@ def test_junit_holds_failures_and_errors(run, folder, tmp_path):
     }
     cases = {case.get("name"): case for case in suite}
     assert "reference R, block 2,3" in cases["fig-8-6b"].find("failure").text
-    assert "no JSON" in cases["broken"].find("error").get("message")
+    assert "not JSON" in cases["broken"].find("error").get("message")
     assert len(cases["fig-8-6a"]) == 0
 
 

@@ -6,11 +6,13 @@ against bounds that a right statistic leaves once in a thousand runs; broken one
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy import special, stats
 
 from comparisons.check import measurement as measuring
 from comparisons.check import moved as moving
 from comparisons.check.measurement import Colours, Measurement, Metric, measurement
+from comparisons.departure.metrics import METRICS, RATIO
 from comparisons.departure.spaces import DEFAULT_VIEWING
 
 PASSES = 16
@@ -23,7 +25,7 @@ def measured(passes):
         Colours(m[:3], e[:3], m[3:].reshape(4, 4, 3), e[3:].reshape(4, 4, 3))
         for m, e in zip(mean.reshape(2, 51), error.reshape(2, 51), strict=True)
     ]
-    metrics = {name: Metric(0.0, 0.0, 0.0) for name in measuring.ROUNDING}
+    metrics = {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
     return Measurement(len(passes), metrics, dict(zip(measuring.HALVES, halves, strict=True)))
 
 
@@ -90,7 +92,7 @@ def normal_not_t(before, after):
     """The normal distribution in place of Student's."""
     moves = moving.differences(before, after)
     return [
-        moving.Move(m.before, m.after, m.error, m.standard_errors, p, moving.sidak(p, len(moves)))
+        structs.replace(m, p=p, p_corrected=moving.sidak(p, len(moves)))
         for m in moves
         for p in [2 * special.ndtr(-abs(m.standard_errors or 0.0))]
     ]
@@ -98,10 +100,7 @@ def normal_not_t(before, after):
 
 def uncorrected(before, after):
     """Each of all the tests at the level of the whole."""
-    return [
-        moving.Move(m.before, m.after, m.error, m.standard_errors, m.p, m.p)
-        for m in moving.differences(before, after)
-    ]
+    return [structs.replace(m, p_corrected=m.p) for m in moving.differences(before, after)]
 
 
 def standard_deviations(before, after):
@@ -137,13 +136,13 @@ def test_the_p_value_is_scipys_of_welchs_test():
     sides = normal(rng), 1.002 + 0.03 * rng.normal(size=(PASSES, 102))
     moves = moving.differences(*map(measured, sides))[5:]
     expected = stats.ttest_ind(sides[1], sides[0], equal_var=False)
-    names = [move.before.name for move in moves]
+    names = [move.quantity for move in moves]
     assert names[:4] == ["heuristic R", "heuristic G", "heuristic B", "reference R"]
     order = np.r_[0:3, 51:54, 3:51, 54:102]
     np.testing.assert_allclose([m.p for m in moves], expected.pvalue[order], rtol=1e-9)
     t = [m.standard_errors for m in moves]
     np.testing.assert_allclose(t, expected.statistic[order], rtol=1e-9)
-    corrected = [m.corrected for m in moves]
+    corrected = [m.p_corrected for m in moves]
     np.testing.assert_allclose(corrected, 1 - (1 - expected.pvalue[order]) ** 107, rtol=1e-6)
 
 
@@ -177,7 +176,7 @@ def test_the_surest_of_the_widest_comes_first():
     after.colours["reference"].blocks[1, 2, 0] = 1.5
     after.colours["reference"].whole[1] = 1.1
     after.metrics["rmse"] = Metric(0.1, 0.0, 0.0)
-    names = [move.before.name for move in moving.moved(moving.differences(before, after))]
+    names = [move.quantity for move in moving.moved(moving.differences(before, after))]
     assert names == ["rmse", "reference G", "reference R, block 2,3"]
 
 
@@ -195,7 +194,7 @@ def test_jackknife_errors_are_those_of_metrics_drawn_again():
         )
         for _ in range(30)
     ]
-    for name in measuring.ROUNDING:
+    for name in (*METRICS, RATIO.name):
         values = [one.metrics[name].value for one in drawn]
         errors = [one.metrics[name].error for one in drawn]
         # 30 draws know their own spread to 13 %.

@@ -81,14 +81,14 @@ def study(request):
 
 
 def test_prices_add_up_to_the_departure_in_the_mean_and_in_every_pixel(study):
-    prices = study.data["prices"]
-    removed = [price["removes"]["value"] for price in prices["effects"]]
-    assert sum(removed) == pytest.approx(prices["departure"], abs=1e-9)
+    prices = study.record.prices
+    removed = [price.removes.value for price in prices.effects]
+    assert sum(removed) == pytest.approx(prices.departure, abs=1e-9)
     np.testing.assert_allclose(sum(study.effects.values()), study.error, atol=1e-9)
     assert study.error.max() > 1
     assert (study.error[~study.counted] == 0).all()
-    added = [price["adds_s"]["value"] for price in prices["effects"]]
-    assert sum(added) == pytest.approx(prices["reference_s"] - prices["kernel_s"], abs=1e-9)
+    added = [price.adds_s.value for price in prices.effects]
+    assert sum(added) == pytest.approx(prices.reference_s - prices.kernel_s, abs=1e-9)
 
 
 def test_the_departure_is_that_of_the_kernel_rendered_anew(study):
@@ -96,23 +96,23 @@ def test_the_departure_is_that_of_the_kernel_rendered_anew(study):
     kernel = study.rungs[_asked_for(study)]
     viewing = Options().viewing
     error = delta_e_2000(kernel, study.reference, viewing)[study.counted].mean()
-    noise = study.data["prices"]["floor"] + study.data["reference"]["noise_floor"]
+    noise = study.record.prices.floor + study.record.reference.noise_floor
     assert study.error[study.counted].mean() == pytest.approx(error, abs=0.05 * error + noise)
 
 
 def test_parts_add_up_to_the_departure_in_every_pixel(study):
-    split = study.data["split"]
-    total = sum(part["mean"] for part in split["parts"])
-    assert total == pytest.approx(split["departure"]["mean"], abs=1e-12)
+    split = study.record.split
+    total = sum(part.mean for part in split.parts)
+    assert total == pytest.approx(split.departure.mean, abs=1e-12)
     np.testing.assert_allclose(sum(study.parts.values()), study.difference, atol=1e-12)
-    assert split["departure"]["dE2000"] > 0.1
+    assert split.departure.dE2000 > 0.1
 
 
 def test_kernel_and_plugin_are_one(study):
-    parts = {part["name"]: part for part in study.data["split"]["parts"]}
+    parts = {part.name: part for part in study.record.split.parts}
     # Single precision: a few units in the last place of values around 1.
     assert np.abs(study.parts["implementation"]).max() < 2e-5
-    assert parts["implementation"]["dE2000"] < 1e-3
+    assert parts["implementation"].dE2000 < 1e-3
 
 
 def test_the_difference_is_that_of_reference_and_kernel_rendered_anew(study):
@@ -125,11 +125,11 @@ def test_the_difference_is_that_of_reference_and_kernel_rendered_anew(study):
 
 def _asked_for(study):
     names = {"flat": "flat kernel", "gouraud": "Gouraud kernel", "phong": "Phong kernel"}
-    return names[study.data["interpolation"]]
+    return names[study.record.interpolation.value]
 
 
 def test_scenes_have_the_effects_and_parts_that_they_are_made_of(study):
-    effects, parts = MADE_OF[study.data["scene"]]
+    effects, parts = MADE_OF[study.record.scene]
     assert set(study.effects) == effects
     assert set(study.parts) == parts
 
@@ -145,11 +145,11 @@ def test_the_record_holds_to_its_schema_and_survives_json(study):
 
 
 def test_every_method_and_effect_is_in_the_tables(study):
-    text = "\n".join(cost_tables.lines(study.data))
-    for rung in study.data["rungs"]:
-        assert rung["name"].split(",")[0] in text
-    for price in study.data["prices"]["effects"]:
-        assert price["effect"] in text
+    text = "\n".join(cost_tables.lines(study.record))
+    for rung in study.record.rungs:
+        assert rung.name.split(",")[0] in text
+    for price in study.record.prices.effects:
+        assert price.effect in text
 
 
 def whole(renderer, passes=8, seed=40):
@@ -331,7 +331,7 @@ CORPUS = Path(__file__).parent / "corpus"
 def test_a_camera_without_a_viewpoint_has_no_flat_and_gouraud_rungs(rgb):
     source = Source("orthographic", CORPUS / "sensor-orthographic.xml")
     study = cost(source, Options(resolution=(16, 12)), TINY)
-    kernels = {point["rung"] for point in study.data["points"] if "kernel" in point["rung"]}
+    kernels = {point.rung for point in study.record.points if "kernel" in point.rung}
     assert kernels == {"Phong kernel", "kernel with shadows"}
 
 

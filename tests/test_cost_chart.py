@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 import vl_convert
+from msgspec import convert, structs
 
+from comparisons.cost.timing import Measured
 from reports.charts import error_over_time, labels
+from tests import cost_records
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -22,19 +25,13 @@ def test_names_with_room_stay_where_they_want_to_be():
 
 
 def point(rung, spp, time, error, pareto=False):
-    seconds = {"median": time, "low": 0.9 * time, "high": 1.2 * time}
-    return {"rung": rung, "spp": spp, "seconds": seconds, "error": error, "pareto": pareto}
+    return convert(cost_records.point(rung, spp, time, error, pareto), Measured)
 
 
-def data(points, floor=0.4):
-    return {
-        "scene": "synthetic",
-        "points": points,
-        "reference": {"noise_floor": floor},
-        "resolution": [64, 48],
-        "rounds": 3,
-        "machine": {"cores": 2, "processor": "a processor"},
-    }
+def record(points, floor=0.4):
+    whole = cost_records.record("synthetic")
+    reference = structs.replace(whole.reference, noise_floor=floor)
+    return structs.replace(whole, points=tuple(points), reference=reference)
 
 
 @pytest.mark.parametrize(
@@ -51,15 +48,15 @@ def data(points, floor=0.4):
     ids=["one point", "no error at all", "ladder"],
 )
 def test_it_draws_and_names_axes_units_and_every_rung(points, floor):
-    svg = vl_convert.vegalite_to_svg(error_over_time.error_over_time(data(points, floor)))
-    for word in ("time for one image (ms", "mean ΔE2000", "Pareto", *(p["rung"] for p in points)):
+    svg = vl_convert.vegalite_to_svg(error_over_time.error_over_time(record(points, floor)))
+    for word in ("time for one image (ms", "mean ΔE2000", "Pareto", *(p.rung for p in points)):
         assert word in svg
     assert "NaN" not in svg
 
 
 def test_points_lie_where_their_axes_say():
     points = [point("full plan", n, 0.02 * n, 8 / n**0.5) for n in (4, 16, 64)]
-    rows = [error_over_time._row(p) for p in points]
+    rows = [error_over_time._row(p, "physical") for p in points]
     x = error_over_time._Axis(
         min(r["low"] for r in rows), max(r["high"] for r in rows), error_over_time.WIDTH
     )

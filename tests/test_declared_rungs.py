@@ -38,12 +38,12 @@ def named(name):
 def test_a_declared_rung_is_in_the_study_and_its_tables(rgb):
     declare(TOY)
     study = cost(SCENES["cornell-box"].source(), Options(resolution=(12, 12)), TINY)
-    points = {point["rung"]: point for point in study.data["points"]}
+    points = {point.rung: point for point in study.record.points}
     assert TOY.name in points
     # Light that passes through boxes is brighter than with shadows.
     assert study.rungs[TOY.name].mean() > 1.02 * study.rungs["direct"].mean()
-    assert any(TOY.name in line for line in cost_tables.lines(study.data))
-    _, rows = tables.methods(study.data)
+    assert any(TOY.name in line for line in cost_tables.lines(study.record))
+    _, rows = tables.methods(study.record)
     assert any(TOY.name in map(str, row) for row in rows)
 
 

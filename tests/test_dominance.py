@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from comparisons.departure.regions import Region
 from comparisons.effects.dominance import LEAST, NONE, UNCOUNTED, dominating, in_region
 
 ALL = np.ones((4, 6), bool)
@@ -29,7 +30,7 @@ def test_what_makes_it_worse_does_not_dominate():
 
 
 def region(x, y, width, height):
-    return {"x": x, "y": y, "width": width, "height": height}
+    return Region(x=x, y=y, width=width, height=height, share=0.5, mean_dE2000=1.0)
 
 
 def test_a_region_of_a_larger_image_is_found_in_the_smaller_map():

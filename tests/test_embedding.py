@@ -7,7 +7,7 @@ import zlib
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import drawn
 from reports.files import exr
 from reports.page import embedding
 
@@ -54,7 +54,7 @@ def channels(width, height, seed=0):
         "heuristic": image(3) * rng.choice([-1, 1], (height, width, 3)),
         "reference": image(3),
         "reference_stderr": image(3),
-        **{name: image() for name in METRICS},
+        **{name: image() for name in drawn()},
         "significant": rng.random((height, width)) > 0.5,
     }
     return exr.channels(layers)
@@ -89,7 +89,7 @@ def test_the_page_holds_what_the_exr_holds():
     planes = read(embedded)
     assert (embedded.width, embedded.height, embedded.block) == (7, 5, 1)
     names = [f"{half}.{c}" for half in ("heuristic", "reference") for c in "RGB"]
-    for name in [*names, *METRICS]:
+    for name in [*names, *drawn()]:
         image = stored[name if "." in name else f"{name}.Y"]
         for (y, x), code in np.ndenumerate(planes[name]):
             assert value_of(code, 3) == float(f"{float(image[y, x]):.2e}")

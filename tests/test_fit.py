@@ -270,15 +270,15 @@ def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):
 def test_the_fit_of_figure_8_9_leaves_what_fresnel_makes(rgb):
     """Roughplastic reflects more towards the rim, which no parameter of the model does."""
     result = fit(builtin("fig-8-9").source(), Options(resolution=(48, 48), spp=16))
-    best = result.data["fits"][result.data["best"]]
-    for departure in best["departure"].values():
-        assert departure["before"] > 2 * departure["after"]
-        assert departure["after"] > 10 * departure["noise_floor"]
-        assert departure["parameter_error"] == departure["before"] - departure["after"]
+    best = result.record.nearest
+    for departure in best.departure.values():
+        assert departure.before > 2 * departure.after
+        assert departure.after > 10 * departure.noise_floor
+        assert departure.parameter_error == departure.before - departure.after
     images = result.images
     rim = unlit_rim(48)
     assert images.reference[rim].mean() > 1.05 * images.after[rim].mean()
-    assert images.maps["dE2000"][rim].mean() > 2 * best["departure"]["dE2000"]["after"]
+    assert images.maps["dE2000"][rim].mean() > 2 * best.departure["dE2000"].after
 
 
 def unlit_rim(size):
@@ -292,23 +292,22 @@ def unlit_rim(size):
 
 def test_an_exact_pair_has_no_error_of_either_kind(rgb):
     result = fit(builtin("fig-8-5a").source(), Options(resolution=(16, 16), spp=4))
-    best = result.data["fits"][result.data["best"]]
-    assert best["departure"]["dE2000"]["before"] == pytest.approx(0, abs=1e-4)
-    found = {p["name"]: p for p in best["materials"][0]["parameters"]}
-    assert found["k_a"]["fitted"] == pytest.approx(0.5, rel=1e-5)
-    assert [found[name]["fitted"] for name in ("k_d", "k_s", "n")] == [None] * 3
+    best = result.record.nearest
+    assert best.departure["dE2000"].before == pytest.approx(0, abs=1e-4)
+    found = {p.name: p for p in best.materials[0].parameters}
+    assert found["k_a"].fitted == pytest.approx(0.5, rel=1e-5)
+    assert [found[name].fitted for name in ("k_d", "k_s", "n")] == [None] * 3
 
 
 def test_a_form_and_its_normalised_variant_are_one_fit_with_another_k_s(rgb):
     result = fit(builtin("fig-8-9").source(), Options(resolution=(24, 24), spp=4))
-    for plain, normalised in zip(*(result.data["fits"][i::2] for i in (0, 1)), strict=True):
-        assert (plain["normalised"], normalised["normalised"]) == (False, True)
-        assert plain["departure"] == normalised["departure"]
+    for plain, normalised in zip(*(result.record.fits[i::2] for i in (0, 1)), strict=True):
+        assert (plain.normalised, normalised.normalised) == (False, True)
+        assert plain.departure == normalised.departure
         one, other = (
-            {p["name"]: p["fitted"] for p in f["materials"][0]["parameters"]}
-            for f in (plain, normalised)
+            {p.name: p.fitted for p in f.materials[0].parameters} for f in (plain, normalised)
         )
-        assert one["k_s"] == pytest.approx(other["k_s"] * normalisation(plain["form"], one["n"]))
+        assert one["k_s"] == pytest.approx(other["k_s"] * normalisation(plain.form, one["n"]))
         assert one["k_d"] == other["k_d"]
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from comparisons.circumstances import Pixels
 from comparisons.departure.histogram import BINS_A_DECADE, DECADES, histogram
 from reports.charts import histograms
 from tests import records
@@ -28,8 +29,8 @@ def test_an_edge_belongs_to_the_bin_above_it():
 
 def test_areas_under_the_chart_are_shares_of_pixels():
     values = 10.0 ** np.random.default_rng(0).uniform(-3, 2, 3000)
-    data = histogram(values).data()
-    spec = histograms.spec("dE2000", data, records.metric(3.0), values.size)
+    data = histogram(values)
+    spec = histograms.spec("dE2000", data, records.summary(3.0), values.size)
     rows = spec["layer"][0]["data"]["values"]
     places = np.log10([row["value"] for row in rows])
     area = sum(np.diff(places) * [row["density"] for row in rows[:-1]])
@@ -38,27 +39,27 @@ def test_areas_under_the_chart_are_shares_of_pixels():
 
 
 def test_mean_percentile_and_noise_floor_are_marked_where_they_are():
-    data = histogram([1.0, 2.0]).data()
-    spec = histograms.spec("dE2000", data, records.metric(3.0), 2)
+    data = histogram([1.0, 2.0])
+    spec = histograms.spec("dE2000", data, records.summary(3.0), 2)
     labels = {
         row["label"]: row["value"] for layer in spec["layer"][1:] for row in layer["data"]["values"]
     }
     expected = {"mean 3.00": 3.0, "95 % 6.30": 6.3, "noise floor 0.0369": 0.0369}
     assert labels == pytest.approx(expected)
-    silent = histograms.spec("dE2000", data, records.metric(0.0), 2)
+    silent = histograms.spec("dE2000", data, records.summary(0.0), 2)
     assert len(silent["layer"]) == 1
 
 
 def test_what_is_not_shown_is_said():
-    data = histogram([0.0, 0.0, 1.0, 2000.0]).data()
+    data = histogram([0.0, 0.0, 1.0, 2000.0])
     assert histograms.note(data, 4) == (
         "Not shown: 50.0 % of the pixels under 0.01, 25.0 % of the pixels at least 1000."
     )
-    assert histograms.note(histogram([1.0]).data(), 1) == ""
+    assert histograms.note(histogram([1.0]), 1) == ""
 
 
 def test_a_record_without_counted_pixels_has_no_chart():
     record = records.record()
     assert [figure.title for figure in histograms.figures(record)] == ["ΔE2000"]
-    record["pixels"]["counted"] = 0
-    assert histograms.figures(record) == []
+    empty = records.record(pixels=Pixels(counted=0, total=24))
+    assert histograms.figures(empty) == []

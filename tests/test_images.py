@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons.departure.metrics import LOG2_RANGE, METRICS
+from comparisons.departure.metrics import METRICS, RATIO, drawn
 from reports.files import images
+from tests import records
 
 
 def pixels_of(picture):
@@ -69,13 +70,12 @@ def test_colour_bar_has_the_ends_of_the_map():
     assert bar.endswith("#fcfdbf)")
 
 
-@pytest.mark.parametrize("name", [*METRICS, "log2_luminance"])
+@pytest.mark.parametrize("name", [*drawn(), RATIO.name])
 def test_pictures_draw_a_map_over_its_printed_range(name):
-    top = LOG2_RANGE if name == "log2_luminance" else METRICS[name].map_range[1]
-    black = np.zeros((1, 2, 3))
-    made = images.pictures(black, black, {name: np.array([[top, 0.99 * top]])}, black[..., 0])
-    assert set(made) == {"heuristic", "reference", "significant", name}
+    top = RATIO.limit if name == RATIO.name else METRICS[name].map_range[1]
+    made = images.pictures(records.images(1, 2, {name: np.array([[top, 0.99 * top]])}))
+    assert set(made) == {"heuristic", "reference", "significant", *drawn(), RATIO.name}
     end, below = decode(made[name])[0]
-    table = images._table("RdBu_r" if name == "log2_luminance" else "magma")
+    table = images._table("RdBu_r" if name == RATIO.name else "magma")
     np.testing.assert_array_equal(end, table[-1])
     assert (below != table[-1]).any()

@@ -12,7 +12,7 @@ CELL = """
 from reports.notebook import compare
 import mitsuba as mi
 shown = compare(mi.cornell_box(), name="box <b>", spp=4, resolution=(16, 16))
-print(shown.comparison.data["resolution"])
+print(shown.comparison.record.resolution)
 shown
 """
 
@@ -23,7 +23,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)])
     NotebookClient(notebook, timeout=120, resources={"metadata": {"path": tmp_path}}).execute()
     printed, shown = notebook.cells[0].outputs
-    assert printed["text"] == "[16, 16]\n"
+    assert printed["text"] == "(16, 16)\n"
     tags = []
     parser = HTMLParser()
     parser.handle_starttag = lambda tag, attributes: tags.append((tag, dict(attributes)))

@@ -1,18 +1,19 @@
 """The record's schema, and the page: its numbers are the record's and it loads nothing."""
 
 import copy
+from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 
-import reports
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import METRICS, drawn
+from comparisons.verification import Verification
 from heuristic.equations import Entry
 from reports.files import images
 from reports.page import embedding, page
+from reports.run.stages import Failure
 from reports.terminal import printing
 from tests import records
 from tests.schemas import schema
@@ -23,14 +24,13 @@ HOSTILE = "../\"><script>alert('x')</script><img src=http://example.org/x onerro
 
 @pytest.fixture
 def record():
-    return records.record()
+    return records.data()
 
 
 @pytest.fixture
 def pictures():
-    rng = np.random.default_rng(0)
-    maps = {name: 20 * rng.random((4, 6)) for name in (*METRICS, "log2_luminance")}
-    return images.pictures(rng.random((4, 6, 3)), rng.random((4, 6, 3)), maps, maps["dE2000"] > 9)
+    shown = records.images(4, 6)
+    return images.pictures(replace(shown, significant=shown.maps["dE2000"] > 9))
 
 
 class Page(HTMLParser):
@@ -71,7 +71,7 @@ def test_the_schema_is_valid_and_accepts_a_record(record):
     [
         (("metrics", "dE2000", "mean"), -1.0),
         (("metrics", "dE2000", "mean"), None),
-        (("metrics", "significant", "fraction"), 1.5),
+        (("significant", "fraction"), 1.5),
         (("resolution",), [512]),
         (("resolution",), [0, 4]),
         (("plan", "max_depth"), -2),
@@ -89,15 +89,16 @@ def test_the_schema_refuses(record, path, value):
 
 
 def test_no_required_key_may_be_missing(record):
-    for key in SCHEMA["required"]:
+    for key in SCHEMA["$defs"]["ComparisonRecord"]["required"]:
         partial = {k: v for k, v in record.items() if k != key}
         assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(partial), key
 
 
 def test_the_numbers_on_the_page_are_the_records(record, pictures):
-    shown = Page(page.render([{"record": record, "images": pictures}]))
+    shown = Page(page.render([records.view(record, images=pictures)]))
     values = {value for value, _ in shown.values}
-    keys = ("metrics", "viewing", "pixels", "pairing", "time")
+    keys = ("metrics", "log2_luminance", "significant", "limits", "viewing", "pixels", "pairing")
+    keys += ("time",)
     parts = [record[key] for key in keys]
     parts += [(region["share"], region["mean_dE2000"]) for region in record["regions"]]
     # The level of the test is printed, as "1 %", without a machine-readable value.
@@ -115,9 +116,7 @@ def test_the_numbers_on_the_page_are_the_records(record, pictures):
 
 def test_two_scenes_keep_their_order_and_their_anchors(record, pictures):
     other = copy.deepcopy(record) | {"scene": "second"}
-    shown = Page(
-        page.render([{"record": record, "images": pictures}, {"record": other, "images": {}}])
-    )
+    shown = Page(page.render([records.view(record, images=pictures), records.view(other)]))
     ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
     assert len(ids) == len(set(ids))
     targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
@@ -134,11 +133,12 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record["versions"] = {HOSTILE: HOSTILE}
     record["plan"]["effects"][0]["rule"] = HOSTILE
     record["regions"][0]["effect"] = HOSTILE
-    record["pairing"]["misses"][0][HOSTILE] = {HOSTILE: [HOSTILE]}
+    record["pairing"]["bsdfs"][0]["parameters"][HOSTILE] = {HOSTILE: [HOSTILE]}
+    record["pairing"]["misses"][0]["what"] = HOSTILE
     html = page.render(
-        [{"record": record, "images": pictures, "files": {HOSTILE: "javascript:" + HOSTILE}}],
+        [records.view(record, images=pictures, files={HOSTILE: "javascript:" + HOSTILE})],
         title=HOSTILE,
-        failures=[(HOSTILE, HOSTILE)],
+        failures=[Failure(scene=HOSTILE, error=HOSTILE)],
     )
     shown = Page(html)
     scripts = [attrs.get("type", "") for tag, attrs in shown.tags if tag == "script"]
@@ -163,14 +163,15 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
 
 
 def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
-    shown = Page(page.render([{"record": record, "images": pictures}]))
+    shown = Page(page.render([records.view(record, images=pictures)]))
     pictures_shown = [attrs for tag, attrs in shown.tags if tag == "img"]
     assert len(pictures_shown) == 7
     assert len({attrs["src"] for attrs in pictures_shown}) == 7
     assert all(len(attrs["alt"]) > 15 for attrs in pictures_shown)
     for metric_ in METRICS.values():
         assert metric_.definition in shown.text
-        assert f"≥ {metric_.map_range[1]:g}" in shown.text
+        assert metric_.caution in shown.text
+        assert not metric_.drawn or f"≥ {metric_.map_range[1]:g}" in shown.text
     assert "not counted" in shown.text
 
 
@@ -179,12 +180,11 @@ def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, mo
         f"{half}.{c}": np.ones((4, 6)) for half in ("heuristic", "reference") for c in "RGB"
     }
     channels |= {f"reference_stderr.{colour}": np.zeros((4, 6)) for colour in "RGB"}
-    channels |= {f"{name}.Y": np.ones((4, 6)) for name in (*METRICS, "significant")}
+    channels |= {f"{name}.Y": np.ones((4, 6)) for name in (*drawn(), "significant")}
 
     def shown():
         embedded = embedding.embed(channels, np.ones((4, 6), bool))
-        view = {"record": record, "images": pictures, "embedded": embedded}
-        return Page(page.render([view])).text
+        return Page(page.render([records.view(record, embedded=embedded)])).text
 
     assert "means over" not in shown()
     monkeypatch.setattr(embedding, "LONGEST", 3)
@@ -192,10 +192,9 @@ def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, mo
 
 
 def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):
-    view = {"record": record, "images": pictures}
-    assert "about noise" not in Page(page.render([view])).text
+    assert "about noise" not in Page(page.render([records.view(record)])).text
     record["metrics"]["dE2000"]["noise_floor"] = 4.2
-    assert "about noise" in Page(page.render([view])).text
+    assert "about noise" in Page(page.render([records.view(record)])).text
 
 
 @pytest.mark.parametrize(
@@ -225,13 +224,13 @@ def test_times_have_their_unit(value, text):
 
 
 def test_the_package_holds_its_templates():
-    folder = Path(reports.__path__[0])
+    folder = page.TEMPLATES
     styles = [f"styles/{name}.css" for name in page.STYLES]
     scripts = [f"viewer/{name}.js" for name in page.SCRIPTS]
     for name in ("page.html.j2", "scene.html.j2", "macros.html.j2", *styles, *scripts):
-        assert (folder / "templates" / name).is_file()
-    assert {path.stem for path in (folder / "templates" / "viewer").iterdir()} == set(page.SCRIPTS)
-    assert {path.stem for path in (folder / "templates" / "styles").iterdir()} == set(page.STYLES)
+        assert (folder / name).is_file()
+    assert {path.stem for path in (folder / "viewer").iterdir()} == set(page.SCRIPTS)
+    assert {path.stem for path in (folder / "styles").iterdir()} == set(page.STYLES)
 
 
 def test_the_index_of_equations_is_printed_with_code_and_escaped(record, pictures):
@@ -239,7 +238,7 @@ def test_the_index_of_equations_is_printed_with_code_and_escaped(record, picture
         Entry("8.5", "heuristic.terms.diffuse", "``I = k_d`` for ``N.L > 0``."),
         Entry("8.7", None, HOSTILE),
     ]
-    view = {"record": record, "images": pictures}
+    view = records.view(record, images=pictures)
     html = page.render([view], equations=entries)
     assert "<code>I = k_d</code> for <code>N.L &gt; 0</code>." in html
     assert "heuristic.terms.diffuse" in html
@@ -251,10 +250,10 @@ def test_verifications_are_printed(record, pictures):
     numbers = {
         "significant": 3, "pixels": 1436, "gain": 91.5, "planned_s": 0.0032, "planned_noise": 0.5,
         "everything_s": 0.25, "everything_noise": 0.125, "planning_s": 0.002,
-        "heuristic_largest": 0.0, "resolution": (96, 80),
+        "heuristic_largest": 0.0, "resolution": (96, 80), "largest": 0.5, "saved_s": 1.0,
     }  # fmt: skip
-    verification = {"scene": HOSTILE, "planned": "direct_all", **numbers}
-    view = {"record": record, "images": pictures}
+    verification = Verification(scene=HOSTILE, planned="direct_all", everything="path", **numbers)
+    view = records.view(record, images=pictures)
     html = page.render([view], verifications=[verification])
     assert "3 of 1436" in html
     assert "91.5 ×" in html

@@ -64,8 +64,8 @@ def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
     assert min(seen) == done
     whole = compare(source, options)
     assert all(map(np.array_equal, arrays(resumed), arrays(whole)))
-    assert resumed.data["metrics"] == whole.data["metrics"]
-    assert resumed.data["time"]["reference"]["passes"] == 16
+    assert resumed.record.metrics == whole.record.metrics
+    assert resumed.record.time.reference.passes == 16
 
 
 def test_kept_passes_of_something_else_are_not_used(tmp_path):
@@ -107,26 +107,26 @@ def test_the_key_tells_scene_options_and_versions_apart(rgb):
 def test_the_run_ends_once_the_noise_is_under_the_target(rgb):
     options = Options(resolution=SMALL, noise=6.0)
     result = compare(SCENES["cornell-box"].source(), options)
-    stop, plan = result.data["noise_target"], result.data["plan"]
-    assert stop["stopped_by"] == "target"
-    assert 0 < stop["reached"] <= 6.0
-    assert stop["limit_spp"] == LIMIT_SPP
-    assert plan["spp"] < LIMIT_SPP
+    stop, plan = result.record.noise_target, result.record.plan
+    assert stop.stopped_by == "target"
+    assert 0 < stop.reached <= 6.0
+    assert stop.limit_spp == LIMIT_SPP
+    assert plan.spp < LIMIT_SPP
     # The noise that was predicted is that between this run and one of other seeds, by √2.
     other = compare(SCENES["cornell-box"].source(), Options(resolution=SMALL, noise=6.0, seed=900))
-    assert other.data["plan"]["spp"] == plan["spp"]
+    assert other.record.plan.spp == plan.spp
     between = METRICS["dE2000"](result.images.reference, other.images.reference)
     measured = np.percentile(between[result.images.counted], 95) / np.sqrt(2)
-    assert stop["reached"] == pytest.approx(measured, rel=0.25)
+    assert stop.reached == pytest.approx(measured, rel=0.25)
 
 
 def test_a_limit_on_samples_stops_first_and_says_so(rgb):
     result = compare(SCENES["cornell-box"].source(), Options(resolution=SMALL, noise=0.01, spp=40))
-    stop, plan = result.data["noise_target"], result.data["plan"]
-    assert stop["stopped_by"] == "samples"
-    assert stop["reached"] > 0.01
-    assert plan["spp"] <= 40
-    assert plan["spp"] == stop["limit_spp"]
+    stop, plan = result.record.noise_target, result.record.plan
+    assert stop.stopped_by == "samples"
+    assert stop.reached > 0.01
+    assert plan.spp <= 40
+    assert plan.spp == stop.limit_spp
 
 
 @pytest.mark.parametrize("noise", [0.0, -1.0, float("nan")])

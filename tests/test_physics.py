@@ -140,9 +140,9 @@ def test_an_exact_pair_differs_by_the_noise_alone(rgb, name, everything):
     """
     options = Options(spp=64, resolution=(64, 64), everything=everything)
     result = compare(Source(name, EXACT[name]()), options)
-    metrics = result.data["metrics"]
-    mean, floor = metrics["dE2000"]["mean"], metrics["dE2000"]["noise_floor"]
-    assert metrics["significant"]["fraction"] == 0
+    metric, significant = result.record.metrics["dE2000"], result.record.significant
+    mean, floor = metric.mean, metric.noise_floor
+    assert significant.fraction == 0
     assert not result.images.significant.any()
     if name == "constant" and everything:
         assert floor > 0.05
@@ -155,10 +155,10 @@ def test_an_exact_pair_differs_by_the_noise_alone(rgb, name, everything):
 def test_a_pair_that_is_not_exact_is_told_from_noise(rgb):
     """The same test on figure 8.9, whose highlight no rough plastic has."""
     result = compare(SCENES["fig-8-9"].source(), Options(spp=64, resolution=(64, 64)))
-    metrics = result.data["metrics"]
-    assert metrics["dE2000"]["mean"] > 1
-    assert metrics["dE2000"]["mean"] > 5 * metrics["dE2000"]["noise_floor"]
-    assert metrics["significant"]["fraction"] > 0.1
+    metric, significant = result.record.metrics["dE2000"], result.record.significant
+    assert metric.mean > 1
+    assert metric.mean > 5 * metric.noise_floor
+    assert significant.fraction > 0.1
 
 
 def test_the_spot_of_an_area_light_is_right_in_the_far_field(rgb):

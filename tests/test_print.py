@@ -2,14 +2,15 @@
 
 import json
 import re
-from types import SimpleNamespace
+from dataclasses import replace
 
 import colour
 import numpy as np
 import pytest
+from msgspec import structs
 
 from comparisons.departure.histogram import histogram
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import METRICS, drawn
 from reports.charts import figures
 from reports.files import images
 from tests import records
@@ -61,22 +62,14 @@ def test_a_signed_map_tells_size_by_lightness_and_sign_by_hue(seen):
 
 
 def comparison():
-    random = np.random.default_rng(0)
-    maps = {name: random.uniform(0, 60, (4, 6)) for name in METRICS}
-    shown = SimpleNamespace(
-        heuristic=random.uniform(0, 1, (4, 6, 3)),
-        reference=random.uniform(0, 1, (4, 6, 3)),
-        maps=maps,
-        counted=np.ones((4, 6), bool),
-    )
-    data = records.record()
-    data["histograms"] = {name: histogram(values.ravel()).data() for name, values in maps.items()}
-    return SimpleNamespace(data=data, images=shown)
+    made = records.comparison()
+    histograms = {name: histogram(made.images.maps[name]) for name in drawn()}
+    return replace(made, record=structs.replace(made.record, histograms=histograms))
 
 
 def test_a_scene_is_written_as_svg_and_pdf_with_its_number(tmp_path):
     figures.write_scene(tmp_path / "figures", "ball", comparison())
-    names = ["ball", *(f"ball-histogram-{metric}" for metric in METRICS)]
+    names = ["ball", *(f"ball-histogram-{metric}" for metric in drawn())]
     found = {path.name for path in (tmp_path / "figures").iterdir()}
     assert found == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf")}
     for path in (tmp_path / "figures").iterdir():
@@ -108,13 +101,14 @@ def test_files_hold_no_date_and_repeat(kind):
 
 
 def test_departures_share_one_axis_whatever_the_scenes():
-    one, other = records.record(), records.record()
+    one, other = records.record(), records.data()
     other["scene"] = "far"
     other["metrics"]["dE2000"] |= {"mean": 250.0, "noise_floor": 0.0}
+    other = records.of(other)
     first, second = figures.departures([one]), figures.departures([one, other])
     assert first["encoding"]["x"] == second["encoding"]["x"]
     values = {(row["scene"], row["what"]): row["value"] for row in second["data"]["values"]}
-    assert values["fig-8-9", "as it is"] == one["metrics"]["dE2000"]["mean"]
+    assert values["fig-8-9", "as it is"] == one.metrics["dE2000"].mean
     assert values["far", "as it is"] == 100
     assert values["far", "noise floor"] == 0.001
     json.dumps(second)

@@ -44,7 +44,7 @@ def noise(seed=0, size=0.01):
 
 def test_a_surface_without_limits_has_none(plain):
     limits = find(plain, GREY, noise())
-    assert limits.data() == {
+    assert plain(limits.counts()) == {
         "clamped": 0, "terminator": 0, "energy_loss": 0, "fireflies": 0, "any": 0
     }  # fmt: skip
 
@@ -53,7 +53,7 @@ def test_alpha_at_mitsubas_smallest_is_clamped_and_above_it_not(plain):
     alpha = plain.alpha.copy()
     alpha[0, :3] = SMALLEST_ALPHA, 1e-6, 1.01 * SMALLEST_ALPHA
     limits = find(replace(plain, alpha=alpha), GREY, noise())
-    assert limits.data()["clamped"] == 2
+    assert limits.counts().clamped == 2
     assert limits.clamped[0, :3].tolist() == [True, True, False]
 
 
@@ -74,7 +74,7 @@ def test_normals_that_disagree_about_light_or_viewer_are_a_terminator(plain, whi
     grazing[4, 5] = GRAZING
     changed = {"view": grazing} if which == "view" else {"lights": LIT_FROM[which]}
     limits = find(replace(plain, shading=tilted, **changed), GREY, noise())
-    assert limits.data()["terminator"] == 1
+    assert limits.counts().terminator == 1
     assert limits.terminator[4, 5]
     assert not find(replace(plain, shading=tilted), GREY, noise()).terminator.any()
     assert not find(replace(plain, **changed), GREY, noise()).terminator.any()
@@ -93,7 +93,7 @@ def test_a_surface_that_loses_light_is_marked(plain):
     albedo = plain.albedo.copy()
     albedo[:2] = 0.74
     albedo[2] = 0.985
-    assert find(replace(plain, albedo=albedo), GREY, noise()).data()["energy_loss"] == 2 * SIDE
+    assert find(replace(plain, albedo=albedo), GREY, noise()).counts().energy_loss == 2 * SIDE
 
 
 def test_a_pixel_whose_light_came_in_one_pass_is_a_firefly():
@@ -110,8 +110,8 @@ def test_a_pixel_whose_light_came_in_one_pass_is_a_firefly():
 def test_pixels_that_do_not_count_are_not_marked(plain):
     nothing = np.zeros((SIDE, SIDE), bool)
     bad = replace(plain, alpha=np.zeros((SIDE, SIDE)), albedo=np.zeros((SIDE, SIDE)))
-    assert find(bad, GREY, noise(), nothing).data()["any"] == 0
-    assert find(bad, GREY, noise()).data()["any"] == SIDE**2
+    assert find(bad, GREY, noise(), nothing).counts().any == 0
+    assert find(bad, GREY, noise()).counts().any == SIDE**2
 
 
 def scene(bsdf, shape=None):
@@ -156,7 +156,7 @@ def test_a_scenes_roughplastic_is_read(rgb, alpha, expected, twosided):
 
 def test_other_materials_have_no_limit(rgb):
     surfaces = of_scene(scene({"type": "diffuse", "reflectance": 1.0}), SIDE, SIDE)
-    assert find(surfaces, GREY, noise()).data()["any"] == 0
+    assert find(surfaces, GREY, noise()).counts().any == 0
 
 
 # --- Terminators of a mesh -------------------------------------------------------------------

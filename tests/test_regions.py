@@ -87,9 +87,3 @@ def test_a_box_is_drawn_in_to_the_counted_pixels():
     counted[:, :207] = counted[:103] = False
     (found,) = regions.find(error, counted)
     assert (found.x, found.y) == (207, 103)
-
-
-def test_an_unknown_effect_is_left_out_of_the_record():
-    region = regions.Region(1, 2, 3, 4, 0.5, 6.0)
-    assert "effect" not in region.data()
-    assert regions.Region(1, 2, 3, 4, 0.5, 6.0, "occlusion").data()["effect"] == "occlusion"

@@ -320,9 +320,8 @@ def broken_integrator(value, row, column):
 def test_a_pixel_that_is_no_number_is_an_error_that_names_it(rgb, value):
     made = mi.load_dict(scene(point=POINT))
     half = renderer.Renderer(made, broken_integrator(value, 5, 17), 256, "reference image")
-    with pytest.raises(
-        NonFiniteError, match=r"reference image, pass with seed 4: 1 pixels .* x = 17, y = 5"
-    ):
+    said = r"reference image, pass with seed 4: 1 of \d+ pixels .*\(x, y\) = \(17, 5\)"
+    with pytest.raises(NonFiniteError, match=said):
         half.render(4)
 
 

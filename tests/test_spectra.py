@@ -64,8 +64,8 @@ def test_rgb_departs_from_the_spectral_reference_where_spectra_do_not(spectral, 
     both = Options(spp=256, resolution=(80, 25))
     mixed = Options(spp=256, resolution=(80, 25), heuristic_variant=scene.heuristic_variant)
     exact, departing = (
-        compare(scene.source(), options).data["metrics"]["dE2000"] for options in (both, mixed)
+        compare(scene.source(), options).record.metrics["dE2000"] for options in (both, mixed)
     )
     # Both halves draw the same wavelengths, so that even their noise is the same.
-    assert exact["mean"] < 0.01
-    assert departing["mean"] > 5 * departing["noise_floor"]
+    assert exact.mean < 0.01
+    assert departing.mean > 5 * departing.noise_floor

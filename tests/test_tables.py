@@ -6,17 +6,21 @@ from io import StringIO
 
 import pytest
 from markdown_it import MarkdownIt
+from msgspec import structs
 
+from comparisons.effects.prices import Price
+from comparisons.intervals import Estimated
+from comparisons.records import plain
 from reports.run import output
 from reports.terminal import tables
-from tests import records
+from tests import cost_records, records
 
 
 def two_records():
-    other = records.record()
+    other = records.data()
     other["scene"] = 'a "b", c | d'
     other["metrics"]["dE2000"]["mean"] = 99.5
-    return [records.record(), other]
+    return [records.record(), records.of(other)]
 
 
 def test_csv_holds_every_number_in_full():
@@ -24,18 +28,15 @@ def test_csv_holds_every_number_in_full():
     rows = list(csv.DictReader(StringIO(tables.metrics_csv(made))))
     assert len(rows) == 8
     for row in rows:
-        (record,) = [each for each in made if each["scene"] == row["scene"]]
-        metric = record["metrics"][row["metric"]]
-        if row["metric"] == "rmse":
-            assert float(row["mean"]) == metric["value"]
-            assert float(row["after_exposure.mean"]) == metric["after_exposure"]["value"]
-            assert row["p95"] == ""
-        else:
-            for name in ("mean", "p50", "p95", "max", "noise_floor"):
-                assert float(row[name]) == metric[name]
-            for name, value in metric["after_exposure"].items():
-                assert float(row[f"after_exposure.{name}"]) == value
-        assert float(row["significant"]) == record["metrics"]["significant"]["fraction"]
+        (record,) = [each for each in made if each.scene == row["scene"]]
+        metric = plain(record.metrics[row["metric"]])
+        for name in ("mean", "p50", "p95", "max", "noise_floor"):
+            assert float(row[name]) == metric[name]
+        for part in ("after_exposure", "visible"):
+            for name, value in metric[part].items():
+                assert float(row[f"{part}.{name}"]) == value
+        assert float(row["significant"]) == record.significant.fraction
+    assert {row["visible.5"] for row in rows if row["metric"] == "rmse"} == {""}
 
 
 def test_markdown_is_a_table_with_a_row_a_scene():
@@ -52,16 +53,18 @@ def test_a_scene_takes_no_name_of_a_folder_of_the_run():
 
 
 def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
-    amount = {"value": 1.5, "low": 1.25, "high": 1.75}
-    price = {"effect": "occlusion", "removes": amount, "adds_s": amount, "alone": -0.5, "last": 3.0}
-    seconds = {"median": 0.25, "low": 0.125, "high": 0.5}
-    point = {"rung": "direct", "spp": 4, "seconds": seconds, "pareto": True}
-    data = {
-        "points": [point | {"error": 12.75, "error_stderr": 0.03125}],
-        "prices": {"effects": [price]},
-    }
-    tables.write_cost(tmp_path / "tables", "box", data)
-    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").iterdir()}
+    amount = Estimated(1.5, 1.25, 1.75)
+    price = Price("occlusion", amount, -0.5, 3.0, amount, 0.0)
+    found = cost_records.record()
+    seconds = structs.replace(found.points[0].seconds, median=0.25, low=0.125, high=0.5)
+    point = structs.replace(
+        found.points[0], rung="direct", spp=4, seconds=seconds, error=12.75, error_stderr=0.03125
+    )
+    prices = structs.replace(found.prices, effects=(price,))
+    tables.write_cost(
+        tmp_path / "tables", "box", structs.replace(found, points=(point,), prices=prices)
+    )
+    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
     assert sorted(read) == ["box-cost.csv", "box-cost.md", "box-prices.csv", "box-prices.md"]
     assert "\ndirect,4,0.25,0.125,0.5,12.75,0.03125,yes\n" in read["box-cost.csv"]
     assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-prices.csv"]

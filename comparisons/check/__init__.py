@@ -1,1 +1,1 @@
-"""Regression checks: a scene measured anew, and held against what was measured once."""
+"""Regression checks: a scene measured again, and compared with what was measured once."""

@@ -6,21 +6,45 @@ Values keep 8 significant digits, far below what rounding can change, and errors
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta, structs
 
-from comparisons.check.measurement import HALVES, ROUNDING, Colours, Measurement, Metric
+from comparisons import record, records
+from comparisons.amounts import Amount
+from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
+from comparisons.circumstances import Versions
+from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
+from comparisons.layout import laid_out
+from comparisons.records import VERSION, Record
 from heuristic.errors import InputError
 
-FORMAT = "fotismos baseline 1"
+FORMAT_0_1 = '"format": "fotismos baseline 1"'
+"""The first line of a baseline of fotismos 0.1; the others are as they were."""
+
+Colour = tuple[float, float, float]
+Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """A measured scene.
+class Block(Record):
+    """Mean linear RGB of a block of pixels."""
+
+    mean: Colour
+    error: Errors
+
+
+class Half(Record):
+    """Mean linear RGB of a half, over the image and over its blocks, row after row."""
+
+    mean: Colour
+    error: Errors
+    blocks: tuple[tuple[Block, ...], ...]
+
+
+class Baseline(Record, kw_only=True, omit_defaults=True):
+    """What was measured of one scene in independent passes of both halves.
 
     Attributes
     ----------
@@ -30,152 +54,108 @@ class Baseline:
         Rendering options by the names of the command line's; those at rest are left out.
     versions
         What it was measured with.
-    measured
-        The numbers.
     images
         Name of an EXR file beside the baseline with both halves, for people to look at; None
         without.
+    metrics, heuristic, reference
+        The numbers.
     """
 
+    record_version: int
     scene: str
-    options: Mapping[str, object]
-    versions: Mapping[str, str]
-    measured: Measurement
+    options: dict[str, Any]
+    passes: Annotated[int, Meta(ge=2)]
+    versions: Versions
     images: str | None = None
+    metrics: dict[str, Metric]
+    heuristic: Half
+    reference: Half
+
+    def measured(self) -> Measurement:
+        """Return the numbers as arrays; ``ValueError`` for rows of blocks that differ in length."""
+        colours = {half: _colours(getattr(self, half)) for half in HALVES}
+        return Measurement(self.passes, self.metrics, colours)
 
     def text(self) -> str:
         """Return the file's content."""
-        head = {
-            "format": FORMAT,
-            "scene": self.scene,
-            "options": dict(sorted(self.options.items())),
-            "passes": self.measured.passes,
-            "versions": dict(self.versions),
-        }
-        if self.images:
-            head["images"] = self.images
-        lines = [f"  {json.dumps(key)}: {_object(value)}" for key, value in head.items()]
-        metrics = [
-            f"    {json.dumps(name)}: {_line(_metric_data(metric))}"
-            for name, metric in self.measured.metrics.items()
-        ]
-        lines.append('  "metrics": {\n' + ",\n".join(metrics) + "\n  }")
-        for half in HALVES:
-            lines.append(f'  "{half}": {_colours_text(self.measured.colours[half])}')
-        return "{\n" + ",\n".join(lines) + "\n}\n"
+        return laid_out(records.plain(self)) + "\n"
+
+
+def of(
+    scene: str, options: Mapping[str, Any], measured: Measurement, images: str | None = None
+) -> Baseline:
+    """Return the baseline of a scene just measured, with the versions of this moment."""
+    return Baseline(
+        record_version=VERSION,
+        scene=scene,
+        options=dict(sorted(options.items())),
+        passes=measured.passes,
+        versions=record.versions(),
+        images=images,
+        metrics={name: _rounded_metric(metric) for name, metric in measured.metrics.items()},
+        **{half: _half(measured.colours[half]) for half in HALVES},
+    )
 
 
 def parse(text: str, name: str) -> Baseline:
-    """Read a baseline from its file's content.
+    """Read a baseline from its file's content, one of fotismos 0.1 too.
 
     Raises
     ------
     InputError
         Naming the file `name` and what is wrong in it.
     """
+    text = text.replace(FORMAT_0_1, f'"record_version": {VERSION}', 1)
     try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"{name}: this is no JSON: {error}. {_ANEW}") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(f"{name}: its format is {found!r}, not {FORMAT!r}. {_ANEW}")
-    try:
-        baseline = Baseline(
-            scene=_of(data["scene"], str),
-            options=_of(data["options"], dict),
-            versions=_of(data["versions"], dict),
-            measured=_measurement(data),
-            images=_of(data.get("images"), (str, type(None))),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise InputError(f"{name}: {what}. {_ANEW}") from error
+        baseline = records.read(Baseline, text, name)
+        _require_metrics(baseline.metrics)
+        _require_finite(baseline.measured())
+    except (InputError, ValueError) as error:
+        where = "" if isinstance(error, InputError) else f"{name}: "
+        raise InputError(
+            f"{where}{error} `fotismos check BASELINE --update --scene SCENE` writes it."
+        ) from error
     return baseline
 
 
-_ANEW = "Restore the file, or write it anew with `fotismos check BASELINE --update --scene SCENE`."
+def _require_metrics(metrics):
+    for name in metrics:
+        if name not in {*METRICS, RATIO.name}:
+            raise ValueError(f"{name!r} is not a metric.")
+    for name in (*BUILT_IN, RATIO.name):
+        if name not in metrics:
+            raise ValueError(f"the metric {name!r} is missing.")
 
 
-def _measurement(data):
-    passes = _of(data["passes"], int)
-    if passes < 2:
-        raise ValueError(f"passes = {passes}, but there must be 2 or more")
-    metrics = {
-        name: Metric(
-            float(_numbers(data["metrics"][name]["value"], ())),
-            float(_numbers(data["metrics"][name]["error"], (), least=0.0)),
-            data["metrics"][name].get("noise_floor"),
-        )
-        for name in ROUNDING
-    }
-    return Measurement(passes, metrics, {half: _colours(data[half]) for half in HALVES})
+def _require_finite(measured):
+    numbers = [*(metric.value for metric in measured.metrics.values())]
+    numbers += [c.mean() for one in measured.colours.values() for c in (one.whole, one.blocks)]
+    if not np.isfinite(numbers).all():
+        raise ValueError("a value is not finite.")
 
 
-def _colours(data):
-    rows = len(data["blocks"])
-    columns = len(data["blocks"][0])
-    blocks = data["blocks"]
-    return Colours(
-        _numbers(data["mean"], (3,)),
-        _numbers(data["error"], (3,), least=0.0),
-        _numbers([[block["mean"] for block in row] for row in blocks], (rows, columns, 3)),
-        _numbers(
-            [[block["error"] for block in row] for row in blocks], (rows, columns, 3), least=0.0
-        ),
-    )
+def _colours(half):
+    blocks = np.array([[(b.mean, b.error) for b in row] for row in half.blocks], float)
+    if blocks.ndim != 4:
+        raise ValueError("there are no blocks.")
+    return Colours(np.array(half.mean), np.array(half.error), blocks[:, :, 0], blocks[:, :, 1])
 
 
-def _numbers(values, shape, least=-np.inf):
-    array = np.array(values, float)
-    if array.shape != shape:
-        raise ValueError(f"{values} has the shape {array.shape} and not {shape}")
-    if not (np.isfinite(array).all() and (array >= least).all()):
-        raise ValueError(f"{values} is not finite, or an error is negative")
-    return array
+def _half(colours):
+    rows = zip(colours.blocks, colours.blocks_error, strict=True)
+    blocks = (tuple(map(_block, *row)) for row in rows)
+    return Half(**structs.asdict(_block(colours.whole, colours.whole_error)), blocks=tuple(blocks))
 
 
-def _of(value, kind):
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise TypeError(f"{value!r} is not what belongs there")
-    return value
+def _block(mean, error):
+    return Block(tuple(_rounded(x, 8) for x in mean), tuple(_rounded(x, 3) for x in error))
 
 
-def _colours_text(colours):
-    lines = [
-        f'    "mean": {_line(_rounded(colours.whole, 8))}',
-        f'    "error": {_line(_rounded(colours.whole_error, 3))}',
-    ]
-    rows = []
-    for means, errors in zip(colours.blocks, colours.blocks_error, strict=True):
-        blocks = (
-            {"mean": _rounded(mean, 8), "error": _rounded(error, 3)}
-            for mean, error in zip(means, errors, strict=True)
-        )
-        rows.append("      [\n" + ",\n".join(f"        {_line(b)}" for b in blocks) + "\n      ]")
-    lines.append('    "blocks": [\n' + ",\n".join(rows) + "\n    ]")
-    return "{\n" + ",\n".join(lines) + "\n  }"
+def _rounded_metric(metric):
+    floor = metric.noise_floor
+    floor = None if floor is None else _rounded(floor, 3)
+    return Metric(_rounded(metric.value, 8), _rounded(metric.error, 3), floor)
 
 
-def _metric_data(metric):
-    data = {"value": _rounded(metric.value, 8), "error": _rounded(metric.error, 3)}
-    if metric.noise_floor is not None:
-        data["noise_floor"] = _rounded(metric.noise_floor, 3)
-    return data
-
-
-def _object(value):
-    if not isinstance(value, dict):
-        return _line(value)
-    lines = (f"    {json.dumps(key)}: {_line(item)}" for key, item in value.items())
-    return "{\n" + ",\n".join(lines) + "\n  }"
-
-
-def _line(value):
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
-def _rounded(values, digits):
-    if np.ndim(values):
-        return [_rounded(value, digits) for value in values]
-    return float(f"{values:.{digits}g}")
+def _rounded(value, digits):
+    return float(f"{value:.{digits}g}")

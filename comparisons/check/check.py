@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons import record
-from comparisons.check.baseline import Baseline
 from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import prepare
@@ -19,7 +17,7 @@ LONGEST = 64
 
 @dataclass(frozen=True)
 class Check:
-    """A scene held against its baseline.
+    """A scene compared with its baseline.
 
     Attributes
     ----------
@@ -55,9 +53,9 @@ class Check:
         """Return the least p-value of each block of a half, corrected for all that was tested."""
         values = np.ones(self.after.colours[half].blocks.shape[:2])
         for move in self.moves:
-            if move.before.half == half and move.before.block:
-                block = move.before.block
-                values[block] = min(values[block], move.corrected)
+            if move.half == half and move.block:
+                block = move.block[0] - 1, move.block[1] - 1
+                values[block] = min(values[block], move.p_corrected)
         return values
 
 
@@ -112,7 +110,7 @@ def check(source, options, before, level=LEVEL, progress=None):
         As of :func:`measure_scene`; ``options`` are those of the baseline. With its seed, what did
         not change gives the same images on the same machine; with another one the test holds, too.
     before : Measurement
-        The baseline's.
+        The baseline's; metrics that it does not know are not tested.
     level
         Chance of an alarm though nothing changed, over all quantities of this scene.
 
@@ -121,19 +119,15 @@ def check(source, options, before, level=LEVEL, progress=None):
     Check
     """
     now = measure_scene(source, options, before.passes, progress)
-    shapes = [m.colours["reference"].blocks.shape for m in (before, now.measurement)]
+    after = now.measurement.of(before.metrics)
+    shapes = [m.colours["reference"].blocks.shape for m in (before, after)]
     if shapes[0] != shapes[1]:
         raise InputError(
             f"{source.name}: the baseline has {shapes[0][0]} by {shapes[0][1]} blocks, and the"
-            f" scene {shapes[1][0]} by {shapes[1][1]}. Write it anew with --update."
+            f" scene {shapes[1][0]} by {shapes[1][1]}. Write it again with --update."
         )
-    moves = differences(before, now.measurement)
+    moves = differences(before, after)
     return Check(before, now.measurement, moves, tuple(moved(moves, level)), level, now.pictures)
-
-
-def new_baseline(scene, options, measured, images=None):
-    """Return the baseline of a scene just measured, with the versions of this moment."""
-    return Baseline(scene, options, record.versions(), measured, images)
 
 
 def made_small(case):

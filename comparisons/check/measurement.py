@@ -6,14 +6,17 @@ only source of the standard errors here, so that they hold whatever noise a scen
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from comparisons.departure.metrics import METRICS, Array, log2_luminance_ratio, rmse
-from comparisons.departure.spaces import Viewing
+from comparisons.amounts import Amount
+from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
+from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
+from comparisons.intervals import jackknife_error
+from comparisons.records import Record
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import passes
 
@@ -25,11 +28,12 @@ GRID = 4
 
 HALVES = ("heuristic", "reference")
 
-ROUNDING = dict.fromkeys(METRICS, 1e-3) | {"rmse": 1e-6, "log2_luminance": 1e-4}
-"""Differences of a metric that rounding can make, in its own unit: perceptual distances and stops
-are steep near black, where 1e-6 of linear light shows most."""
-
 LINEAR_ROUNDING = 1e-6
+
+
+def rounding(metric: str) -> float:
+    """Return the difference of a metric that rounding can make; ``KeyError`` for no metric."""
+    return RATIO.rounding if metric == RATIO.name else METRICS[metric].rounding
 
 
 @dataclass(frozen=True)
@@ -56,16 +60,15 @@ class Quantity:
     block: tuple[int, int] | None = None
 
 
-@dataclass(frozen=True)
-class Metric:
+class Metric(Record, omit_defaults=True):
     """A departure metric, its standard error, and what noise alone would give.
 
     ``noise_floor`` is None for the signed ratio of luminances, which noise does not raise.
     """
 
     value: float
-    error: float
-    noise_floor: float | None
+    error: Amount
+    noise_floor: Amount | None = None
 
 
 @dataclass(frozen=True)
@@ -86,10 +89,14 @@ class Measurement:
     metrics: dict[str, Metric]
     colours: dict[str, Colours]
 
+    def of(self, metrics: Iterable[str]) -> Measurement:
+        """Return the measurement with these metrics alone."""
+        return replace(self, metrics={name: self.metrics[name] for name in metrics})
+
     def quantities(self) -> Iterator[Quantity]:
         """All numbers, one by one: metrics, whole images, blocks."""
         for name, metric in self.metrics.items():
-            yield Quantity(name, metric.value, metric.error, ROUNDING[name])
+            yield Quantity(name, metric.value, metric.error, rounding(name))
         for half, colours in self.colours.items():
             for c, letter in enumerate("RGB"):
                 value, error = float(colours.whole[c]), float(colours.whole_error[c])
@@ -150,46 +157,44 @@ def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     standard error: they are not linear, and the mean of ``n`` passes has less noise in it than each
     of them, so that only as many passes of as many samples compare with each other.
     """
-    metrics = _metrics(images[:, :, counted], viewing)
+    metrics = _metrics(images, counted, viewing)
     colours = {half: _colours(images[:, index]) for index, half in enumerate(HALVES)}
     return Measurement(len(images), metrics, colours)
 
 
-def _metrics(pixels, viewing):
-    """Metrics of passes (n, 2, N, 3), each with the jackknife's error over passes."""
-    count = len(pixels)
-    if pixels.shape[2] == 0:
-        return {name: Metric(0.0, 0.0, 0.0) for name in ROUNDING}
-    total = pixels.sum(axis=0)
-    values = _departure(*(total / count), viewing)
-    left_out = np.array([_departure(*((total - one) / (count - 1)), viewing) for one in pixels])
-    errors = np.sqrt((count - 1) * left_out.var(axis=0))
-    floors = _floors(pixels, viewing)
+def _metrics(images, counted, viewing):
+    """Metrics over the counted pixels, each with the jackknife's error over passes."""
+    if not counted.any():
+        return {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
+    count, total = len(images), images.sum(axis=0)
+    values = _departure(*(total / count), counted, viewing)
+    errors = jackknife_error(
+        [_departure(*((total - one) / (count - 1)), counted, viewing) for one in images]
+    )
+    floors = _floors(images, counted, viewing)
     return {
         name: Metric(float(value), float(error), floors.get(name))
-        for name, value, error in zip(ROUNDING, values, errors, strict=True)
+        for name, value, error in zip((*METRICS, RATIO.name), values, errors, strict=True)
     }
 
 
-def _departure(test, reference, viewing):
-    """The metrics of pixels (N, 3), in the order of `ROUNDING`."""
-    distances = [metric(test, reference, viewing).mean() for metric in METRICS.values()]
-    return (
-        *distances,
-        rmse(test, reference),
-        log2_luminance_ratio(test, reference).mean(),
-    )
+def _departure(test, reference, counted, viewing):
+    """The means of all metrics, and last of the ratio."""
+    means = [
+        metric.mean(metric.against(reference, counted, viewing)(test))
+        for metric in METRICS.values()
+    ]
+    return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
 
 
-def _floors(pixels, viewing):
-    signs = np.where(np.arange(len(pixels)) % 2, -1.0, 1.0)
-    noise = np.einsum("i,ijk->jk", signs, pixels[:, 0] - pixels[:, 1]) / len(pixels)
-    reference, everywhere = pixels[:, 1].mean(axis=0), np.ones(len(noise), bool)
-    floors = {
-        name: noise_floor(metric, reference, noise, everywhere, viewing)
+def _floors(images, counted, viewing):
+    signs = np.where(np.arange(len(images)) % 2, -1.0, 1.0)
+    noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / len(images)
+    reference = images[:, 1].mean(axis=0)
+    return {
+        name: noise_floor(metric, reference, noise, counted, viewing)
         for name, metric in METRICS.items()
     }
-    return floors | {"rmse": rmse(noise, np.zeros_like(noise))}
 
 
 def _colours(images):

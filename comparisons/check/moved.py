@@ -7,11 +7,14 @@ the second only makes the difference of unchanged things smaller than the test a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
-from comparisons.check.measurement import Measurement, Quantity
+from comparisons.amounts import Amount, Share
+from comparisons.check.measurement import Measurement
+from comparisons.records import Record
 
 LEVEL = 0.01
 """Chance of an alarm though nothing changed, over all that one check tests."""
@@ -20,12 +23,13 @@ RELATIVE_ROUNDING = 1e-5
 """Share of a value that rounding can change: other machines order float32 sums otherwise."""
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(Record):
     """One quantity, before and after.
 
     Attributes
     ----------
+    quantity, half, block
+        As of :class:`comparisons.check.measurement.Quantity`; row and column count from 1.
     before, after
         What was measured then and now.
     error
@@ -34,16 +38,19 @@ class Move:
         The difference over that error, signed; None where neither side has any spread.
     p
         Chance of a difference as large as this one, or larger, though nothing changed.
-    corrected
+    p_corrected
         Chance of one such among all quantities tested (Šidák).
     """
 
-    before: Quantity
-    after: Quantity
-    error: float
+    quantity: str
+    half: str | None
+    block: Annotated[tuple[int, int], Meta(description="Row and column, from 1.")] | None
+    before: float
+    after: float
+    error: Amount
     standard_errors: float | None
-    p: float
-    corrected: float
+    p: Share
+    p_corrected: Share
 
 
 def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
@@ -65,33 +72,35 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
         For measurements of other quantities, or of more passes on one side: Welch's test is then
         not right in the far tails, which a correction for many tests needs.
     """
-    from scipy.special import stdtr
+    from scipy.stats import ttest_ind_from_stats
 
     pairs = list(zip(before.quantities(), after.quantities(), strict=True))
     if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
         raise ValueError("measurements of other passes or quantities cannot be compared")
+    count = before.passes
     x = np.array([[old.value, new.value] for old, new in pairs])
-    variance = np.array([[old.error**2, new.error**2] for old, new in pairs])
-    difference, total = x[:, 1] - x[:, 0], variance.sum(axis=1)
+    errors = np.array([[old.error, new.error] for old, new in pairs])
+    difference, total = x[:, 1] - x[:, 0], (errors**2).sum(axis=1)
     rounding = np.array([old.rounding for old, _ in pairs])
     rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
     spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
-    safe = np.where(spread, total, 1.0)
-    t = difference / np.sqrt(safe)
-    # With shares of the total, because fourth powers of small errors would underflow.
-    shares = np.where(spread[:, None], variance / safe[:, None], 0.5)
-    nu = (before.passes - 1) / (shares**2).sum(axis=1)
-    p = np.where(spread, 2.0 * stdtr(nu, -np.abs(t)), 0.0)
-    p = np.where(np.abs(difference) <= rounding, 1.0, p)
+    deviations = np.where(spread[:, None], errors, 1.0) * np.sqrt(count)
+    t, p = ttest_ind_from_stats(
+        x[:, 1], deviations[:, 1], count, x[:, 0], deviations[:, 0], count, equal_var=False
+    )
+    p = np.where(np.abs(difference) <= rounding, 1.0, np.where(spread, p, 0.0))
     corrected = sidak(p, len(pairs))
     return tuple(
         Move(
-            old,
-            new,
-            float(np.sqrt(total[i])),
-            float(t[i]) if spread[i] else None,
-            float(p[i]),
-            float(corrected[i]),
+            quantity=old.name,
+            half=old.half,
+            block=old.block and (old.block[0] + 1, old.block[1] + 1),
+            before=old.value,
+            after=new.value,
+            error=float(np.sqrt(total[i])),
+            standard_errors=float(t[i]) if spread[i] else None,
+            p=float(p[i]),
+            p_corrected=float(corrected[i]),
         )
         for i, (old, new) in enumerate(pairs)
     )
@@ -113,10 +122,10 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
 
     Where neither side has any spread, the largest difference comes first.
     """
-    found = [move for move in moves if move.corrected < level]
+    found = [move for move in moves if move.p_corrected < level]
     return sorted(found, key=_order)
 
 
 def _order(move):
-    part = (move.before.half is not None) + (move.before.block is not None)
-    return part, move.p, -abs(move.after.value - move.before.value)
+    part = (move.half is not None) + (move.block is not None)
+    return part, move.p, -abs(move.after - move.before)

@@ -1,12 +1,15 @@
 """What accuracy costs on one scene: the whole study."""
 
 import gc
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from comparisons import record
+from comparisons.circumstances import Machine, Pixels
 from comparisons.compare import prepare
+from comparisons.cost.cost_record import Converged, Cost, Pictures, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
 from comparisons.cost.front import Point, equal_error, equal_time, pareto
 from comparisons.cost.methods import Methods
@@ -22,12 +25,12 @@ from reference.rendering.renderer import Accumulator, Renderer
 
 @dataclass(frozen=True)
 class Study:
-    """What a study returns: the data of ``cost.json``, and images by name.
+    """What a study returns: its record, ``cost.json``, and images by name.
 
     Attributes
     ----------
-    data
-        Plain data.
+    record
+        What the files, tables and charts tell.
     rungs
         ``{rung name: (H, W, 3)}``, of the most samples.
     parts
@@ -44,7 +47,7 @@ class Study:
         (H, W): the pixels that count.
     """
 
-    data: dict
+    record: Cost
     rungs: dict
     parts: dict
     difference: np.ndarray
@@ -89,61 +92,48 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     judge = Judge(reference, counted, options.viewing)
 
     methods = Methods(source, options, ready, effort.depths)
-    rungs = methods.rungs
-    measured = _measured(methods, effort, judge, options.seed, progress)
+    measured, images = _measured(methods, effort, judge, options.seed, progress)
     lattice = Lattice(options, methods, effort.replicates, effort.replicate_spp, options.seed)
     progress("pricing effects", 0, 1)
     priced = prices(lattice, judge, options.seed, effort.exact_effects, effort.orders)
-    parts, whole = split(lattice, counted, options.viewing)
+    *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
 
-    points = [Point(m.rung, m.spp, m.seconds.median, m.error) for m in measured]
-    front = {(point.method, point.spp) for point in pareto(points)}
-    data = {
-        "scene": source.name,
-        "variant": ready.reference.variant,
-        "heuristic_variant": methods.heuristic_variant,
-        "heuristic": options.heuristic,
-        "interpolation": options.interpolation.value,
-        "seed": options.seed,
-        "resolution": [width, height],
-        "rounds": effort.rounds,
-        "reference": {
-            "integrator": ready.plan.integrator,
-            "max_depth": ready.plan.max_depth,
-            "spp": effort.reference_spp * reference.passes,
-            "passes": reference.passes,
-            "noise_floor": judge.floor,
-            "mean_variance": judge.variance,
-        },
-        "rungs": [
-            {"name": rung.name, "names": list(rung.names), "monte_carlo": rung.monte_carlo}
-            for rung in rungs
-        ],
-        "points": [_without(m, "image") | {"pareto": (m.rung, m.spp) in front} for m in measured],
-        "equal_time": [asdict(row) for row in equal_time(points)],
-        "equal_error": [asdict(row) for row in equal_error(points)],
-        "prices": {
-            **_without(priced, "effects", "map"),
-            "effects": [_without(price, "map") for price in priced.effects],
-        },
-        "split": {
-            "parts": [_without(part, "map") for part in parts],
-            "departure": _without(whole, "map"),
-        },
-        "viewing": options.viewing.record(),
-        "pixels": {"counted": int(counted.sum()), "total": width * height},
-        "machine": record.machine(),
-        "versions": record.versions(),
-        "command": command,
-    }
+    found = Cost(
+        scene=source.name,
+        variant=ready.reference.variant,
+        heuristic_variant=methods.heuristic_variant,
+        heuristic=options.heuristic,
+        interpolation=options.interpolation,
+        seed=options.seed,
+        resolution=(width, height),
+        rounds=effort.rounds,
+        reference=Converged(
+            integrator=ready.plan.integrator,
+            max_depth=ready.plan.max_depth,
+            spp=effort.reference_spp * reference.passes,
+            passes=reference.passes,
+            noise_floor=judge.floor,
+            mean_variance=judge.variance,
+        ),
+        rungs=tuple(Rung(r.name, r.names, r.monte_carlo, r.family) for r in methods.rungs),
+        **_compared(measured),
+        prices=priced.prices,
+        split=Split(tuple(part for part, _ in parts), whole),
+        viewing=options.viewing,
+        pixels=Pixels(counted=int(counted.sum()), total=width * height),
+        machine=Machine(**record.machine()),
+        versions=record.versions(),
+        command=command,
+        pictures=_limits([image for _, image in parts], priced.maps.values()),
+    )
     return Study(
-        data=data,
-        rungs={m.rung: m.image for m in measured},
-        parts={part.name: part.map for part in parts},
-        difference=whole.map,
-        effects={price.effect: price.map for price in priced.effects},
-        error=priced.map,
+        record=found,
+        rungs={name: image for (name, _), image in images.items()},
+        parts={part.name: image for part, image in parts},
+        difference=difference,
+        effects=priced.maps,
+        error=priced.departure,
         reference=reference.mean,
         counted=counted,
     )
@@ -157,7 +147,7 @@ def quick(source, options=None, progress=None, command=""):
 
 
 def _measured(methods, effort, judge, seed, progress):
-    """Time and judge the rungs; their scenes are let go of, since they would slow what follows."""
+    """Time and judge the rungs; their scenes are released, since they slow what follows."""
     renderers = {
         (rung.name, spp): methods.renderer(rung.method, spp)
         for rung in methods.rungs
@@ -181,10 +171,25 @@ def _converged(ready, effort, seed, progress):
     return total.estimate()
 
 
-def _without(item, *names):
-    """Return the fields of a record as plain data, without the arrays that are named."""
-    plain = replace(item, **dict.fromkeys(names)) if names else item
-    return {key: value for key, value in asdict(plain).items() if key not in names}
+def _compared(measured):
+    """Return the points, with the front marked, and what they reach within times and errors."""
+    points = [Point(m.rung, m.spp, m.seconds.median, m.error) for m in measured]
+    front = pareto(points)
+    return {
+        "points": tuple(
+            structs.replace(one, pareto=point in front)
+            for one, point in zip(measured, points, strict=True)
+        ),
+        "equal_time": equal_time(points),
+        "equal_error": equal_error(points),
+    }
+
+
+def _limits(parts, effects):
+    """Return half ranges that hold all pictures; rounding alone does not fill one."""
+    limits = [abs(signed.mean(axis=2)).max() for signed in parts]
+    removed = [abs(values).max() for values in effects]
+    return Pictures(float(max(1e-3, *limits)), float(max(1.0, *removed, 0.0)))
 
 
 def _silent(stage, done, total):

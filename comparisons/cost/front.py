@@ -6,34 +6,33 @@ its slope is −1/2 where the error is noise alone, and flatter towards the meth
 the measured counts nothing is said.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import exp, log
+
+from comparisons.amounts import Amount, Positive
+from comparisons.records import Record
 
 TIMES_S = (0.01, 0.1, 1.0, 10.0)
 ERRORS = (5.0, 2.0, 1.0, 0.5)
 
 
-@dataclass(frozen=True)
-class Point:
-    """A method at one sample count: time in seconds (> 0), and error (≥ 0)."""
+class Point(Record):
+    """A method at one sample count: median time in seconds, and mean ΔE2000."""
 
     method: str
     spp: int
-    seconds: float
-    error: float
+    seconds: Positive
+    error: Amount
 
 
-@dataclass(frozen=True)
-class Within:
+class Within(Record):
     """The best point within a time, None where none is as fast."""
 
-    seconds: float
+    seconds: Positive
     best: Point | None
 
 
-@dataclass(frozen=True)
-class Reached:
+class Reached(Record):
     """When a method reaches an error.
 
     ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
@@ -41,7 +40,7 @@ class Reached:
     """
 
     method: str
-    error: float
+    error: Positive
     seconds: float | None
     at_most: bool = False
 

@@ -5,19 +5,19 @@ rung traces and compiles, and stands apart; a second one warms caches; the round
 a seed of its own, so that their errors are independent as well.
 """
 
-from dataclasses import dataclass
-from math import comb
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
+from comparisons import intervals
+from comparisons.amounts import Amount, Positive
 from comparisons.departure.metrics import METRICS
+from comparisons.records import Record
 from reference.rendering.passes import passes
 
-LEVEL = 0.95
 
-
-@dataclass(frozen=True)
-class Interval:
+class Interval(Record):
     """The median of repeats, their quartiles, and an interval for the median.
 
     ``low`` and ``high`` are order statistics; ``level`` is the chance that they hold the true
@@ -25,40 +25,29 @@ class Interval:
     and ``level`` says what they do reach.
     """
 
-    median: float
-    p25: float
-    p75: float
-    low: float
-    high: float
-    level: float
+    median: Positive
+    p25: Positive
+    p75: Positive
+    low: Positive
+    high: Positive
+    level: Annotated[float, Meta(ge=0, le=1)]
     repeats: int
 
 
 def interval(values):
     """Return the :class:`Interval` of at least two repeats."""
     ordered = np.sort(np.asarray(values, float))
-    count = len(ordered)
-    place = 0
-    while place + 1 < count - 1 - (place + 1) and _coverage(count, place + 1) >= LEVEL:
-        place += 1
+    low, high, level = intervals.median_ranks(len(ordered))
     p25, median, p75 = np.percentile(ordered, (25, 50, 75))
     return Interval(
         median=float(median),
         p25=float(p25),
         p75=float(p75),
-        low=float(ordered[place]),
-        high=float(ordered[count - 1 - place]),
-        level=_coverage(count, place),
-        repeats=count,
+        low=float(ordered[low]),
+        high=float(ordered[high]),
+        level=level,
+        repeats=len(ordered),
     )
-
-
-def _coverage(count, place):
-    """Chance that the median lies between the ordered values ``place`` and ``count - 1 - place``.
-
-    Each value is below the median with chance 1/2: ``1 - 2 sum_{i <= place} C(n, i) / 2^n``.
-    """
-    return 1 - 2 * sum(comb(count, i) for i in range(place + 1)) / 2**count
 
 
 class Judge:
@@ -103,14 +92,13 @@ class Judge:
         return np.mean(self.metric.difference(self.coordinates, here))
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(Record):
     """A rung at one sample count.
 
     Attributes
     ----------
     rung, spp
-        Name of the rung, and samples a pixel as rendered.
+        Name of the rung, and samples per pixel as rendered.
     first_s, compile_s
         Time of the first run, and what LLVM took of it.
     seconds
@@ -119,20 +107,20 @@ class Measured:
         Mean ΔE2000 of one rendering, mean over rounds, and its standard error.
     mse, mse_stderr
         Linear mean squared error, the reference's variance subtracted.
-    image
-        The last round's, (H, W, 3).
+    pareto
+        Whether it is on the front of time and error (:func:`comparisons.cost.front.pareto`).
     """
 
     rung: str
     spp: int
-    first_s: float
-    compile_s: float
+    first_s: Positive
+    compile_s: Amount
     seconds: Interval
-    error: float
-    error_stderr: float
+    error: Amount
+    error_stderr: Amount
     mse: float
-    mse_stderr: float
-    image: np.ndarray
+    mse_stderr: Amount
+    pareto: bool = False
 
 
 def measure(renderers, judge, rounds, seed, progress):
@@ -153,7 +141,9 @@ def measure(renderers, judge, rounds, seed, progress):
 
     Returns
     -------
-    tuple of Measured
+    measured : tuple of Measured
+    images : dict
+        The last round's image (H, W, 3) of each key.
     """
     errors = {key: [] for key in renderers}
     images = {}
@@ -163,12 +153,11 @@ def measure(renderers, judge, rounds, seed, progress):
         if one.number > 1:
             for key, image in images.items():
                 errors[key].append(judge.errors(image))
-    return tuple(
-        _summarise(key, renderer, errors[key], images[key]) for key, renderer in renderers.items()
-    )
+    measured = (_summarise(key, renderer, errors[key]) for key, renderer in renderers.items())
+    return tuple(measured), images
 
 
-def _summarise(key, renderer, errors, image):
+def _summarise(key, renderer, errors):
     means = np.mean(errors, axis=0)
     stderrs = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors))
     return Measured(
@@ -181,5 +170,4 @@ def _summarise(key, renderer, errors, image):
         error_stderr=float(stderrs[0]),
         mse=float(means[1]),
         mse_stderr=float(stderrs[1]),
-        image=image,
     )

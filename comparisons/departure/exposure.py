@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from comparisons.departure.metrics import DEFAULT_VIEWING, Array, Metric, Viewing, checked_pair
+from comparisons.departure.metric import Distances, Metric, checked_pair
+from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 
 #: The best exposure is sought within this many stops on either side of none.
 EXPOSURE_STOPS = 6.0
@@ -23,16 +24,19 @@ def best_exposure(
 ) -> float:
     """The factor on `test`, within ±6 stops, that makes the mean of `metric` over `mask` smallest.
 
-    The mean is taken over at most 16,384 counted pixels, drawn with a fixed seed. Whole stops
-    bracket the minimum, a bounded scalar search (Brent) finds it to 0.001 stop, and the factors
-    1 and least squares compete with it, so an image that is a multiple of the reference gives
-    that multiple exactly. 1 if no pixel counts or if either image has no positive value there.
+    That of a linear metric is the factor of least squares. Of others, the mean is taken over at
+    most 16,384 counted pixels, drawn with a fixed seed. Whole stops bracket the minimum, a bounded
+    scalar search (Brent) finds it to 0.001 stop, and the factors 1 and least squares compete with
+    it, so an image that is a multiple of the reference gives that multiple exactly. 1 if no pixel
+    counts or if either image has no positive value there.
     Raises as `comparisons.departure.metrics.delta_e_2000`.
     """
     from scipy.optimize import minimize_scalar
 
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
+    if metric.linear:
+        return least_squares_factor(test[mask], reference[mask])
     lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
     if not all(lit):
         return 1.0
@@ -40,30 +44,20 @@ def best_exposure(
     places = np.flatnonzero(mask)
     count = min(len(places), _SEARCH_PIXELS)
     drawn = places[np.random.default_rng(0).choice(len(places), count, replace=False)]
-    test, reference = test.reshape(-1, 3)[drawn], reference.reshape(-1, 3)[drawn]
-    coordinates = metric.coordinates(reference, viewing)
+    drawn = np.unravel_index(drawn, mask.shape)
+    some = tuple(index[:_BRACKET_PIXELS] for index in drawn)
+    distances, bracketing = (metric.against(reference, at, viewing) for at in (drawn, some))
 
-    def mean_at(stops: float, count: int | None = None) -> float:
-        exposed = metric.coordinates(2.0**stops * test[:count], viewing)
-        return float(metric.difference(coordinates[:count], exposed).mean())
+    def mean_at(stops: float, distances: Distances = distances) -> float:
+        return metric.mean(distances(test, factor=2.0**stops))
 
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
-    start = whole_stops[np.argmin([mean_at(s, _BRACKET_PIXELS) for s in whole_stops])]
+    start = whole_stops[np.argmin([mean_at(s, bracketing) for s in whole_stops])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
     found = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-    least_squares = np.log2(least_squares_factor(test, reference))
+    least_squares = np.log2(least_squares_factor(test[drawn], reference[drawn]))
     candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), found.x]
     return float(2.0 ** min(candidates, key=mean_at))
-
-
-def best_exposure_rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike) -> float:
-    """The factor on `test` that makes the linear RMSE over `mask` smallest.
-
-    Least squares in closed form. Raises as `comparisons.departure.metrics.delta_e_2000`.
-    """
-    test, reference = checked_pair(test, reference)
-    mask = np.asarray(mask, bool)
-    return least_squares_factor(test[mask], reference[mask])
 
 
 def least_squares_factor(test: Array, reference: Array) -> float:

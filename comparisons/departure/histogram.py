@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
+
+from comparisons.amounts import Count, Positive
+from comparisons.records import Record
 
 #: The bins' range in decades, log10 of the metric's unit, and the bins in each decade.
 DECADES, BINS_A_DECADE = (-2, 3), 12
 
 
-@dataclass(frozen=True)
-class Histogram:
+class Histogram(Record):
     """Counts of pixels in bins of equal ratio.
 
-    low, high
-        Range of the bins; bin i of n holds ``low·(high/low)^(i/n) <= value < low·…^((i+1)/n)``.
-    counts
-        Pixels in each bin, from low to high.
-    below, above
-        Pixels under `low`, zeros included, and those at `high` or more.
+    Bin i of n holds ``low·(high/low)^(i/n) <= value < low·…^((i+1)/n)``.
     """
 
-    low: float
-    high: float
-    counts: tuple[int, ...]
-    below: int
-    above: int
-
-    def data(self) -> dict:
-        """The histogram as in ``comparison.json``."""
-        return asdict(self) | {"counts": list(self.counts)}
+    low: Positive
+    high: Positive
+    counts: tuple[Count, ...]
+    below: Annotated[Count, Meta(description="Pixels under `low`, zeros included.")]
+    above: Annotated[Count, Meta(description="Pixels at `high` or more.")]
 
 
 def histogram(values: ArrayLike) -> Histogram:

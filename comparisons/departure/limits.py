@@ -24,12 +24,14 @@ from all sides alike it is the share ``(1 - N.N_g) / 2`` of the irradiance, whic
 counts from :data:`WEDGE_LOST` on.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from comparisons.amounts import Count
+from comparisons.records import Record
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic
 
@@ -41,6 +43,16 @@ LIGHT_GRID = 5
 FIREFLY_SHARE = 0.5
 FIREFLY_CONTRAST = 8.0
 NEIGHBOURHOOD = 5
+
+
+class LimitCounts(Record):
+    """Counted pixels where the reference itself is at fault, by limit; they may overlap."""
+
+    clamped: Count
+    terminator: Count
+    energy_loss: Count
+    fireflies: Count
+    any: Count
 
 
 @dataclass(frozen=True)
@@ -57,10 +69,11 @@ class Limits:
         """The pixels with one limit or more."""
         return self.clamped | self.terminator | self.energy_loss | self.fireflies
 
-    def data(self):
-        """Return the number of pixels by limit, and ``any``, as plain data."""
-        counts = {field.name: int(getattr(self, field.name).sum()) for field in fields(self)}
-        return counts | {"any": int(self.any.sum())}
+    def counts(self):
+        """Return the number of pixels by limit, and ``any``."""
+        return LimitCounts(
+            **{name: int(getattr(self, name).sum()) for name in LimitCounts.__struct_fields__}
+        )
 
 
 @dataclass(frozen=True)

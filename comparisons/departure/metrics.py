@@ -1,29 +1,31 @@
-"""Pixelwise distances between two images, each with its definition, unit and range.
-
-Every image is a float array (H, W, 3) of linear light with the sRGB primaries (ITU-R BT.709,
-D65); 1.0 is display white. Three perceptual metrics come from colour-science:
+"""The built-in metrics, each with its definition, unit and range.
 
 =============  ================================  ==========================================
 dE2000         CIE DE2000                        display-referred: exposed, clipped to [0, 1]
 dE_ITP         ITU-R BT.2124                     HDR: absolute luminance up to 10,000 cd/m²
 dE_CAM16UCS    CAM16-UCS (Li et al. 2017)        display-referred, with viewing conditions
+rmse           root mean square                  linear light, neither exposed nor clipped
 =============  ================================  ==========================================
 
-Each is split into ``coordinates`` (an image's position in a nearly uniform colour space) and
-``difference`` (a distance of two positions), so that the reference is converted once and
-compared with many test images. Beside them stand the linear RMSE and the signed ratio of
-luminances in stops. Statistics over an image are in `comparisons.departure.statistics`.
+The first three come from colour-science. Beside them stands the signed ratio of luminances in
+stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from comparisons.departure.metric import (
+    METRICS,
+    Pixelwise,
+    checked_pair,
+    declare,
+    declare_from_outside,
+    drawn,
+)
 from comparisons.departure.spaces import (
     DEFAULT_VIEWING,
     Array,
@@ -35,81 +37,111 @@ from comparisons.departure.spaces import (
     lab,
     luminance,
 )
-from heuristic.errors import InputError, NonFiniteError
+
+__all__ = ["METRICS", "declare", "drawn"]
 
 #: Added to both luminances of `log2_luminance_ratio`; 1.0 is display white.
 LOG2_EPSILON = 1e-4
 
-#: Half range of the signed map of `log2_luminance_ratio`, in stops.
-LOG2_RANGE = 3.0
+
+def _linear(rgb: ArrayLike, viewing: Viewing) -> Array:
+    return np.asarray(rgb, np.float64)
+
+
+def _root_mean_square(a: Array, b: Array) -> Array:
+    return np.sqrt(np.mean((b - a) ** 2, axis=-1))
+
+
+#: The metric by which scenes are judged: regions, targets of noise and prices are in it.
+LEADING = declare(
+    Pixelwise(
+        name="dE2000",
+        label="ΔE2000",
+        unit="1 is about one just noticeable difference, black to white is 100",
+        definition="CIE DE2000 between CIE L*a*b* colours (D65, 2° observer) of the images as a "
+        "display shows them: exposed, then clipped to [0, 1].",
+        caution="It was fitted to small differences, up to about 5, of uniform patches: large "
+        "values are ordered, but twice the value is not twice as far. Above white it sees nothing.",
+        map_range=(0.0, 20.0),
+        visible=(1.0, 2.0, 5.0),
+        coordinates=lab,
+        difference=ciede2000,
+    )
+)
+declare(
+    Pixelwise(
+        name="dE_ITP",
+        label="ΔE ITP",
+        unit="1 is one just noticeable difference in the most critical adaptation",
+        definition="ITU-R BT.2124: 720 √(ΔI² + ΔT² + ΔP²) of ICtCp with the PQ curve, at absolute "
+        "luminance, clipped to 0–10,000 cd/m².",
+        caution="It takes the eye as adapted to each pixel, and so overrates differences in deep "
+        "shadow beside bright light. It depends on the luminance that white stands for.",
+        map_range=(0.0, 60.0),
+        visible=(1.0, 2.0, 5.0),
+        coordinates=itp,
+        difference=euclidean,
+    )
+)
+declare(
+    Pixelwise(
+        name="dE_CAM16UCS",
+        label="CAM16-UCS",
+        unit="black to white is 100",
+        definition="Euclidean distance in J'a'b' of CAM16-UCS (Li et al. 2017), of the images as a "
+        "display shows them: exposed, then clipped to [0, 1].",
+        caution="It holds for one state of adaptation, that of the viewing conditions, all over "
+        "the image. Above white it sees nothing.",
+        map_range=(0.0, 20.0),
+        visible=(1.0, 2.0, 5.0),
+        coordinates=cam16ucs,
+        difference=euclidean,
+    )
+)
+RMSE = declare(
+    Pixelwise(
+        name="rmse",
+        label="RMSE",
+        unit="1 is display white",
+        definition="Root mean square of the linear RGB difference over pixels and channels.",
+        caution="It knows nothing of eyes: a few very bright pixels outweigh all others.",
+        map_range=(0.0, 1.0),
+        rounding=1e-6,
+        heading="RMSE, linear",
+        drawn=False,
+        linear=True,
+        coordinates=_linear,
+        difference=_root_mean_square,
+    )
+)
+
+#: Names of the metrics above.
+BUILT_IN = tuple(METRICS)
+declare_from_outside()
 
 
 @dataclass(frozen=True)
-class Metric:
-    """A perceptual distance.
-
-    name
-        As in `comparison.json` and as an EXR layer.
-    label, unit, definition
-        As printed in reports.
-    map_range
-        Fixed (low, high) of the colour bar, so that maps of different scenes compare.
-    coordinates
-        ``(rgb, viewing) -> (..., 3)``: linear RGB to a colour space.
-    difference
-        ``(coordinates, coordinates) -> (...)``: distance, ≥ 0. The first is the reference's
-        where it matters; none of the metrics here is asymmetric.
-    """
+class Ratio:
+    """A signed map that is no distance; ``limit`` is the half range of its colour bar."""
 
     name: str
     label: str
     unit: str
     definition: str
-    map_range: tuple[float, float]
-    coordinates: Callable[[ArrayLike, Viewing], Array]
-    difference: Callable[[Array, Array], Array]
-
-    def __call__(
-        self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-    ) -> Array:
-        """The map (H, W) of distances between two linear images (H, W, 3)."""
-        test, reference = checked_pair(test, reference)
-        return self.difference(
-            self.coordinates(reference, viewing), self.coordinates(test, viewing)
-        )
+    limit: float
+    rounding: float
 
 
-def require_finite(image: ArrayLike, layer: str) -> None:
-    """Raise `NonFiniteError` if `image` (H, W) or (H, W, C) holds a NaN or an infinity.
-
-    The message names the layer, how many pixels are concerned and the first one as (x, y),
-    counted from the top left in reading order.
-    """
-    finite = np.isfinite(image)
-    if finite.all():
-        return
-    wrong = ~finite if finite.ndim == 2 else ~finite.all(axis=-1)
-    y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
-    raise NonFiniteError(
-        f"{layer}: {np.count_nonzero(wrong)} of {wrong.size} pixels are NaN or infinite, "
-        f"the first at (x, y) = ({x}, {y}): {np.asarray(image)[y, x]}"
-    )
-
-
-def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
-    """Both images as float64, checked: same shape (..., 3) and finite.
-
-    Raises `InputError` for the shapes, `NonFiniteError` for a NaN or an infinity.
-    """
-    test, reference = np.asarray(test, np.float64), np.asarray(reference, np.float64)
-    if test.shape != reference.shape or test.shape[-1:] != (3,):
-        raise InputError(
-            f"images of shapes {test.shape} and {reference.shape} cannot be compared: "
-            "both must be (height, width, 3)"
-        )
-    require_finite(test, "test image")
-    require_finite(reference, "reference image")
-    return test, reference
+#: That of `log2_luminance_ratio`.
+RATIO = Ratio(
+    name="log2_luminance",
+    label="Luminance ratio",
+    unit="stops",
+    definition=f"log2 of heuristic over reference, red where the heuristic is brighter; "
+    f"ε = {LOG2_EPSILON:g}",
+    limit=3.0,
+    rounding=1e-4,
+)
 
 
 def delta_e_2000(
@@ -180,9 +212,8 @@ def rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike | None = None) -
     0.289
     """
     test, reference = checked_pair(test, reference)
-    square = (test - reference) ** 2
-    selected = square if mask is None else square[np.asarray(mask, bool)]
-    return float(np.sqrt(selected.mean())) if selected.size else 0.0
+    where = ... if mask is None else np.asarray(mask, bool)
+    return RMSE.mean(RMSE.against(reference, where, DEFAULT_VIEWING)(test))
 
 
 def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
@@ -199,43 +230,3 @@ def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
     test, reference = checked_pair(test, reference)
     lift = [np.maximum(luminance(image), 0.0) + LOG2_EPSILON for image in (test, reference)]
     return np.log2(lift[0] / lift[1])
-
-
-#: The perceptual metrics by name, in the order of reports.
-METRICS: Mapping[str, Metric] = MappingProxyType(
-    {
-        metric.name: metric
-        for metric in (
-            Metric(
-                "dE2000",
-                "ΔE2000",
-                "1 is about one just noticeable difference, black to white is 100",
-                "CIE DE2000 between CIE L*a*b* colours (D65, 2° observer) of the images as a "
-                "display shows them: exposed, then clipped to [0, 1].",
-                (0.0, 20.0),
-                lab,
-                ciede2000,
-            ),
-            Metric(
-                "dE_ITP",
-                "ΔE ITP",
-                "1 is one just noticeable difference in the most critical adaptation",
-                "ITU-R BT.2124: 720 √(ΔI² + ΔT² + ΔP²) of ICtCp with the PQ curve, at absolute "
-                "luminance, clipped to 0–10,000 cd/m².",
-                (0.0, 60.0),
-                itp,
-                euclidean,
-            ),
-            Metric(
-                "dE_CAM16UCS",
-                "CAM16-UCS",
-                "black to white is 100",
-                "Euclidean distance in J'a'b' of CAM16-UCS (Li et al. 2017), of the images as a "
-                "display shows them: exposed, then clipped to [0, 1].",
-                (0.0, 20.0),
-                cam16ucs,
-                euclidean,
-            ),
-        )
-    }
-)

@@ -9,10 +9,14 @@ up to at most 1, and evenly spread error has none.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
+
+from comparisons.amounts import Amount, Count, Share, Size
+from comparisons.records import Record
 
 #: Cells along the longer side of the image.
 CELLS = 48
@@ -24,29 +28,18 @@ CONTRAST = 1.25
 MOST, LEAST_SHARE = 4, 0.04
 
 
-@dataclass(frozen=True)
-class Region:
-    """A box of pixels: x, y count from the top left, and include the first pixel.
+class Region(Record):
+    """A box of pixels: x, y count from the top left, and include the first pixel."""
 
-    share
-        Of the sum of the error over all counted pixels, 0 to 1.
-    mean_dE2000
-        Mean over the box's counted pixels.
-    effect
-        The effect that dominates there, in words, where that is known.
-    """
-
-    x: int
-    y: int
-    width: int
-    height: int
-    share: float
-    mean_dE2000: float
-    effect: str | None = None
-
-    def data(self) -> dict[str, int | float | str]:
-        """The region as in ``comparison.json``; an unknown effect is left out."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+    x: Count
+    y: Count
+    width: Size
+    height: Size
+    share: Annotated[Share, Meta(description="Of the sum of dE2000 over the counted pixels.")]
+    mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
+    effect: Annotated[
+        str | None, Meta(description="What dominates there, in words, where that is known.")
+    ] = None
 
 
 def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:

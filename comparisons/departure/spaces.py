@@ -8,12 +8,15 @@ about a second.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.amounts import Positive
+from comparisons.records import Record, plain
 from heuristic.errors import InputError
 
 Array = NDArray[np.float64]
@@ -25,27 +28,25 @@ PQ_PEAK = 10_000.0
 _BLOCK = 32_768
 
 
-@dataclass(frozen=True)
-class Viewing:
+class Viewing(Record):
     """How linear values are looked at; printed with every number that depends on it.
-
-    exposure
-        Linear factor on both images before any perceptual metric, > 0.
-    white_luminance
-        Luminance of linear 1.0 in cd/m², > 0. 203 is the HDR reference white of ITU-R BT.2408.
-        Used by ΔE_ITP; display-referred metrics are relative to white.
-    ambient_illuminance, background
-        CAM16's viewing conditions as in IEC 61966-2-1 (sRGB): 64 lx, from which the adapting
-        luminance is 0.2 · E/π = 4.07 cd/m², and a background of Y_b = 20 (white is 100). The
-        surround is "average".
 
     Raises `InputError` for a value that is not positive and finite.
     """
 
-    exposure: float = 1.0
-    white_luminance: float = 203.0
-    ambient_illuminance: float = 64.0
-    background: float = 20.0
+    exposure: Annotated[
+        Positive, Meta(description="Linear factor on both images before any perceptual metric.")
+    ] = 1.0
+    white: Literal["D65"] = "D65"
+    white_luminance: Annotated[
+        Positive,
+        Meta(description="Luminance of linear 1.0, cd/m²; 203 is BT.2408's HDR reference white."),
+    ] = 203.0
+    # CAM16's conditions as in IEC 61966-2-1 (sRGB): 64 lx, from which the adapting luminance is
+    # 0.2 · E/π = 4.07 cd/m².
+    ambient_illuminance: Annotated[Positive, Meta(description="CAM16: illuminance, lx.")] = 64.0
+    background: Annotated[Positive, Meta(description="CAM16: Y_b; white is 100.")] = 20.0
+    surround: Literal["average"] = "average"
 
     def __post_init__(self) -> None:
         for name in ("exposure", "white_luminance", "ambient_illuminance", "background"):
@@ -54,15 +55,8 @@ class Viewing:
                 raise InputError(f"viewing: {name} is {value}, but must be positive and finite")
 
     def record(self) -> dict[str, float | str]:
-        """The values as written to `comparison.json`; the white point is fixed at D65."""
-        return {
-            "exposure": self.exposure,
-            "white": "D65",
-            "white_luminance": self.white_luminance,
-            "ambient_illuminance": self.ambient_illuminance,
-            "background": self.background,
-            "surround": "average",
-        }
+        """The values as written to ``comparison.json``."""
+        return plain(self)
 
 
 #: No exposure, 203 cd/m² white, sRGB's viewing conditions.

@@ -12,72 +12,51 @@ noise is told by `comparisons.departure.marks`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from comparisons.departure.exposure import best_exposure, least_squares_factor
-from comparisons.departure.metrics import (
-    DEFAULT_VIEWING,
-    Array,
-    Metric,
-    Viewing,
-    checked_pair,
-    log2_luminance_ratio,
-    rmse,
-)
+from comparisons.amounts import Amount, Positive, Share
+from comparisons.departure.exposure import best_exposure
+from comparisons.departure.metric import Metric, Pixelwise, checked_pair
+from comparisons.departure.metrics import log2_luminance_ratio
+from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
+from comparisons.records import Record
 
 #: Pixels measured at a time: temporaries stay small whatever the image's size.
 _BLOCK_PIXELS = 2**20
 
 
-@dataclass(frozen=True)
-class ExposedSummary:
-    """A metric over an image after the factor `exposure` on the test image."""
+class Exposed(Record):
+    """A metric after the factor `exposure` on the test image that makes its mean smallest."""
 
-    exposure: float
-    mean: float
-    p50: float
-    p95: float
-    max: float
-
-
-@dataclass(frozen=True)
-class MetricSummary:
-    """A metric over the counted pixels, in the metric's own unit.
-
-    `noise_floor` is the mean that the reference's own noise alone would give.
-    """
-
-    mean: float
-    p50: float
-    p95: float
-    max: float
-    noise_floor: float
-    after_exposure: ExposedSummary
+    exposure: Annotated[Positive, Meta(description="Linear factor; 1 is none.")]
+    mean: Amount
+    p50: Amount
+    p95: Amount
+    max: Amount
 
 
-@dataclass(frozen=True)
-class ExposedRmse:
-    """The linear RMSE after the factor `exposure` on the test image."""
+class Summary(Record):
+    """A metric over the counted pixels, in the metric's own unit."""
 
-    exposure: float
-    value: float
+    mean: Annotated[Amount, Meta(description="Mean; of rmse, the root of the mean square.")]
+    p50: Annotated[Amount, Meta(description="Median of the pixels.")]
+    p95: Amount
+    max: Amount
+    visible: Annotated[
+        dict[str, Share], Meta(description="Share of the pixels above each threshold.")
+    ]
+    noise_floor: Annotated[
+        Amount, Meta(description="Mean that the reference's own noise alone would give.")
+    ]
+    after_exposure: Exposed
 
 
-@dataclass(frozen=True)
-class RmseSummary:
-    """The linear RMSE over the counted pixels; 1 is display white."""
-
-    value: float
-    noise_floor: float
-    after_exposure: ExposedRmse
-
-
-@dataclass(frozen=True)
-class RatioSummary:
-    """The signed luminance ratio over the counted pixels, in stops."""
+class RatioSummary(Record):
+    """The signed luminance ratio, heuristic over reference, over the counted pixels, in stops."""
 
     mean: float
     p05: float
@@ -92,7 +71,7 @@ def summarise(
     mask: ArrayLike,
     viewing: Viewing = DEFAULT_VIEWING,
     noise: ArrayLike | None = None,
-) -> tuple[MetricSummary, Array]:
+) -> tuple[Summary, Array]:
     """The numbers of `metric` over `mask`, and its map over the whole image.
 
     test, reference
@@ -110,46 +89,27 @@ def summarise(
     factor = best_exposure(metric, test, reference, mask, viewing)
     has_noise = noise is not None and np.any(noise)
     distance, exposed, noisy = np.zeros(test.shape[:-1]), [], []
-    for rows in _blocks(test):
-        here, truth = mask[rows], reference[rows]
+    for rows in _blocks(metric, test):
+        shown, truth, here = test[rows], reference[rows], mask[rows]
         # Equal colours are 0 apart: what lies around the objects of a figure costs nothing.
-        wanted = here | (test[rows] != truth).any(axis=-1)
-        fixed = metric.coordinates(truth[wanted], viewing)
-        shown = metric.coordinates(test[rows][wanted], viewing)
-        distance[rows][wanted] = metric.difference(fixed, shown)
-        fixed = fixed[here[wanted]]
+        wanted = here | (shown != truth).any(axis=-1)
+        distances = metric.against(truth, wanted, viewing)
+        distance[rows][wanted] = distances(shown)
         if factor != 1.0:
-            shown = metric.coordinates(factor * test[rows][here], viewing)
-            exposed.append(metric.difference(fixed, shown))
+            exposed.append(distances(shown, here, factor))
         if has_noise:
-            shown = metric.coordinates((truth + noise[rows])[here], viewing)
-            noisy.append(metric.difference(fixed, shown))
-    numbers = after = _numbers(distance[mask])
+            noisy.append(distances(truth + noise[rows], here))
+    values = distance[mask]
+    numbers = after = _numbers(metric, values)
     if factor != 1.0:
-        after = _numbers(np.concatenate(exposed))
+        after = _numbers(metric, np.concatenate(exposed))
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
-    floor = _numbers(np.concatenate(noisy))["mean"] if has_noise else 0.0
-    at_best = ExposedSummary(exposure=factor, **after)
-    return MetricSummary(**numbers, noise_floor=floor, after_exposure=at_best), distance
-
-
-def summarise_rmse(
-    test: ArrayLike, reference: ArrayLike, mask: ArrayLike, noise: ArrayLike | None = None
-) -> RmseSummary:
-    """The linear RMSE over `mask`, its noise floor √(mean noise²), and after best exposure."""
-    test, reference = checked_pair(test, reference)
-    mask = np.asarray(mask, bool)
-    test, reference = test[mask], reference[mask]
-    value = rmse(test, reference)
-    factor = least_squares_factor(test, reference)
-    after = rmse(factor * test, reference)
-    if after > value:
-        factor, after = 1.0, value
-    floor = 0.0
-    if noise is not None:
-        floor = rmse(np.asarray(noise)[mask], np.zeros_like(reference))
-    return RmseSummary(value, floor, ExposedRmse(factor, after))
+    visible = {f"{limit:g}": _share(values > limit) for limit in metric.visible}
+    floor = metric.mean(np.concatenate(noisy)) if has_noise else 0.0
+    at_best = Exposed(exposure=factor, **after)
+    summary = Summary(**numbers, visible=visible, noise_floor=floor, after_exposure=at_best)
+    return summary, distance
 
 
 def summarise_log2_luminance(
@@ -159,9 +119,9 @@ def summarise_log2_luminance(
     ratio = log2_luminance_ratio(test, reference)
     values = ratio[np.asarray(mask, bool)]
     if not values.size:
-        return RatioSummary(0.0, 0.0, 0.0, 0.0), ratio
-    p05, p50, p95 = np.percentile(values, (5, 50, 95))
-    return RatioSummary(float(values.mean()), float(p05), float(p50), float(p95)), ratio
+        return RatioSummary(mean=0.0, p05=0.0, p50=0.0, p95=0.0), ratio
+    p05, p50, p95 = map(float, np.percentile(values, (5, 50, 95)))
+    return RatioSummary(mean=float(values.mean()), p05=p05, p50=p50, p95=p95), ratio
 
 
 def noise_floor(
@@ -181,27 +141,27 @@ def noise_floor(
     mask = np.asarray(mask, bool)
     if not mask.any() or not noise.any():
         return 0.0
-    values = []
-    for rows in _blocks(reference):
-        here = reference[rows][mask[rows]]
-        noisy = metric.coordinates(here + noise[rows][mask[rows]], viewing)
-        values.append(metric.difference(metric.coordinates(here, viewing), noisy))
-    return float(np.concatenate(values).mean())
+    values = [
+        metric.against(reference[rows], mask[rows], viewing)(reference[rows] + noise[rows])
+        for rows in _blocks(metric, reference)
+    ]
+    return metric.mean(np.concatenate(values))
 
 
-def _numbers(values: Array) -> dict[str, float]:
+def _numbers(metric: Metric, values: Array) -> dict[str, float]:
     if not values.size:
-        return {"mean": 0.0, "p50": 0.0, "p95": 0.0, "max": 0.0}
-    p50, p95 = np.percentile(values, (50, 95))
-    return {
-        "mean": float(values.mean()),
-        "p50": float(p50),
-        "p95": float(p95),
-        "max": float(values.max()),
-    }
+        return dict.fromkeys(("mean", "p50", "p95", "max"), 0.0)
+    p50, p95 = map(float, np.percentile(values, (50, 95)))
+    return {"mean": metric.mean(values), "p50": p50, "p95": p95, "max": float(values.max())}
 
 
-def _blocks(image: Array) -> Iterator[slice]:
-    """Slices of rows that hold about `_BLOCK_PIXELS` pixels."""
-    step = max(1, _BLOCK_PIXELS * len(image) // max(image.size // 3, 1))
-    return (slice(start, start + step) for start in range(0, len(image), step))
+def _share(marked: Array) -> float:
+    return float(marked.mean()) if marked.size else 0.0
+
+
+def _blocks(metric: Metric, image: Array) -> Iterator[slice]:
+    """Slices of rows that hold about `_BLOCK_PIXELS` pixels; all of them for a metric of wholes."""
+    step = len(image)
+    if isinstance(metric, Pixelwise):
+        step = max(1, _BLOCK_PIXELS * len(image) // max(image.size // 3, 1))
+    return (slice(start, start + step) for start in range(0, len(image), max(step, 1)))

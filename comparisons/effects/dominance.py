@@ -35,8 +35,8 @@ def in_region(region, resolution, effects):
 
     Parameters
     ----------
-    region
-        As in ``comparison.json``: ``x``, ``y``, ``width`` and ``height`` in pixels.
+    region : comparisons.departure.regions.Region
+        The region.
     resolution
         ``(width, height)`` of the image that the region is of; the maps may be smaller.
     effects
@@ -54,8 +54,8 @@ def in_region(region, resolution, effects):
 def _mean(values, region, resolution):
     """Mean of a map over a region, by the cells that it touches."""
     height, width = values.shape
-    columns = _cells(region["x"], region["width"], width / resolution[0])
-    rows = _cells(region["y"], region["height"], height / resolution[1])
+    columns = _cells(region.x, region.width, width / resolution[0])
+    rows = _cells(region.y, region.height, height / resolution[1])
     return float(values[rows, columns].mean())
 
 

@@ -11,22 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from comparisons import intervals
+from comparisons.amounts import Amount, Positive
 from comparisons.effects import shapley
-
-LEVEL = 0.95
-
-
-@dataclass(frozen=True)
-class Amount:
-    """A number with a 95 % interval of Student's t over the replicates."""
-
-    value: float
-    low: float
-    high: float
+from comparisons.intervals import Estimated
+from comparisons.records import Record
 
 
-@dataclass(frozen=True)
-class Price:
+class Price(Record):
     """What one effect buys and costs.
 
     Attributes
@@ -38,24 +30,20 @@ class Price:
     alone, last
         The same where it is the first effect to be added, and the last.
     adds_s
-        Seconds that it adds to one rendering with :attr:`Prices.spp` samples a pixel.
+        Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
     sampling_error
         Standard error of ``removes`` from drawing orders, 0 where all subsets were rendered.
-    map
-        (H, W): the ΔE2000 that it removes in each pixel.
     """
 
     effect: str
-    removes: Amount
+    removes: Estimated
     alone: float
     last: float
-    adds_s: Amount
-    sampling_error: float
-    map: np.ndarray
+    adds_s: Estimated
+    sampling_error: Amount
 
 
-@dataclass(frozen=True)
-class Prices:
+class Prices(Record):
     """The prices of all effects.
 
     Attributes
@@ -70,24 +58,40 @@ class Prices:
     kernel_s, reference_s
         Seconds that none of the effects and all of them take.
     spp, replicates, orders
-        Samples a pixel of each replicate, their number, and orders drawn (0: every subset).
-    map
-        (H, W): the ΔE2000 of the heuristic half in each pixel, which the effects' maps add up to.
+        Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
     """
 
     effects: tuple[Price, ...]
-    departure: float
-    floor: float
-    kernel_s: float
-    reference_s: float
+    departure: Amount
+    floor: Amount
+    kernel_s: Positive
+    reference_s: Positive
     spp: int
     replicates: int
     orders: int
-    map: np.ndarray
+
+
+@dataclass(frozen=True)
+class Priced:
+    """Prices, and where in the image they are paid.
+
+    Attributes
+    ----------
+    prices
+        The means.
+    maps
+        ``{effect: (H, W)}``: the ΔE2000 that each removes.
+    departure
+        (H, W): the ΔE2000 of the heuristic half, which the maps add up to.
+    """
+
+    prices: Prices
+    maps: dict
+    departure: np.ndarray
 
 
 def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
-    """Return the :class:`Prices` of the effects of a lattice.
+    """Return the effects of a lattice as :class:`Priced`.
 
     Parameters
     ----------
@@ -124,9 +128,10 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
     nothing = frozenset()
     shares = shapley.shares(effects, error, seed, exact_effects, orders)
     times = shapley.shares(effects, time, seed, exact_effects, orders)
-    found = []
+    found, maps = [], {}
     for place, effect in enumerate(effects):
         removed = -shares.values[place]
+        maps[effect.label] = _filled(removed[0], judge.counted)
         others = everything - {effect}
         found.append(
             Price(
@@ -134,14 +139,13 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
                 removes=_jackknife(removed.mean(axis=1)),
                 alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
                 last=float((error(others) - error(everything))[0].mean()),
-                adds_s=_student(times.values[place]),
+                adds_s=intervals.of_mean(times.values[place]),
                 sampling_error=shares.sampling_error[place],
-                map=_filled(removed[0], judge.counted),
             )
         )
     own = lattice.of("reference")
     departure = judge.map(lattice.simulating(nothing).images.mean(axis=0))
-    return Prices(
+    priced = Prices(
         effects=tuple(found),
         departure=float(departure[judge.counted].mean()),
         floor=judge.errors(own.images.mean(axis=0))[0],
@@ -150,8 +154,8 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
         spp=lattice.spp,
         replicates=lattice.replicates,
         orders=shares.orders,
-        map=departure if effects else np.zeros_like(departure),
     )
+    return Priced(priced, maps, departure if effects else np.zeros_like(departure))
 
 
 def _leaving_one_out(images):
@@ -160,28 +164,9 @@ def _leaving_one_out(images):
 
 
 def _jackknife(values):
-    """Return the first value, with an interval from the others, each leaving out one replicate.
-
-    Errors are no linear function of an image, so that those of single replicates, noisier than
-    their mean, would not average to its error.
-    """
-    value, others = float(values[0]), values[1:]
-    spread = np.sqrt((len(others) - 1) * np.mean((others - others.mean()) ** 2))
-    return _amount(value, float(spread), len(others))
-
-
-def _student(values):
-    """Return the mean of independent values, with its interval."""
-    return _amount(
-        float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values))), len(values)
-    )
-
-
-def _amount(value, error, count):
-    from scipy.special import stdtrit
-
-    half = float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error
-    return Amount(value, value - half, value + half)
+    """Return the first value, with an interval from the others, each leaving out one replicate."""
+    value, *others = values
+    return intervals.student(float(value), float(intervals.jackknife_error(others)), len(others))
 
 
 def _filled(values, counted):

@@ -17,20 +17,19 @@ minus kernel in every pixel. A part that the scene does not have is left out; im
 form and transport are always there.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from comparisons.amounts import Amount
 from comparisons.departure.metrics import delta_e_2000
 from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
+from comparisons.records import Record
 from reference.effects.effect import PARTS
 from reference.effects.polygons import POLYGONS
 
 ALWAYS = ("implementation", "BSDF form", "transport")
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(Record):
     """One cause of the departure.
 
     Attributes
@@ -43,20 +42,20 @@ class Part:
         Root mean square.
     dE2000
         Mean ΔE2000 between the two images; those of the parts do not add up.
-    map
-        (H, W, 3), linear and signed.
     """
 
     name: str
     mean: float
-    mean_stderr: float
-    rms: float
-    dE2000: float
-    map: np.ndarray
+    mean_stderr: Amount
+    rms: Amount
+    dE2000: Amount
 
 
 def split(lattice, counted, viewing):
-    """Return the :class:`Part` tuple of a lattice's departure, and the whole as one more part."""
+    """Return ``(Part, image)`` of each cause of a lattice's departure, and last of the whole.
+
+    Images are (H, W, 3), linear and signed.
+    """
     chain = _chain(lattice)
     lattice.render(key for _, key in chain)
     images = [lattice.of(key).images.astype(float) for _, key in chain]
@@ -64,7 +63,7 @@ def split(lattice, counted, viewing):
         _part(name, before, after, counted, viewing)
         for (name, _), before, after in zip(chain[1:], images, images[1:], strict=False)
     ]
-    return tuple(parts), _part("departure", images[0], images[-1], counted, viewing)
+    return (*parts, _part("departure", images[0], images[-1], counted, viewing))
 
 
 def _chain(lattice):
@@ -89,11 +88,11 @@ def _part(name, before, after, counted, viewing):
     each = signed[:, counted].mean(axis=(1, 2))
     mean = signed.mean(axis=0)
     distance = delta_e_2000(after.mean(axis=0), before.mean(axis=0), viewing)
-    return Part(
+    part = Part(
         name=name,
         mean=float(each.mean()),
         mean_stderr=float(each.std(ddof=1) / np.sqrt(len(each))),
         rms=float(np.sqrt(np.mean(mean[counted] ** 2))),
         dE2000=float(distance[counted].mean()),
-        map=mean,
     )
+    return part, mean

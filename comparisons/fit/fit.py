@@ -9,17 +9,19 @@ from time import perf_counter
 
 import numpy as np
 
-from comparisons import record as comparison_record
+from comparisons.circumstances import Pixels
 from comparisons.compare import prepare
 from comparisons.fit import summary
+from comparisons.fit.fit_record import FitRecord, FitTimes, FormFit, LossName
 from comparisons.fit.identify import identify
 from comparisons.fit.loss import LOSSES
 from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
 from comparisons.fit.parameters import parameters
 from comparisons.fit.rendering import filter_by_box, render
-from comparisons.fit.summary import Fit, FitImages
+from comparisons.fit.summary import Attempt, Fit, FitImages
 from comparisons.options import Options
+from comparisons.record import versions
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
@@ -100,14 +102,28 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
         raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
     attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
-    data, maps = _measured(ready, rendered, attempts, best, chosen, options)
-    data |= {
-        "scene": source.name,
-        "time": {"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
-        "command": command,
-    }
+    fits, maps = _judged(ready, rendered, attempts, options.viewing, chosen.intensities)
+    record = FitRecord(
+        scene=source.name,
+        variant=ready.reference.variant,
+        seed=options.seed,
+        resolution=options.resolution,
+        spp=ready.reference.spp * ready.passes,
+        passes=ready.passes,
+        viewing=options.viewing,
+        pairing=options.convention.value,
+        loss=LossName(chosen.loss, LOSSES[chosen.loss].unit),
+        intensities=chosen.intensities,
+        pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
+        fits=fits,
+        best=len(fits) // len(attempts) * best,
+        warnings=tuple(ready.pair.warnings),
+        versions=versions(),
+        time=FitTimes(rendering, perf_counter() - begin - rendering),
+        command=command,
+    )
     after = attempts[best].image(rendered)
-    return Fit(data, FitImages(rendered.before, rendered.reference.mean, after, maps))
+    return Fit(record, FitImages(rendered.before, rendered.reference.mean, after, maps[best]))
 
 
 def _completed(options):
@@ -125,21 +141,6 @@ def _completed(options):
     return replace(options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP)
 
 
-@dataclass(frozen=True)
-class _Attempt:
-    """The best fit of one form."""
-
-    model: Model
-    solution: object
-    verdicts: list
-    covariance: np.ndarray
-
-    def image(self, rendered):
-        """Return the whole image, (H, W, 3)."""
-        model = Model(rendered.surface, self.model.form, self.model.parameters)
-        return model.image(self.solution.x).reshape(rendered.before.shape)
-
-
 def _attempt(rendered, form, chosen, viewing):
     loss, counted = LOSSES[chosen.loss], rendered.counted
     surface = rendered.surface.within(counted.ravel())
@@ -154,13 +155,13 @@ def _attempt(rendered, form, chosen, viewing):
     ]
     error = rendered.difference.standard_error[counted]
     verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
-    return _Attempt(model, solution, verdicts, covariance)
+    return Attempt(model, solution, verdicts, covariance)
 
 
-def _measured(ready, rendered, attempts, best, chosen, options):
-    """Return the record of all attempts, and the residual maps of the best one."""
+def _judged(ready, rendered, attempts, viewing, intensities):
+    """Return the fits of all attempts, and the residual maps of each attempt."""
     physical = summary.physical_materials(ready.pair.physical)
-    lights = _light_names(ready.heuristic.scene) if chosen.intensities else []
+    lights = _light_names(ready.heuristic.scene) if intensities else []
     fits, maps = [], []
     for attempt in attempts:
         departure, residual = summary.departure(
@@ -169,27 +170,11 @@ def _measured(ready, rendered, attempts, best, chosen, options):
             rendered.reference.mean,
             rendered.counted,
             rendered.difference.noise,
-            options.viewing,
+            viewing,
         )
         maps.append(residual)
-        fits += _fit_data(attempt, departure, physical, lights)
-    data = {
-        "variant": ready.reference.variant,
-        "seed": options.seed,
-        "resolution": list(options.resolution),
-        "spp": ready.reference.spp * ready.passes,
-        "passes": ready.passes,
-        "viewing": options.viewing.record(),
-        "pairing": options.convention.value,
-        "loss": {"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
-        "intensities": chosen.intensities,
-        "pixels": {"counted": int(rendered.counted.sum()), "total": rendered.counted.size},
-        "fits": fits,
-        "best": len(fits) // len(attempts) * best,
-        "warnings": list(ready.pair.warnings),
-        "versions": comparison_record.versions(),
-    }
-    return data, maps[best]
+        fits += _form_fits(attempt, departure, physical, lights)
+    return tuple(fits), maps
 
 
 def _light_names(scene):
@@ -197,18 +182,17 @@ def _light_names(scene):
     return [emitter.id() for emitter in scene.emitters() if hasattr(emitter, "light")]
 
 
-def _fit_data(attempt, departure, physical, lights):
-    """Return the data of a form as the chapters have it, and normalised: one fit, two ``k_s``."""
-    model, judged = attempt.model, (attempt.solution, attempt.verdicts, attempt.covariance)
+def _form_fits(attempt, departure, physical, lights):
+    """Return a form as the chapters have it, and normalised: one fit, two ``k_s``."""
     return [
-        {
-            "form": model.form,
-            "normalised": normalised,
-            "loss": attempt.solution.loss,
-            "departure": departure,
-            "materials": summary.materials_data(model, *judged, normalised, physical),
-            "lights": summary.lights_data(model, *judged, lights) if lights else [],
-            "convergence": summary.convergence_data(attempt.solution),
-        }
+        FormFit(
+            form=attempt.model.form,
+            normalised=normalised,
+            loss=attempt.solution.loss,
+            departure=departure,
+            materials=summary.materials(attempt, normalised, physical),
+            lights=summary.lights(attempt, lights) if lights else (),
+            convergence=attempt.solution.starts,
+        )
         for normalised in (False, True)
     ]

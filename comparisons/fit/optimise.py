@@ -18,7 +18,9 @@ from math import inf, isfinite, log
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from comparisons.fit import parameters as layout
+from comparisons.amounts import Amount, Count
+from comparisons.fit import parameters
+from comparisons.records import Record
 
 STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
 """Exponents of the form ``phong`` to start from; of ``blinn`` they are four times as large."""
@@ -38,18 +40,22 @@ SMALLEST_GAIN = 1e-14
 LARGEST_DAMPING = 1e12
 
 
-@dataclass(frozen=True)
-class Start:
+class Start(Record):
     """One search: where it began, where it ended, and what it took.
 
-    ``loss`` is that of :meth:`Residuals.loss`; None at the end where a start was worse than others
-    and not followed. ``n`` is None for the paired parameters.
+    Attributes
+    ----------
+    n
+        Exponent of the start; null for the paired parameters.
+    loss, final_loss
+        Where it began and ended (:meth:`Residuals.loss`); null where it was not followed, since
+        others began better.
     """
 
     n: float | None
-    loss: float
-    final_loss: float | None = None
-    evaluations: int = 0
+    loss: Amount
+    final_loss: Amount | None = None
+    evaluations: Count = 0
     converged: bool = False
 
 
@@ -141,7 +147,7 @@ def minimise(residuals):
     -------
     Solution
     """
-    paired = layout.start(residuals.model.parameters)
+    paired = parameters.start(residuals.model.parameters)
     candidates = [(None, paired)]
     candidates += [(n, _best_coefficients(residuals, paired, n)) for n in STARTS]
     losses = [residuals.loss(x) for _, x in candidates]
@@ -159,7 +165,7 @@ def minimise(residuals):
 
 def _descend(residuals, x):
     """Return the minimum that a search from ``x`` finds, its loss, evaluations and convergence."""
-    low, high = layout.bounds(residuals.model.parameters)
+    low, high = parameters.bounds(residuals.model.parameters)
     loss, damping = residuals.loss(x), 1e-3
     gradient, second = residuals.quadratic(x)
     for evaluations in range(1, LARGEST_COUNT):
@@ -182,7 +188,7 @@ def _descend(residuals, x):
 def _best_coefficients(residuals, x, n):
     """Return parameters with one exponent, and the coefficients that suit it in linear RGB."""
     model = residuals.model
-    low, high = layout.bounds(model.parameters)
+    low, high = parameters.bounds(model.parameters)
     at_n = np.array([parameter.name == "n" for parameter in model.parameters])
     x = np.where(at_n, log(n * 4 if model.form == "blinn" else n), x)
     linear = model.linear

@@ -1,4 +1,4 @@
-"""The record of a fit: images, and the plain data that ``fit.json`` holds."""
+"""What a fit returns: images, and its record made of parameters and verdicts."""
 
 from dataclasses import dataclass
 from math import exp, sqrt
@@ -6,9 +6,12 @@ from math import exp, sqrt
 import mitsuba as mi
 import numpy as np
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import drawn
 from comparisons.departure.statistics import noise_floor
+from comparisons.fit.fit_record import Departure, FitRecord, Fitted, FittedLight, FittedMaterial
 from comparisons.fit.identify import AT_BOUND, COVERAGE
+from comparisons.fit.model import Model
+from comparisons.fit.optimise import Solution
 from heuristic.terms import normalisation
 
 
@@ -24,94 +27,83 @@ class FitImages:
 
 @dataclass(frozen=True)
 class Fit:
-    """What a fit returns: the data of ``fit.json``, and the images of the best form."""
+    """What a fit returns: its record, and the images of the best form."""
 
-    data: dict
+    record: FitRecord
     images: FitImages
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """The best fit of one form, and what :mod:`comparisons.fit.identify` says of it."""
+
+    model: Model
+    solution: Solution
+    verdicts: list
+    covariance: np.ndarray
+
+    def image(self, rendered):
+        """Return the whole image, (H, W, 3)."""
+        model = Model(rendered.surface, self.model.form, self.model.parameters)
+        return model.image(self.solution.x).reshape(rendered.before.shape)
+
+
 def departure(before, after, reference, counted, noise, viewing):
-    """Return each metric's mean before and after, split into parameter and model error.
-
-    Returns
-    -------
-    data : dict
-        By metric: ``before``, ``after``, ``p95_after``, ``noise_floor``, ``parameter_error`` (what
-        better parameters remove) and ``model_error`` (what they leave).
-    maps : dict
-        The metric after the fit, (H, W).
-    """
-    data, maps = {}, {}
-    for name, metric in METRICS.items():
+    """Return the :class:`Departure` by metric, and the metrics' maps (H, W) after the fit."""
+    found, maps = {}, {}
+    for name, metric in drawn().items():
         first, maps[name] = (metric(image, reference, viewing) for image in (before, after))
-        means = [float(values[counted].mean()) for values in (first, maps[name])]
-        data[name] = {
-            "before": means[0],
-            "after": means[1],
-            "p95_after": float(np.percentile(maps[name][counted], 95)),
-            "noise_floor": noise_floor(metric, reference, noise, counted, viewing),
-            "parameter_error": means[0] - means[1],
-            "model_error": means[1],
-        }
-    return data, maps
+        means = [metric.mean(values[counted]) for values in (first, maps[name])]
+        found[name] = Departure(
+            before=means[0],
+            after=means[1],
+            p95_after=float(np.percentile(maps[name][counted], 95)),
+            noise_floor=noise_floor(metric, reference, noise, counted, viewing),
+            parameter_error=means[0] - means[1],
+            model_error=means[1],
+        )
+    return found, maps
 
 
-def materials_data(model, solution, verdicts, covariance, normalised, physical):
-    """Return what was fitted, material by material, as plain data."""
-    names = model.surface.names
-    return [
-        {
-            "name": name,
-            "reference": physical.get(name),
-            "pixels": len(np.unique(model.surface.samples[owner].pixel)),
-            "parameters": [
-                _parameter_data(model, solution, verdicts, covariance, place, normalised)
-                for place, parameter in enumerate(model.parameters)
+def materials(attempt, normalised, physical):
+    """Return what was fitted, material by material."""
+    surface = attempt.model.surface
+    return tuple(
+        FittedMaterial(
+            name=name,
+            reference=physical.get(name),
+            pixels=len(np.unique(surface.samples[owner].pixel)),
+            parameters=tuple(
+                Fitted(**_parameter(attempt, place, normalised))
+                for place, parameter in enumerate(attempt.model.parameters)
                 if parameter.owner == owner and parameter.name != "intensity"
-            ],
-        }
-        for owner, name in enumerate(names)
-    ]
+            ),
+        )
+        for owner, name in enumerate(surface.names)
+    )
 
 
-def lights_data(model, solution, verdicts, covariance, lights):
+def lights(attempt, names):
     """Return the factors on the intensities of lights, by name; the first is what they refer to."""
-    fitted = [
-        {"light": lights[parameter.owner]}
-        | _parameter_data(model, solution, verdicts, covariance, place, False)
-        for place, parameter in enumerate(model.parameters)
+    first = FittedLight(
+        light=names[0],
+        name="intensity",
+        is_factor=True,
+        paired=1.0,
+        fitted=None,
+        stopped_at=1.0,
+        interval=None,
+        bounds=(1.0, 1.0),
+        at_bound=False,
+        identifiable=False,
+        reason="only products with k_d and k_s show; other lights' factors are relative to it",
+    )
+    others = (
+        FittedLight(light=names[parameter.owner], **_parameter(attempt, place, False))
+        for place, parameter in enumerate(attempt.model.parameters)
         if parameter.name == "intensity"
-    ]
-    first = {
-        "light": lights[0],
-        "name": "intensity",
-        "channel": "",
-        "is_factor": True,
-        "paired": 1.0,
-        "fitted": None,
-        "stopped_at": 1.0,
-        "interval": None,
-        "bounds": [1.0, 1.0],
-        "at_bound": False,
-        "identifiable": False,
-        "reason": "only products with k_d and k_s show; other lights' factors are relative to it",
-        "partners": [],
-    }
-    return [first, *fitted]
-
-
-def convergence_data(solution):
-    """Return all searches of a fit as plain data."""
-    return [
-        {
-            "n": start.n,
-            "loss": start.loss,
-            "final_loss": start.final_loss,
-            "evaluations": start.evaluations,
-            "converged": start.converged,
-        }
-        for start in solution.starts
-    ]
+    )
+    return (first, *others)
 
 
 def physical_materials(graph):
@@ -136,10 +128,11 @@ def _plain_properties(props):
     return values
 
 
-def _parameter_data(model, solution, verdicts, covariance, place, normalised):
-    """Return one parameter in the units of the chapters."""
+def _parameter(attempt, place, normalised):
+    """Return one parameter in the units of the chapters, as the fields of :class:`Fitted`."""
+    model, verdicts, covariance = attempt.model, attempt.verdicts, attempt.covariance
     parameter, verdict = model.parameters[place], verdicts[place]
-    reason, x = verdict.reason, solution.x
+    reason, x = verdict.reason, attempt.solution.x
     if parameter.name != "k_s" or normalised:
         spread = COVERAGE * sqrt(covariance[place, place])
         raw = (parameter.paired, x[place], x[place] - spread, x[place] + spread)
@@ -162,12 +155,12 @@ def _parameter_data(model, solution, verdicts, covariance, place, normalised):
         "paired": paired,
         "fitted": None if reason else fitted,
         "stopped_at": fitted,
-        "interval": [max(below, low), min(above, high)] if has_interval else None,
-        "bounds": [low, high],
+        "interval": (max(below, low), min(above, high)) if has_interval else None,
+        "bounds": (low, high),
         "at_bound": verdict.at_bound,
         "identifiable": not reason,
         "reason": reason,
-        "partners": [_label(model, other) for other in verdict.partners],
+        "partners": tuple(_label(model, other) for other in verdict.partners),
     }
 
 

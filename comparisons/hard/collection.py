@@ -44,6 +44,10 @@ class HardCases:
     pictures: tuple[Picture, ...]
     furnaces: tuple[Furnace, ...]
 
+    def of_group(self, name):
+        """Return the outcomes of the cases of a group."""
+        return [outcome for outcome in self.outcomes if outcome.case.group == name]
+
 
 def collect():
     """Evaluate everything, in the current Mitsuba variant; a few seconds."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from reference.effects.enumeration import EFFECTS
 
@@ -30,18 +31,11 @@ PARAMETERS = {
     for scene in SCENES.values()
     for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
 }
-RESULTS = {
+MEANS = {
     "heuristic": Column("1", f"mean of the heuristic image, {LUMINANCE}"),
     "reference": Column("1", f"mean of the reference, {LUMINANCE}"),
-    "dE2000": Column("1", "CIE DE2000, mean"),
-    "dE2000_p95": Column("1", "CIE DE2000, 95th percentile"),
-    "dE2000_noise": Column("1", "CIE DE2000 that the noise of the comparison alone would give"),
-    "dE2000_shape": Column("1", "CIE DE2000, mean, after the best exposure"),
-    "exposure": Column("1", "factor on the heuristic image that makes CIE DE2000 smallest"),
-    "dE_ITP": Column("1", "ΔE ITP (ITU-R BT.2124) at 203 cd/m² for white, mean"),
-    "dE_CAM16UCS": Column("1", "distance in CAM16-UCS, mean"),
-    "rmse": Column("1", "root mean square difference, display-linear"),
-    "log2_luminance": Column("stops", "mean ratio of luminances, heuristic to reference"),
+}
+CHANGES = {
     STEPS[0]: Column("1", "RMS change by the physical BSDFs and lights, without shadows"),
     **{effect.label: Column("1", f"RMS change by {effect.step}") for effect in STEPPED},
     "dominant": Column("", f"the largest of {', '.join(STEPS[:-1])} and {STEPS[-1]}", str),
@@ -64,3 +58,18 @@ RESULTS = {
     "miss": Column("1", "largest relative miss of the pairing, 0 where it is met"),
     "error": Column("", "why there is no result; empty where there is one", str),
 }
+
+
+def results():
+    """Return the columns of results; those of the departure are those of the metrics."""
+    name, label = LEADING.name, LEADING.label
+    departure = {
+        name: Column("1", LEADING.heading),
+        f"{name}_p95": Column("1", f"{label}, 95th percentile"),
+        f"{name}_noise": Column("1", f"{label} that the noise of the comparison alone would give"),
+        f"{name}_shape": Column("1", f"{label}, mean, after the best exposure"),
+        "exposure": Column("1", f"factor on the heuristic image that makes {label} smallest"),
+    }
+    departure |= {name: Column("1", metric.heading) for name, metric in METRICS.items()}
+    departure[RATIO.name] = Column(RATIO.unit, "mean ratio of luminances, heuristic to reference")
+    return MEANS | departure | CHANGES

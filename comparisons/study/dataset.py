@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 
 from comparisons import atomic
 from comparisons.record import versions
-from comparisons.study.columns import IDENTITY, PARAMETERS, RESULTS, Column
+from comparisons.study.columns import IDENTITY, PARAMETERS, Column, results
 from heuristic.errors import InputError
 
 TYPES = {str: pa.string(), int: pa.int64(), float: pa.float64()}
@@ -23,9 +23,9 @@ def table(study, rows):
     """
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
-    paths = sorted(present - {*IDENTITY, *PARAMETERS, *RESULTS})
+    paths = sorted(present - {*IDENTITY, *PARAMETERS, *results()})
     own = {path: Column("", "parameter of the scene, by its path") for path in paths}
-    columns = IDENTITY | PARAMETERS | own | RESULTS
+    columns = IDENTITY | PARAMETERS | own | results()
     columns = {name: column for name, column in columns.items() if name in present}
     schema = pa.schema(
         [

@@ -3,9 +3,9 @@
 import numpy as np
 
 from comparisons.departure import statistics
-from comparisons.departure.metrics import METRICS, checked_pair
-
-ITP, CAM16 = METRICS["dE_ITP"], METRICS["dE_CAM16UCS"]
+from comparisons.departure.metric import Pixelwise, checked_pair
+from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
+from comparisons.departure.spaces import DEFAULT_VIEWING
 
 
 def measure(heuristic, reference, counted, noise=None):
@@ -19,21 +19,23 @@ def measure(heuristic, reference, counted, noise=None):
     NonFiniteError
         For a NaN or an infinity.
     """
-    summary, _ = statistics.summarise(METRICS["dE2000"], heuristic, reference, counted, noise=noise)
+    summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
     test, truth = heuristic[counted], reference[counted]
+    checked_pair(heuristic, reference)
+    means = {
+        name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
+        for name, metric in METRICS.items()
+    }
     return {
         "heuristic": float(test.mean()) if test.size else 0.0,
         "reference": float(truth.mean()) if truth.size else 0.0,
-        "dE2000": summary.mean,
-        "dE2000_p95": summary.p95,
-        "dE2000_noise": summary.noise_floor,
-        "dE2000_shape": summary.after_exposure.mean,
+        **means,
+        f"{LEADING.name}_p95": summary.p95,
+        f"{LEADING.name}_noise": summary.noise_floor,
+        f"{LEADING.name}_shape": summary.after_exposure.mean,
         "exposure": summary.after_exposure.exposure,
-        "dE_ITP": float(ITP(test, truth).mean()) if test.size else 0.0,
-        "dE_CAM16UCS": float(CAM16(test, truth).mean()) if test.size else 0.0,
-        "rmse": statistics.rmse(heuristic, reference, counted),
-        "log2_luminance": ratio.mean,
+        RATIO.name: ratio.mean,
     }
 
 
@@ -53,10 +55,10 @@ def measure_each(heuristic, reference):
         For a NaN or an infinity.
     """
     test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
+    pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}
     return {
         "heuristic": heuristic,
         "reference": reference,
-        **{name: metric(test, truth) for name, metric in METRICS.items()},
-        "rmse": np.abs(heuristic - reference),
-        "log2_luminance": statistics.log2_luminance_ratio(test, truth),
+        **{name: metric(test, truth) for name, metric in pixelwise.items()},
+        RATIO.name: log2_luminance_ratio(test, truth),
     }

@@ -15,9 +15,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError, NonFiniteError
+from heuristic.errors import InputError
 from reference.rendering import direct
 from reference.rendering.environment import AlbedoTable
+from reference.rendering.finite import require_finite
 from reference.scene.preparation import PATHS
 
 
@@ -188,7 +189,8 @@ class Renderer:
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
-        _require_finite(image, self.label, seed)
+        if not dr.all(dr.isfinite(image.array)):
+            require_finite(np.array(image), f"{self.label}, pass with seed {seed}")
         return image
 
     def pass_times(self):
@@ -236,15 +238,3 @@ def _reason(error):
     while (cause := error.__cause__ or error.__context__) is not None:
         error = cause
     return str(error).strip()
-
-
-def _require_finite(image, label, seed):
-    if dr.all(dr.isfinite(image.array)):
-        return
-    bad = ~np.isfinite(np.array(image)).all(axis=2)
-    y, x = np.argwhere(bad)[0]
-    raise NonFiniteError(
-        f"{label}, pass with seed {seed}: {bad.sum()} pixels are NaN or infinite, the first at"
-        f" x = {x}, y = {y}. Look at the surface and the lights seen there: an infinite light or a"
-        " degenerate mesh is the usual cause."
-    )

@@ -26,17 +26,17 @@ Each is seen on white and on a dark ground."""
 FAINT = "#8a8a8a"
 
 
-def error_over_time(data):
-    """Return the chart of ``cost.json``: mean ΔE2000 over seconds, both logarithmic.
+def error_over_time(record):
+    """Return the chart of a ``Cost``: mean ΔE2000 over seconds, both logarithmic.
 
     It stands alone, with a title and a white ground; :func:`plot` is what a page shows.
     """
-    return plot(data, ground="white") | {
+    return plot(record, ground="white") | {
         "$schema": SCHEMA,
-        "description": f"Error against time of the methods on {data['scene']}",
+        "description": f"Error against time of the methods on {record.scene}",
         "title": {
-            "text": f"{data['scene']}: error against time",
-            "subtitle": [f"{size(data)}, {machine(data)}", *reading(data)],
+            "text": f"{record.scene}: error against time",
+            "subtitle": [f"{size(record)}, {machine(record)}", *reading(record)],
             "anchor": "start",
         },
         "config": {
@@ -49,15 +49,16 @@ def error_over_time(data):
     }
 
 
-def plot(data, ground="transparent"):
-    """Return the plot of ``cost.json`` without a title, on a ground of any colour.
+def plot(record, ground="transparent"):
+    """Return the plot of a record without a title, on a ground of any colour.
 
     Points of the Pareto front are filled. Lines join the sample counts of one rung. The dashed line
     is the slope −1/2 of plain Monte Carlo; the dotted one the reference's own noise, below which
     nothing can be told.
     """
-    points = [_row(point) for point in data["points"]]
-    floor = data["reference"]["noise_floor"]
+    families = {rung.name: rung.family for rung in record.rungs}
+    points = [_row(point, families[point.rung]) for point in record.points]
+    floor = record.reference.noise_floor
     times = [point[bound] for point in points for bound in ("low", "high")]
     errors = [point["error"] for point in points] + ([floor] if floor > 0 else [])
     x = _Axis(min(times), max(times), WIDTH)
@@ -77,20 +78,21 @@ def plot(data, ground="transparent"):
     return {"width": WIDTH, "height": HEIGHT, "padding": padding, "layer": layers}
 
 
-def size(data):
+def size(record):
     """Say how large the images were, and how often each was rendered."""
-    width, height = data["resolution"]
-    return f"{width} × {height} pixels, {data['rounds']} rounds"
+    width, height = record.resolution
+    return f"{width} × {height} pixels, {record.rounds} rounds"
 
 
-def machine(data):
+def machine(record):
     """Say what machine the times are of."""
-    return f"{data['machine']['cores']} cores, {data['machine']['processor']}"
+    return f"{record.machine.cores} cores, {record.machine.processor}"
 
 
-def reading(data):
+def reading(record):
     """Return how to read the chart, in lines."""
-    slope = "dashed: slope −1/2, plain Monte Carlo; " if _sampled(data["points"]) else ""
+    sampled = _sampled([point.rung for point in record.points])
+    slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     return [
         "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
         f"{slope}dotted: noise of the reference itself",
@@ -113,19 +115,16 @@ class _Axis:
         return {"type": "log", "domain": [self.low, self.high], "nice": False}
 
 
-def _row(point):
-    family = "kernel" if "kernel" in point["rung"] else "physical"
-    if point["rung"].startswith("phong BSDF"):
-        family = "phong BSDF"
+def _row(point, family):
     return {
-        "rung": point["rung"],
+        "rung": point.rung,
         "family": family,
-        "spp": point["spp"],
-        "time": point["seconds"]["median"] * 1e3,
-        "low": point["seconds"]["low"] * 1e3,
-        "high": point["seconds"]["high"] * 1e3,
-        "error": point["error"],
-        "front": point["pareto"],
+        "spp": point.spp,
+        "time": point.seconds.median * 1e3,
+        "low": point.seconds.low * 1e3,
+        "high": point.seconds.high * 1e3,
+        "error": point.error,
+        "front": point.pareto,
     }
 
 
@@ -202,7 +201,8 @@ def _colour():
 
 def _slope(points, x, y):
     """Return the line of slope −1/2 through the best point of any Monte Carlo rung."""
-    sampled = _sampled(points)
+    names = _sampled([point["rung"] for point in points])
+    sampled = [point for point in points if point["rung"] in names]
     if not sampled:
         return []
     last = min(sampled, key=lambda point: point["error"])
@@ -218,10 +218,9 @@ def _slope(points, x, y):
     return [rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
 
 
-def _sampled(points):
-    """Return the points of rungs that have several sample counts."""
-    rungs = [point["rung"] for point in points]
-    return [point for point in points if rungs.count(point["rung"]) > 1]
+def _sampled(rungs):
+    """Return the rungs that have points at several sample counts."""
+    return {rung for rung in rungs if rungs.count(rung) > 1}
 
 
 def _floor(floor, y):

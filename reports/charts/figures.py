@@ -1,6 +1,6 @@
 """Figures for print, each as SVG and PDF: a strip of pictures, histograms, and a run's departures.
 
-Maps have the fixed ranges of `METRICS`, and every figure of a kind has the same
+Maps have the fixed ranges of their metrics, and every figure of a kind has the same
 axis, so that the figures of different scenes compare. Text is black on white. Pictures are kept
 pixel for pixel. The files depend on what they show alone: they hold no date.
 """
@@ -17,7 +17,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from comparisons.departure.metrics import METRICS
+from comparisons.comparison import ComparisonRecord
+from comparisons.cost.cost_record import Cost
+from comparisons.departure.metrics import LEADING
 from comparisons.record import Comparison
 from reports.charts import error_over_time, histograms
 from reports.files import images, ownership
@@ -34,10 +36,7 @@ GAP, BAR, HEADING = 0.08, 0.55, 0.22
 #: Points, as they are printed at that width.
 FONT_SIZE = 8
 
-#: The metric that strips and the chart of a run show.
-SHOWN = "dE2000"
-
-#: ΔE2000: departures below are drawn at the left border, since a logarithmic axis has no 0.
+#: Departures below are drawn at the left border, since a logarithmic axis has no 0.
 LEAST, LARGEST = 1e-3, 100.0
 
 #: How charts look on paper; fonts as Vega names them.
@@ -55,24 +54,23 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
     figure = strip(comparison)
     for kind in FORMATS:
         ownership.write(folder / f"{name}.{kind}", drawn(figure, kind))
-    data = comparison.data
-    for metric, histogram in data["histograms"].items():
-        if data["pixels"]["counted"]:
-            summary, counted = data["metrics"][metric], data["pixels"]["counted"]
-            spec = histograms.spec(metric, histogram, summary, counted)
+    record = comparison.record
+    for metric, histogram in record.histograms.items():
+        if counted := record.pixels.counted:
+            spec = histograms.spec(metric, histogram, record.metrics[metric], counted)
             write_chart(folder, f"{name}-histogram-{metric}", spec)
 
 
-def write_run(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:
     """Write the departures of all scenes of a run as ``folder/departures`` in each format."""
     ownership.folder(folder)
     write_chart(folder, "departures", departures(list(records)))
 
 
-def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
     ownership.folder(folder)
-    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(data))
+    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(record))
 
 
 def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
@@ -85,18 +83,18 @@ def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
 
 
 def strip(comparison: Comparison) -> Figure:
-    """Return heuristic, reference and the map of ΔE2000 with its colour bar, side by side."""
-    shown, metric = comparison.images, METRICS[SHOWN]
-    exposure = comparison.data["viewing"]["exposure"]
-    summary = comparison.data["metrics"][SHOWN]
+    """Return heuristic, reference and the map of the error with its colour bar, side by side."""
+    shown, metric = comparison.images, LEADING
+    exposure = comparison.record.viewing.exposure
+    summary = comparison.record.metrics[metric.name]
     high = metric.map_range[1]
-    heading = f"{metric.label}: mean {number(summary['mean'])}"
-    if summary["noise_floor"]:
-        heading += f" (noise {number(summary['noise_floor'])})"
+    heading = f"{metric.label}: mean {number(summary.mean)}"
+    if summary.noise_floor:
+        heading += f" (noise {number(summary.noise_floor)})"
     panels = {
         "heuristic": images.tonemap(shown.heuristic, exposure),
         "reference": images.tonemap(shown.reference, exposure),
-        heading: images.error_map(shown.maps[SHOWN], high),
+        heading: images.error_map(shown.maps[metric.name], high),
     }
     height, width = shown.counted.shape
     side = (TEXT_WIDTH - 2 * GAP - BAR) / len(panels)
@@ -133,28 +131,28 @@ def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
     return buffer.getvalue()
 
 
-def departures(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the chart of mean ΔE2000 by scene: as it is, its shape, and the noise floor.
+def departures(records: Sequence[ComparisonRecord]) -> dict[str, Any]:
+    """Return the chart of means by scene: as it is, its shape, and the noise floor.
 
     The axis is logarithmic, from 0.001 to 100 whatever the scenes; values beyond take its ends.
     """
     rows = []
     for record in records:
-        metric = record["metrics"][SHOWN]
+        metric = record.metrics[LEADING.name]
         values = {
-            "as it is": metric["mean"],
-            "after exposure": metric["after_exposure"]["mean"],
-            "noise floor": metric["noise_floor"],
+            "as it is": metric.mean,
+            "after exposure": metric.after_exposure.mean,
+            "noise floor": metric.noise_floor,
         }
         rows += [
-            {"scene": record["scene"], "what": what, "value": min(max(value, LEAST), LARGEST)}
+            {"scene": record.scene, "what": what, "value": min(max(value, LEAST), LARGEST)}
             for what, value in values.items()
         ]
     place = {
         "field": "value",
         "type": "quantitative",
         "scale": {"type": "log", "domain": [LEAST, LARGEST], "nice": False},
-        "title": "mean ΔE2000 (0.001 and less at the left border)",
+        "title": f"mean {LEADING.label} (0.001 and less at the left border)",
         "axis": {"values": [0.001, 0.01, 0.1, 1, 10, 100], "format": "~g"},
     }
     scene = {"field": "scene", "type": "nominal", "sort": None, "title": None}

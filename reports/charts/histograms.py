@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.histogram import Histogram
 from comparisons.departure.metrics import METRICS
+from comparisons.departure.statistics import Summary
 from reports.charts import vega
 from reports.terminal.printing import number, percent
 
@@ -20,24 +22,22 @@ AREA = "#7d8fb3"
 MARKS = (("mean", "mean", [1, 0]), ("p95", "95 %", [5, 3]), ("noise_floor", "noise floor", [1, 3]))
 
 
-def figures(record: Mapping[str, Any]) -> list[vega.Figure]:
+def figures(record: ComparisonRecord) -> list[vega.Figure]:
     """The histograms of a record, where it has them and any pixel counts."""
-    counted = record["pixels"]["counted"]
+    counted = record.pixels.counted
     if not counted:
         return []
     return [
         vega.figure(
             METRICS[name].label,
-            spec(name, histogram, record["metrics"][name], counted),
+            spec(name, histogram, record.metrics[name], counted),
             note(histogram, counted),
         )
-        for name, histogram in record.get("histograms", {}).items()
+        for name, histogram in record.histograms.items()
     ]
 
 
-def spec(
-    name: str, histogram: Mapping[str, Any], summary: Mapping[str, float], counted: int
-) -> dict[str, Any]:
+def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dict[str, Any]:
     """The Vega-Lite specification of a histogram of `comparison.json`.
 
     The axis is logarithmic and the height is the share of pixels a decade, so that equal areas
@@ -45,12 +45,12 @@ def spec(
 
     name
         One of `comparisons.departure.metrics.METRICS`.
-    histogram, summary, counted
-        Of the record: ``histograms[name]``, ``metrics[name]`` and ``pixels.counted``.
+    counted
+        Pixels in all.
     """
     bins = _densities(histogram, counted)
     top = max((row["density"] for row in bins), default=1.0) or 1.0
-    shown = (histogram["low"], 4 * histogram["high"])  # room for the last label
+    shown = (histogram.low, 4 * histogram.high)  # room for the last label
     axis = {"type": "log", "domain": list(shown), "nice": False, "clamp": True}
     place = {
         "field": "value",
@@ -78,13 +78,13 @@ def spec(
     }
 
 
-def note(histogram: Mapping[str, Any], counted: int) -> str:
+def note(histogram: Histogram, counted: int) -> str:
     """What the chart leaves out, in words; empty where that is nothing."""
     parts = [
         f"{percent(count / counted)} of the pixels {side} {limit:g}"
         for count, side, limit in (
-            (histogram["below"], "under", histogram["low"]),
-            (histogram["above"], "at least", histogram["high"]),
+            (histogram.below, "under", histogram.low),
+            (histogram.above, "at least", histogram.high),
         )
         if count
     ]
@@ -93,8 +93,8 @@ def note(histogram: Mapping[str, Any], counted: int) -> str:
 
 def _densities(histogram, counted):
     """Lower edge and share of pixels a decade of each bin, and a closing zero."""
-    low, counts = histogram["low"], histogram["counts"]
-    decades = math.log10(histogram["high"] / low) / len(counts)
+    low, counts = histogram.low, histogram.counts
+    decades = math.log10(histogram.high / low) / len(counts)
     return [
         {"value": low * 10.0 ** (place * decades), "density": count / max(counted, 1) / decades}
         for place, count in enumerate([*counts, 0])
@@ -106,7 +106,8 @@ def _marks(summary, place, low, top):
 
     A line ends at its label's row and the label is to its right, so that nothing crosses.
     """
-    marks = sorted((summary[key], word, dash) for key, word, dash in MARKS if summary[key] >= low)
+    marks = [(getattr(summary, name), word, dash) for name, word, dash in MARKS]
+    marks = sorted(mark for mark in marks if mark[0] >= low)
     layers = []
     for row, (value, word, dash) in enumerate(marks):
         height = {"datum": (1.45 - 0.14 * row) * top, "type": "quantitative"}

@@ -16,13 +16,13 @@ NO_EFFECT = "#dee2e6"
 """Where no effect removes enough to be seen."""
 
 
-def price_chart(data):
+def price_chart(record):
     """Return the chart of the prices in ``cost.json``: ΔE2000 removed by each effect, as bars.
 
     Rules are 95 % intervals, the circle and the stroke what the effect removes where it is added
     first and last. A tooltip has the numbers.
     """
-    rows = [_row(price) for price in data["prices"]["effects"]]
+    rows = [_row(price) for price in record.prices.effects]
     place = {"field": "effect", "type": "nominal", "sort": None, "title": None}
     tooltip = [
         {"field": "effect", "title": "effect"},
@@ -63,11 +63,11 @@ def price_chart(data):
 
 def _row(price):
     return {
-        "effect": price["effect"],
-        "removes": price["removes"]["value"],
-        "low": price["removes"]["low"],
-        "high": price["removes"]["high"],
-        "alone": price["alone"],
-        "last": price["last"],
-        "adds": price["adds_s"]["value"] * 1e3,
+        "effect": price.effect,
+        "removes": price.removes.value,
+        "low": price.removes.low,
+        "high": price.removes.high,
+        "alone": price.alone,
+        "last": price.last,
+        "adds": price.adds_s.value * 1e3,
     }

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from markupsafe import Markup
-
 #: How all charts look; `currentColor` is the text's. Charts are described by their page, not in
 #: themselves.
 CONFIG: Mapping[str, Any] = {
@@ -51,7 +49,7 @@ class Figure:
     title: str
     note: str
     spec: Mapping[str, Any]
-    svg: Markup
+    svg: str
 
 
 def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
@@ -81,8 +79,8 @@ def _merged(default, own):
     return default if own is None else own
 
 
-def _inline(svg: str) -> Markup:
+def _inline(svg: str) -> str:
     """The SVG with ids of its own, since several share one page; described by its figure."""
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)
-    return Markup(owned.replace("<svg ", '<svg aria-hidden="true" ', 1))
+    return owned.replace("<svg ", '<svg aria-hidden="true" ', 1)

@@ -22,10 +22,11 @@ from pathlib import Path
 
 from reports.ci import junit, lines
 from reports.files import ownership
+from reports.terminal.tables import markdown
 
 
 def annotate(results, folder, level, environment=None):
-    """Write the files that the service at hand reads, and return the lines that it looks for.
+    """Write the files that the CI service reads, and return the lines that it looks for.
 
     Parameters
     ----------
@@ -64,35 +65,24 @@ def annotate(results, folder, level, environment=None):
 
 def table(results, level):
     """Return the results as a Markdown table."""
-    rows = [
-        "### fotismos check",
-        "",
-        lines.verdict(results, level),
-        "",
-        "| Baseline | Result | What moved most | Baseline | Now | Standard errors | p |",
-        "|---|---|---|---:|---:|---:|---:|",
-    ]
-    for result in results:
-        cells = [result.name, result.status]
-        if result.check is not None and result.check.moved:
-            move = result.check.moved[0]
-            errors = move.standard_errors
-            cells += [
-                f"{move.before.name} ({len(result.check.moved)} in all)",
-                f"{move.before.value:.6g}",
-                f"{move.after.value:.6g}",
-                "no noise" if errors is None else f"{errors:+.1f}",
-                f"{move.corrected:.1g}",
-            ]
-        else:
-            cells += [result.message, "", "", "", ""]
-        rows.append("| " + " | ".join(map(_cell, cells)) + " |")
-    return "\n".join(rows) + "\n\n"
+    headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
+    rows = ([_cell(cell) for cell in _cells(result)] for result in results)
+    head = ["### fotismos check", "", lines.verdict(results, level), ""]
+    return "\n".join([*head, *markdown(headings, rows, right=3)]) + "\n\n"
+
+
+def _cells(result):
+    if result.check is None or not result.check.moved:
+        return result.name, result.status, result.message, "", "", "", ""
+    moved = result.check.moved
+    what, *numbers = lines.moved_cells(moved[0])
+    return result.name, result.status, f"{what} ({len(moved)} in all)", *numbers
 
 
 def _cell(text):
+    """Return text in one line that Markdown shows as it is; `markdown` sees to bars."""
     text = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
-    return re.sub(r"([\\`*_\[\]|])", r"\\\1", text)
+    return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
 def _github(result, variables):

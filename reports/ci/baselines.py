@@ -1,15 +1,15 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 
 from comparisons import atomic
 from comparisons.case import Request, open_case
-from comparisons.check import baseline as format
-from comparisons.check.baseline import Baseline
+from comparisons.check.baseline import Baseline, parse
 from heuristic.errors import InputError
 from reports.files import exr
 
@@ -73,7 +73,7 @@ def read(path):
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
-    return BaselineFile(path, format.parse(text, str(path)))
+    return BaselineFile(path, parse(text, str(path)))
 
 
 def write(path, baseline, pictures=None):
@@ -91,7 +91,7 @@ def write(path, baseline, pictures=None):
             # "baseline." keeps the layers at half precision, which pictures are fine with.
             layers = {f"baseline.{half}": image for half, image in pictures.items()}
             exr.write(images, layers, {"scene": baseline.scene})
-            baseline = replace(baseline, images=images.name)
+            baseline = structs.replace(baseline, images=images.name)
         atomic.write(path, baseline.text())
     except OSError as error:
         raise InputError(f"baseline {path}: {error.strerror or error}.") from error
@@ -123,6 +123,6 @@ def _read_pictures(path):
             }
     except (RuntimeError, KeyError) as error:
         raise InputError(
-            f"{path}: the baseline's pictures cannot be read: {error}. Write them anew with"
+            f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
             " `fotismos check BASELINE --update --images`."
         ) from error

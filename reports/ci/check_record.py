@@ -1,69 +1,86 @@
-"""The results of checks as plain data, for ``--json`` and for the files of a failure."""
+"""The results of checks as records, for ``--json`` and for the files of a failure."""
 
-from comparisons import record
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from comparisons.amounts import Amount, Count, Share
+from comparisons.check.moved import Move
+from comparisons.records import VERSION, Record
+
+Status = Literal["passed", "failed", "error", "created", "updated", "unchanged"]
 
 
-def data(result):
-    """Return one result as plain data; numbers are finite."""
-    found = {
-        "baseline": result.path.as_posix(),
-        "scene": result.scene,
-        "status": result.status,
-        "passed": result.exit_code == 0,
-        "seconds": round(result.seconds, 3),
-    }
-    if result.message:
-        found["message"] = result.message
+class Before(Record):
+    """A metric, as the baseline has it and now."""
+
+    before: float
+    after: float
+
+
+class VersionChange(Record):
+    """The version of a library when the baseline was made, and today's."""
+
+    before: str
+    after: str
+
+
+class CheckRecord(Record, kw_only=True, omit_defaults=True):
+    """What became of one baseline; of one that was not compared, the numbers are left out."""
+
+    record_version: int
+    baseline: Annotated[str, Meta(description="Path of its file.")]
+    scene: str
+    status: Status
+    passed: bool
+    seconds: Amount
+    message: str = ""
+    tested: Count | None = None
+    significance: Share | None = None
+    moved: tuple[Move, ...] | None = None
+    metrics: dict[str, Before] | None = None
+    versions: dict[str, VersionChange] | None = None
+    pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
+
+
+class Checks(Record, kw_only=True):
+    """The results of one command."""
+
+    record_version: int = VERSION
+    passed: bool
+    significance: Share
+    checks: tuple[CheckRecord, ...]
+
+
+def of(result):
+    """Return the record of one :class:`reports.ci.checks.Result`."""
+    compared = {}
     if result.check is not None:
         check = result.check
-        found |= {
+        compared = {
             "tested": len(check.moves),
             "significance": check.level,
-            "moved": [move_data(move) for move in check.moved],
+            "moved": check.moved,
             "metrics": {
-                name: {"before": metric.value, "after": check.after.metrics[name].value}
+                name: Before(metric.value, check.after.metrics[name].value)
                 for name, metric in check.before.metrics.items()
             },
         }
-    if result.versions:
-        found["versions"] = {
-            name: {"before": old, "after": new} for name, (old, new) in result.versions.items()
-        }
-    if result.folder is not None:
-        found["pictures"] = result.folder.as_posix()
-    return found
+    return CheckRecord(
+        record_version=VERSION,
+        baseline=result.path.as_posix(),
+        scene=result.scene,
+        status=result.status,
+        passed=result.exit_code == 0,
+        seconds=round(result.seconds, 3),
+        message=result.message,
+        **compared,
+        versions=result.versions or None,
+        pictures=result.folder and result.folder.as_posix(),
+    )
 
 
-def move_data(move):
-    """Return one quantity, before and after, as plain data; ``block`` counts from 1."""
-    block = move.before.block
-    return {
-        "quantity": move.before.name,
-        "half": move.before.half,
-        "block": [block[0] + 1, block[1] + 1] if block else None,
-        "before": move.before.value,
-        "after": move.after.value,
-        "error": move.error,
-        "standard_errors": move.standard_errors,
-        "p": move.p,
-        "p_corrected": move.corrected,
-    }
-
-
-def summary(results, level):
-    """Return the results of one command as plain data."""
-    return {
-        "passed": all(result.exit_code == 0 for result in results),
-        "significance": level,
-        "checks": [data(result) for result in results],
-    }
-
-
-def other_versions(baseline):
-    """Return ``{name: (then, now)}`` of the versions that changed since a baseline was made."""
-    now = record.versions()
-    return {
-        name: (old, now.get(name, "none"))
-        for name, old in baseline.versions.items()
-        if now.get(name) != old
-    }
+def of_all(results, level):
+    """Return the record of the results of one command."""
+    passed = all(result.exit_code == 0 for result in results)
+    return Checks(passed=passed, significance=level, checks=tuple(map(of, results)))

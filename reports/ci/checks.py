@@ -1,17 +1,19 @@
 """Checking scenes against baselines, and writing baselines and the pictures of what failed."""
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from comparisons.check import check as checking
+from comparisons import record
+from comparisons.check import baseline, check
 from comparisons.check.check import Check
 from comparisons.check.moved import LEVEL
+from comparisons.records import to_json
 from heuristic.errors import FotismosError
 from reference.scene.graph import set_variant
 from reports.ci import baselines, check_pictures, check_record
 from reports.ci.baselines import BaselineFile
+from reports.ci.check_record import VersionChange
 from reports.files import ownership
 
 FILES = ("check.json", *(f"{name}.png" for name in check_pictures.NAMES))
@@ -39,7 +41,7 @@ class Result:
     folder
         Where the pictures of a failure are.
     versions
-        Those of the baseline that are other than today's, as ``name: (then, now)``.
+        Those that changed since the baseline was made, by name.
     """
 
     path: Path
@@ -50,7 +52,7 @@ class Result:
     message: str = ""
     exit_code: int = 0
     folder: Path | None = None
-    versions: dict | None = None
+    versions: dict[str, VersionChange] | None = None
 
     @property
     def name(self):
@@ -86,15 +88,15 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
         When the scene cannot be measured.
     """
     begin = perf_counter()
-    check = _checked(file, case, level, progress)
+    found = _checked(file, case, level, progress)
     result = Result(
         file.path,
         file.baseline.scene,
-        "passed" if check.passed else "failed",
-        check=check,
-        exit_code=0 if check.passed else 1,
-        folder=None if check.passed else folder,
-        versions=check_record.other_versions(file.baseline),
+        "passed" if found.passed else "failed",
+        check=found,
+        exit_code=0 if found.passed else 1,
+        folder=None if found.passed else folder,
+        versions=_changed_versions(file.baseline),
     )
     if folder is not None:
         ownership.clear(folder, FILES)
@@ -105,20 +107,21 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
 
 
 def update(file, case, level=LEVEL, images=False, progress=None):
-    """Measure anew, and write the baseline if anything moved; else its file stays as it is."""
+    """Measure again, and write the baseline if anything moved; else its file stays as it is."""
     begin = perf_counter()
-    check = _checked(file, case, level, progress)
-    status = "unchanged" if check.passed else "updated"
+    found = _checked(file, case, level, progress)
+    status = "unchanged" if found.passed else "updated"
     old = file.baseline
-    if not check.passed:
-        new = checking.new_baseline(old.scene, old.options, check.after)
-        baselines.write(file.path, new, _small(check.pictures) if images or old.images else None)
-    images_missing = check.passed and images and not old.images
+    pictures = check_pictures.reduced(found.pictures) if images or old.images else None
+    if not found.passed:
+        new = baseline.of(old.scene, old.options, found.after)
+        baselines.write(file.path, new, pictures)
+    images_missing = found.passed and images and not old.images
     if images_missing:
-        baselines.write(file.path, old, _small(check.pictures))
+        baselines.write(file.path, old, pictures)
     message = "the pictures were added" if images_missing else ""
     seconds = perf_counter() - begin
-    return Result(file.path, file.baseline.scene, status, seconds, check, message)
+    return Result(file.path, file.baseline.scene, status, seconds, found, message)
 
 
 def create(path, scene, case, images=False, progress=None):
@@ -138,12 +141,12 @@ def create(path, scene, case, images=False, progress=None):
         As of :func:`comparisons.compare.compare`.
     """
     begin = perf_counter()
-    case = checking.made_small(case)
-    measured = checking.measure_scene(case.source, case.options, progress=progress)
+    case = check.made_small(case)
+    measured = check.measure_scene(case.source, case.options, progress=progress)
     options = case.asking(spp=measured.spp).request.stated()
     status = "updated" if path.exists() else "created"
-    new = checking.new_baseline(scene, options, measured.measurement)
-    baselines.write(path, new, _small(measured.pictures) if images else None)
+    new = baseline.of(scene, options, measured.measurement)
+    baselines.write(path, new, check_pictures.reduced(measured.pictures) if images else None)
     return Result(path, scene, status, perf_counter() - begin)
 
 
@@ -157,11 +160,16 @@ def guarded(path, run, scene=""):
 
 def _checked(file: BaselineFile, case, level, progress):
     set_variant(case.variant)
-    return checking.check(case.source, case.options, file.baseline.measured, level, progress)
+    return check.check(case.source, case.options, file.baseline.measured(), level, progress)
 
 
-def _small(pictures):
-    return check_pictures.reduced(pictures)
+def _changed_versions(baseline):
+    now = record.versions()
+    return {
+        name: VersionChange(old, now.get(name, "none"))
+        for name, old in baseline.versions.items()
+        if now.get(name) != old
+    }
 
 
 def _write_failure(file, result):
@@ -170,5 +178,4 @@ def _write_failure(file, result):
     ownership.folder(folder)
     for name, png in check_pictures.pictures(result.check, file.pictures()).items():
         ownership.write(folder / f"{name}.png", png)
-    data = json.dumps(check_record.data(result), indent=2, ensure_ascii=False, allow_nan=False)
-    ownership.write(folder / "check.json", data + "\n")
+    ownership.write(folder / "check.json", to_json(check_record.of(result)))

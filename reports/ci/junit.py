@@ -1,7 +1,7 @@
 """The results of checks as JUnit XML, which CI services show as tests."""
 
 import re
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from reports.ci import lines
 
@@ -10,39 +10,28 @@ NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 def document(results):
     """Return the XML document, one test case for each baseline."""
-    suite = {
+    statuses = [result.status for result in results]
+    totals = {
         "name": "fotismos check",
         "tests": str(len(results)),
-        "failures": str(sum(result.status == "failed" for result in results)),
-        "errors": str(sum(result.status == "error" for result in results)),
-        "skipped": "0",
+        "failures": str(statuses.count("failed")),
+        "errors": str(statuses.count("error")),
         "time": f"{sum(result.seconds for result in results):.3f}",
     }
-    root = ElementTree.Element("testsuites", {k: v for k, v in suite.items() if k != "skipped"})
-    element = ElementTree.SubElement(root, "testsuite", suite)
+    root = Element("testsuites", totals)
+    suite = SubElement(root, "testsuite", totals, skipped="0")
     for result in results:
-        _case(element, result)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-
-
-def _case(suite, result):
-    case = ElementTree.SubElement(
-        suite,
-        "testcase",
-        name=_clean(result.name),
-        classname="fotismos.check",
-        file=_clean(result.path.as_posix()),
-        time=f"{result.seconds:.3f}",
-    )
-    if result.status == "failed":
-        text = "\n".join(lines.moved_lines(result.check))
-        failure = ElementTree.SubElement(case, "failure", message=headline(result), type="moved")
-        failure.text = _clean(text)
-    elif result.status == "error":
-        message = _clean(result.message)
-        error = ElementTree.SubElement(case, "error", message=message, type="error")
-        error.text = message
+        names = {"name": _clean(result.name), "file": _clean(result.path.as_posix())}
+        time = f"{result.seconds:.3f}"
+        case = SubElement(suite, "testcase", names, classname="fotismos.check", time=time)
+        if result.status == "failed":
+            failure = SubElement(case, "failure", message=headline(result), type="moved")
+            failure.text = _clean("\n".join(lines.moved_lines(result.check)))
+        elif result.status == "error":
+            error = SubElement(case, "error", message=headline(result), type="error")
+            error.text = headline(result)
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True)
 
 
 def headline(result):
@@ -52,8 +41,8 @@ def headline(result):
     first, *others = result.check.moved
     more = f", and {len(others)} more" if others else ""
     return _clean(
-        f"{first.before.name} moved from {first.before.value:.6g} to {first.after.value:.6g}"
-        f" (p = {first.corrected:.1g}){more}"
+        f"{first.quantity} moved from {first.before:.6g} to {first.after:.6g}"
+        f" (p = {first.p_corrected:.1g}){more}"
     )
 
 

@@ -1,7 +1,6 @@
 """The results of checks as lines for a terminal."""
 
-from rich.console import Console
-from rich.table import Table
+from reports.terminal.tables import printed, ruled
 
 SHOWN = 12
 """Quantities of a scene that are listed; all are in the record."""
@@ -12,7 +11,7 @@ def lines(results, level):
     for result in results:
         yield from _details(result)
     if len(results) > 1:
-        yield from _printed(_summary(results))
+        yield from printed(_summary(results))
         yield ""
     yield verdict(results, level)
 
@@ -34,27 +33,34 @@ def verdict(results, level):
 
 def moved_lines(check):
     """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
-    table = _table("what moved", "baseline", "now", "change", "standard errors", "p")
+    table = ruled("what moved", "baseline", "now", "change", "standard errors", "p", right=2)
     for move in check.moved[:SHOWN]:
-        old, new = move.before.value, move.after.value
-        errors = move.standard_errors
-        table.add_row(
-            move.before.name,
-            f"{old:.6g}",
-            f"{new:.6g}",
-            f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}",
-            "no noise" if errors is None else f"{errors:+.1f}",
-            f"{move.corrected:.1g}" if move.corrected else "0",
-        )
-    yield from _printed(table)
+        old, new = move.before, move.after
+        change = f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}"
+        name, before, now, *certainty = moved_cells(move)
+        table.add_row(name, before, now, change, *certainty)
+    yield from printed(table)
     more = len(check.moved) - SHOWN
     if more > 0:
         yield f"and {more} more; {len(check.moves)} quantities were tested"
 
 
+def moved_cells(move):
+    """Return what a table says of a move: its name, from, to, standard errors and p-value."""
+    errors = move.standard_errors
+    return (
+        move.quantity,
+        f"{move.before:.6g}",
+        f"{move.after:.6g}",
+        "no noise" if errors is None else f"{errors:+.1f}",
+        f"{move.p_corrected:.1g}",
+    )
+
+
 def versions_line(result):
     """Return what else changed since the baseline, or nothing."""
-    changes = ", ".join(f"{name} {a} -> {b}" for name, (a, b) in (result.versions or {}).items())
+    changed = (result.versions or {}).items()
+    changes = ", ".join(f"{name} {both.before} -> {both.after}" for name, both in changed)
     return f"versions since the baseline: {changes}" if changes else ""
 
 
@@ -75,30 +81,17 @@ def _details(result):
 
 
 def _summary(results):
-    table = _table("baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time")
+    headings = ("baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time")
+    table = ruled(*headings, right=2)
     for result in results:
         row = [result.name, result.status]
         if result.check is not None:
             check = result.check
             old, new = (m.metrics["dE2000"].value for m in (check.before, check.after))
-            least = min(move.corrected for move in check.moves)
+            least = min(move.p_corrected for move in check.moves)
             row += [str(len(check.moved)), str(len(check.moves)), f"{old:.3f}", f"{new:.3f}"]
             row += [f"{least:.2g}"]
         else:
             row += [""] * 5
         table.add_row(*row, f"{result.seconds:.1f} s")
     return table
-
-
-def _table(*headings):
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for number, heading in enumerate(headings):
-        table.add_column(heading, overflow="fold", justify="right" if number > 1 else "left")
-    return table
-
-
-def _printed(table):
-    console = Console(width=120)
-    with console.capture() as capture:
-        console.print(table)
-    return [line.rstrip() for line in capture.get().splitlines()]

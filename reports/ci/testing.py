@@ -8,14 +8,12 @@ from functools import total_ordering
 from pathlib import Path
 
 from comparisons.case import Request, open_case
-from comparisons.check import check as checking
+from comparisons.check import check
 from comparisons.check.measurement import PASSES
 from comparisons.check.moved import LEVEL
+from comparisons.intervals import student
 from heuristic.errors import InputError, unknown
-from reports.ci import baselines, checks
-from reports.ci import lines as lines
-
-CONFIDENCE = 0.95
+from reports.ci import baselines, checks, lines
 
 
 @total_ordering
@@ -57,10 +55,8 @@ class Departure:
     @property
     def interval(self):
         """Return the 95 % interval of Student's t."""
-        from scipy.special import stdtrit
-
-        half = self.error * float(stdtrit(self.passes - 1, (1 + CONFIDENCE) / 2))
-        return self.value - half, self.value + half
+        amount = student(self.value, self.error, self.passes)
+        return amount.low, amount.high
 
     def fotismos_explanation(self):
         """Return the lines that an assertion's message gets."""
@@ -112,8 +108,8 @@ class Fotismos:
         -------
         Departure
         """
-        case = checking.made_small(self._open(self._found(scene), options, "scene"))
-        found = checking.measure_scene(case.source, case.options).measurement
+        case = check.made_small(self._open(self._found(scene), options, "scene"))
+        found = check.measure_scene(case.source, case.options).measurement
         if metric not in found.metrics:
             raise unknown("metric", metric, found.metrics)
         measured = found.metrics[metric]
@@ -164,7 +160,7 @@ class Fotismos:
             if not self.update:
                 raise AssertionError(
                     f"{path}: the baseline has other options than the test: {others}."
-                    " `pytest --fotismos-update` writes it anew."
+                    " `pytest --fotismos-update` writes it again."
                 )
             checks.create(path, file.baseline.scene, case)
         elif self.update:

@@ -1,6 +1,5 @@
 """``fotismos check``: whether a change moved anything that was measured before."""
 
-import json
 from pathlib import Path
 
 import click
@@ -68,8 +67,9 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     }
     _require_consistent(update, scenes, images, given)
     jobs.check_installation()
+    from comparisons.records import to_json
     from reports.ci import annotations, check_record, lines
-    from reports.ci import junit as junit_xml
+    from reports.ci.junit import document
 
     if update:
         results = _update(baseline, scenes, images, significance, given)
@@ -78,10 +78,9 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     _report_errors(results)
     notes = annotations.annotate(results, output, significance)
     if junit is not None:
-        _write(junit, junit_xml.document(results))
+        _write(junit, document(results))
     if as_json:
-        data = check_record.summary(results, significance)
-        click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+        click.echo(to_json(check_record.of_all(results, significance)), nl=False)
     elif not verbosity.is_quiet():
         for line in lines.lines(results, significance):
             click.echo(line)

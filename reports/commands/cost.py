@@ -1,7 +1,5 @@
 """``fotismos cost``: what each step of accuracy costs in time."""
 
-import json
-
 import click
 
 from reports.asked import jobs
@@ -33,29 +31,29 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
     from comparisons.case import open_case
-    from comparisons.cost.cost import Effort
-    from comparisons.cost.cost import cost as run
-    from reports.charts import figures as prints
+    from comparisons.cost.cost import Effort, cost
+    from comparisons.records import to_json
+    from reports.charts.figures import write_cost
     from reports.files import ownership
-    from reports.run import cost_files as results
-    from reports.run import output as folders
+    from reports.run import cost_files
+    from reports.run.output import FIGURES, TABLES, folder_name, prepare
     from reports.terminal import cost_tables, progress, tables
 
-    folder = folders.prepare(output)
+    folder = prepare(output)
     case = open_case(scene, jobs.request(rendering))
-    place = folder / folders.folder_name(case.name, ())
-    for used in (place, folder / folders.TABLES, *([folder / folders.FIGURES] if figures else ())):
+    place = folder / folder_name(case.name, ())
+    for used in (place, folder / TABLES, *([folder / FIGURES] if figures else ())):
         ownership.require_free_folder(used)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     words = case.command("cost", rounds=rounds)
     with progress.shown() as bar:
-        study = run(case.source, case.options, effort, bar.of(case.name), words)
-    results.write(place, study)
-    tables.write_cost(folder / folders.TABLES, place.name, study.data)
+        study = cost(case.source, case.options, effort, bar.of(case.name), words)
+    cost_files.write(place, study)
+    tables.write_cost(folder / TABLES, place.name, study.record)
     if figures:
-        prints.write_cost(folder / folders.FIGURES, place.name, study.data)
+        write_cost(folder / FIGURES, place.name, study.record)
     if as_json:
-        click.echo(json.dumps(study.data, indent=2, ensure_ascii=False))
+        click.echo(to_json(study.record), nl=False)
         return
-    verbosity.tell(cost_tables.lines(study.data))
+    verbosity.tell(cost_tables.lines(study.record))
     verbosity.tell_where(place / "cost.svg")

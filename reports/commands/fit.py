@@ -61,34 +61,34 @@ def fit(scenes, output, form, as_json, markdown, **words):
     jobs.check_installation()
     from comparisons import atomic
     from comparisons.case import open_case
-    from comparisons.fit.fit import FitOptions
-    from comparisons.fit.fit import fit as run
+    from comparisons.fit.fit import FitOptions, fit
+    from comparisons.records import plain
     from heuristic.materials import FORMS
     from reference.scene.graph import set_variant
     from reports.files import ownership
     from reports.run import fit_files
-    from reports.run import output as folders
+    from reports.run.output import folder_name, prepare
     from reports.terminal import progress
 
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
-    folder = folders.prepare(output)
+    folder = prepare(output)
     wanted = [open_case(name, jobs.request(words)) for name in scenes]
     records, places = [], []
     for case in wanted:
-        places.append(folders.folder_name(case.name, places))
+        places.append(folder_name(case.name, places))
         ownership.require_free_folder(folder / places[-1])
     with progress.shown() as bar:
         for case in wanted:
             set_variant(case.variant)
             command = case.command("fit", **fitting_words, form=form)
-            result = run(case.source, case.options, chosen, bar.of(case.name), command)
+            result = fit(case.source, case.options, chosen, bar.of(case.name), command)
             fit_files.write(folder / places.pop(0), result)
-            records.append(result.data)
+            records.append(result.record)
     if markdown:
         atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:
-        click.echo(json.dumps(records, indent=2, ensure_ascii=False))
+        click.echo(json.dumps(plain(records), indent=2, ensure_ascii=False))
         return
     for record in records:
         verbosity.tell(fit_files.lines(record))

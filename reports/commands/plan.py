@@ -1,7 +1,5 @@
 """``fotismos plan``: which effects a scene calls for."""
 
-import json
-
 import click
 
 from reports.asked import jobs
@@ -24,21 +22,23 @@ def plan(scene, as_json, verify, **rendering):
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.check_installation()
     from comparisons.case import open_case
+    from comparisons.records import to_json
     from reports.terminal import plan_lines, progress
 
     case = open_case(scene, jobs.request(rendering))
     if verify:
-        from comparisons.verification import verify as run
+        from comparisons import verification
 
         with progress.shown() as bar:
-            data = run(case.source, case.options, bar.of(case.name)).data()
-        lines = plan_lines.verification_lines([data])
+            found = verification.verify(case.source, case.options, bar.of(case.name))
+        lines = plan_lines.verification_lines([found])
     else:
         from comparisons.compare import prepare
 
-        data = plan_lines.data(case.name, prepare(case.source, case.options), case.variant)
-        lines = plan_lines.lines(data)
+        ready = prepare(case.source, case.options)
+        found = plan_lines.report(case.name, ready, case.variant)
+        lines = plan_lines.lines(found)
     if as_json:
-        lines = [json.dumps(data, indent=2, ensure_ascii=False)]
+        lines = [to_json(found).rstrip()]
     for line in lines:
         click.echo(line)

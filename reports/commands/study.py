@@ -61,13 +61,13 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     jobs.check_installation()
     from comparisons.pool import cores
     from comparisons.study import cluster, design, running
-    from reports.run import output as files
     from reports.run import study_files
+    from reports.run.output import prepare
     from reports.terminal import progress
 
     wanted = design.read(file)
     page = study_files.page(wanted, file, findings)
-    folder = files.prepare(output or Path("out", wanted.name))
+    folder = prepare(output or Path("out", wanted.name))
     study_files.require_free(wanted, folder)
     if scheduler:
         spreading = cluster.connected(scheduler)

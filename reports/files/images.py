@@ -7,7 +7,6 @@ printed beside the picture; values beyond them take the colour of the end.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from io import BytesIO
 
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from comparisons.departure.metrics import LOG2_RANGE, METRICS
+from comparisons.departure.metrics import LEADING, RATIO, drawn
+from comparisons.record import Images
 
 Bytes = NDArray[np.uint8]
 
@@ -87,45 +87,29 @@ def png(picture: Image.Image, longest: int | None = None) -> bytes:
     return buffer.getvalue()
 
 
-def pictures(
-    heuristic: ArrayLike,
-    reference: ArrayLike,
-    maps: Mapping[str, ArrayLike],
-    significant: ArrayLike,
-    *,
-    counted: ArrayLike | None = None,
-    exposure: float = 1.0,
-    longest: int | None = None,
-) -> dict[str, bytes]:
-    """The PNG files of a comparison by name, as `reports.page.page.render` shows them.
+def pictures(shown: Images, exposure: float = 1.0, longest: int | None = None) -> dict[str, bytes]:
+    """The PNG files of a comparison by name, each map over the fixed range of its metric.
 
-    maps
-        "log2_luminance" and any of `METRICS` by name, each (H, W); drawn
-        over the metric's `map_range`, and over ±`LOG2_RANGE` stops.
     longest
         As for `png`: None for files, about 1600 for pictures inside a page.
     """
     made = {
-        "heuristic": tonemap(heuristic, exposure),
-        "reference": tonemap(reference, exposure),
-        "significant": mask_map(significant, counted),
+        "heuristic": tonemap(shown.heuristic, exposure),
+        "reference": tonemap(shown.reference, exposure),
+        "significant": mask_map(shown.significant, shown.counted),
+        RATIO.name: signed_map(shown.maps[RATIO.name], RATIO.limit),
     }
-    for name, values in maps.items():
-        if name == "log2_luminance":
-            made[name] = signed_map(values, LOG2_RANGE)
-        else:
-            made[name] = error_map(values, METRICS[name].map_range[1])
+    for name, metric in drawn().items():
+        made[name] = error_map(shown.maps[name], metric.map_range[1])
     return {name: png(picture, longest) for name, picture in made.items()}
 
 
-def thumbnails(
-    heuristic: ArrayLike, reference: ArrayLike, error: ArrayLike, exposure: float = 1.0
-) -> dict[str, bytes]:
-    """Small PNG files of both halves and of the map of ΔE2000, as cards show them."""
+def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
+    """Small PNG files of both halves and of the map by which scenes are judged, for cards."""
     made = {
-        "heuristic": tonemap(heuristic, exposure),
-        "reference": tonemap(reference, exposure),
-        "dE2000": error_map(error, METRICS["dE2000"].map_range[1]),
+        "heuristic": tonemap(shown.heuristic, exposure),
+        "reference": tonemap(shown.reference, exposure),
+        LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
     }
     return {name: png(picture, THUMBNAIL) for name, picture in made.items()}
 

@@ -1,47 +1,59 @@
 """The cost of accuracy over all scenes: what each method takes, and the error that it leaves."""
 
-METHODS = (
-    "flat kernel",
-    "Phong kernel",
-    "kernel with shadows",
-    "phong BSDF, full transport",
-    "direct",
-    "full plan",
-)
-"""The rungs that every scene has under some name, cheapest idea first."""
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from comparisons.cost.cost_record import Cost
+from comparisons.cost.timing import Measured
+from comparisons.effects.prices import Price
 
 
-def rows(records):
-    """Return a row for each ``cost.json``: its scene, a cell a method, and what is worth most.
+@dataclass(frozen=True)
+class Cell:
+    """A method on one scene: its point of most samples.
 
-    A cell is the rung's point of most samples. A method that the scene cannot tell from another one
-    shares its rung, and ``merged`` is set in its cell but the first.
+    A method that the scene cannot tell from another one shares its rung; all cells of the rung but
+    the first are ``merged``.
     """
-    return [
-        {
-            "scene": record["scene"],
-            "cells": _cells(record),
-            "best": _best(record),
-            "departure": record["prices"]["departure"],
-        }
-        for record in records
-    ]
+
+    point: Measured
+    merged: bool
 
 
-def _cells(record):
+@dataclass(frozen=True)
+class Row:
+    """A scene: a cell for each method, None where it has none, and the effect worth most."""
+
+    record: Cost
+    cells: tuple[Cell | None, ...]
+    best: Price | None
+
+
+def methods(records: Sequence[Cost]) -> tuple[str, ...]:
+    """Return the names of all methods, in the order of the scene that tells most of them apart."""
+    ordered = sorted(records, key=lambda record: -len(record.rungs))
+    rungs = [rung for record in ordered for rung in record.rungs]
+    return tuple(dict.fromkeys(name for rung in rungs for name in rung.names))
+
+
+def rows(records: Sequence[Cost]) -> list[Row]:
+    """Return a row for each record, whose cells are in the order of :func:`methods`."""
+    names = methods(records)
+    return [Row(record, _cells(record, names), _best(record)) for record in records]
+
+
+def _cells(record, names):
     cells, seen = [], set()
-    for method in METHODS:
-        rung = next((r["name"] for r in record["rungs"] if method in r["names"]), None)
+    for name in names:
+        rung = next((rung.name for rung in record.rungs if name in rung.names), None)
         if rung is None:
             cells.append(None)
             continue
-        points = [point for point in record["points"] if point["rung"] == rung]
-        last = max(points, key=lambda point: point["spp"])
-        cells.append(last | {"merged": rung in seen})
+        last = max(record.points_of(rung), key=lambda point: point.spp)
+        cells.append(Cell(last, merged=rung in seen))
         seen.add(rung)
-    return cells
+    return tuple(cells)
 
 
 def _best(record):
-    prices = record["prices"]["effects"]
-    return max(prices, key=lambda price: price["removes"]["value"]) if prices else None
+    return max(record.prices.effects, key=lambda price: price.removes.value, default=None)

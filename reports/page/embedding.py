@@ -15,12 +15,14 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import drawn
+from comparisons.records import Record, plain
 
 #: Significant digits of values, and of the standard error.
 DIGITS, ERROR_DIGITS = 3, 2
@@ -40,8 +42,7 @@ SIGNIFICANT, COUNTED = 1, 2
 Codes = NDArray[np.uint16]
 
 
-@dataclass(frozen=True)
-class Plane:
+class Plane(Record):
     """One channel: its name, its digits (0: the codes are the values), and its base plane."""
 
     name: str
@@ -49,8 +50,7 @@ class Plane:
     base: str | None = None
 
 
-@dataclass(frozen=True)
-class Embedded:
+class Embedded(Record):
     """The images of a comparison, for the page.
 
     width, height
@@ -67,9 +67,9 @@ class Embedded:
     planes: tuple[Plane, ...]
     data: str
 
-    def manifest(self) -> dict:
+    def manifest(self) -> dict[str, Any]:
         """What is needed to read `data`, as plain data."""
-        return {key: value for key, value in asdict(self).items() if key != "data"}
+        return plain(structs.replace(self, data=""))
 
 
 def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
@@ -93,7 +93,7 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
         for colour in "GRB":
             name, base = f"{layer}.{colour}", None if colour == "G" else f"{layer}.G"
             add(name, _means(channels[name], block), DIGITS, base)
-    for name in METRICS:
+    for name in drawn():
         add(name, _means(channels[f"{name}.Y"], block), DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
     add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)

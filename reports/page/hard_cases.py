@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import base64
 import math
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
+from comparisons.hard.cases import Convention, HardCase, Outcome
 from comparisons.hard.collection import HardCases
-from comparisons.hard.furnace import ANGLES
+from comparisons.hard.furnace import ANGLES, Furnace
 from reports.files import images
 
 #: Groups of cases in the order of the page.
@@ -35,57 +37,72 @@ NOTES = {
 }
 
 
-def view(record: HardCases) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Row:
+    """A case; an error that is not finite is None."""
+
+    case: HardCase
+    naive: float | None
+    ours: float | None
+    holds: bool
+
+
+@dataclass(frozen=True)
+class Group:
+    """Cases under one heading, and what their errors are of."""
+
+    title: str
+    note: str | None
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One thing seen by the naive formula and by ours, as data URIs."""
+
+    title: str
+    naive: str
+    ours: str
+
+
+@dataclass(frozen=True)
+class HardCasesView:
     """What the template ``hard_cases.html.j2`` shows.
 
-    groups
-        Each with its ``title``, ``note`` and ``rows``: case, hard, naive, ours, bound and holds. An
-        error that is infinite stands as None, and is printed as the NaN or infinity that it is.
-    conventions
-        What is laid down: case, text and holds.
-    pictures
-        Each with its ``title`` and the two images as data URIs.
-    furnaces, angles
-        The models' albedo under light from each angle, and their asymmetry.
+    ``conventions`` are pairs of what is laid down and whether it holds; ``furnaces`` the models'
+    albedo under light from each of ``angles``, and their asymmetry.
     """
-    return {
-        "groups": [
-            {
-                "title": title,
-                "note": NOTES.get(group),
-                "rows": [_row(o) for o in record.outcomes if o.case.group == group],
-            }
-            for group, title in GROUPS.items()
-        ],
-        "conventions": [
-            {"case": convention.name, "text": convention.text, "holds": holds}
-            for convention, holds in record.conventions
-        ],
-        "pictures": [
-            {"title": picture.title, "naive": _uri(picture.naive), "ours": _uri(picture.ours)}
-            for picture in record.pictures
-        ],
-        "furnaces": record.furnaces,
-        "angles": ANGLES,
-    }
+
+    groups: tuple[Group, ...]
+    conventions: tuple[tuple[Convention, bool], ...]
+    pictures: tuple[Pair, ...]
+    furnaces: tuple[Furnace, ...]
+    angles: tuple[float, ...] = ANGLES
 
 
-def _row(outcome):
-    return {
-        "case": outcome.case.name,
-        "hard": outcome.case.hard,
-        "naive": _finite(outcome.naive_error),
-        "ours": _finite(outcome.our_error),
-        "bound": outcome.case.bound,
-        "holds": outcome.holds,
-    }
+def view(record: HardCases) -> HardCasesView:
+    """Group the cases, and make the pictures part of the page."""
+    groups = (
+        Group(title, NOTES.get(name), tuple(map(_row, record.of_group(name))))
+        for name, title in GROUPS.items()
+    )
+    return HardCasesView(
+        groups=tuple(groups),
+        conventions=record.conventions,
+        pictures=tuple(Pair(p.title, _uri(p.naive), _uri(p.ours)) for p in record.pictures),
+        furnaces=record.furnaces,
+    )
 
 
-def _finite(value):
-    return value if math.isfinite(value) else None
+def _row(outcome: Outcome) -> Row:
+    naive, ours = (
+        error if math.isfinite(error) else None
+        for error in (outcome.naive_error, outcome.our_error)
+    )
+    return Row(outcome.case, naive, ours, outcome.holds)
 
 
-def _uri(image):
+def _uri(image: ArrayLike) -> str:
     grey = np.repeat(np.nan_to_num(np.float32(image))[..., None], 3, axis=2)
     picture = images.tonemap(grey).resize((320, 320), Image.Resampling.NEAREST)
     return "data:image/png;base64," + base64.b64encode(images.png(picture)).decode("ascii")

@@ -4,49 +4,53 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from comparisons.departure.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
+from comparisons.departure.metrics import RATIO, drawn
 from reports.files import images
 
 
 @dataclass(frozen=True)
 class Legend:
-    """A map's colour bar: title, CSS background, labels from low to high, and a sentence."""
+    """A map: how it is drawn, its colour bar, labels from low to high, and a sentence.
+
+    ``kind`` is ``error``, ``ratio`` or ``mask``; ``top`` the end of the bar.
+    """
 
     name: str
     title: str
-    bar: str
-    labels: tuple[str, ...]
-    note: str
+    kind: str
+    top: float = 1.0
+    bar: str = ""
+    labels: tuple[str, ...] = ()
+    note: str = ""
 
 
 def legends() -> tuple[Legend, ...]:
     """The maps in the order of the page."""
-    maps = [
-        Legend(
-            metric.name,
-            metric.label,
-            images.colour_bar(images.ERROR_COLOURS),
-            _labels(*metric.map_range),
-            metric.unit,
-        )
-        for metric in METRICS.values()
-    ]
+    limit = RATIO.limit
     return (
-        *maps,
-        Legend(
-            "log2_luminance",
-            "Luminance ratio",
-            images.colour_bar(images.SIGNED_COLOURS),
-            (f"≤ −{LOG2_RANGE:g}", "0", f"≥ +{LOG2_RANGE:g} stops"),
-            f"log2 of heuristic over reference, red where the heuristic is brighter; "
-            f"ε = {LOG2_EPSILON:g}",
+        *(
+            Legend(
+                metric.name,
+                metric.label,
+                "error",
+                metric.map_range[1],
+                images.colour_bar(images.ERROR_COLOURS),
+                _labels(*metric.map_range),
+                metric.unit,
+            )
+            for metric in drawn().values()
         ),
         Legend(
-            "significant",
-            "Significant difference",
-            "",
-            (),
-            "more than the reference's noise",
+            RATIO.name,
+            RATIO.label,
+            "ratio",
+            limit,
+            images.colour_bar(images.SIGNED_COLOURS),
+            (f"≤ −{limit:g}", "0", f"≥ +{limit:g} {RATIO.unit}"),
+            RATIO.definition,
+        ),
+        Legend(
+            "significant", "Significant difference", "mask", note="more than the reference's noise"
         ),
     )
 

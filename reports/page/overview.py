@@ -2,62 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.metric import Metric
+from comparisons.departure.metrics import LEADING, METRICS
 from reports.terminal.printing import about_noise
 
 
 @dataclass(frozen=True)
 class Column:
-    """What scenes can be sorted by: a key, its words, and its heading with line breaks."""
+    """What scenes can be sorted by: a key, its words, its number, and how that is shown.
+
+    ``form`` is one of the macro ``value``, ``style`` a class; the ``leading`` column is the one in
+    which scenes are judged.
+    """
 
     key: str
     title: str
-    heading: Markup
+    value: Callable[[ComparisonRecord], float]
+    form: str = "number"
+    style: str = ""
+    leading: bool = False
+
+    @property
+    def heading(self) -> Markup:
+        """The words as a heading of a narrow column."""
+        return escape(self.title[0].upper() + self.title[1:]).replace(", ", Markup(",<br>"))
 
 
-#: The columns of the overview, in order.
-COLUMNS = tuple(
-    Column(key, title, Markup(heading))
-    for key, title, heading in (
-        ("name", "scene", "Scene"),
-        ("dE2000", "ΔE2000, mean", "ΔE2000,<br>mean"),
-        ("shape", "ΔE2000 after the best exposure", "ΔE2000, best<br>exposure"),
-        ("noise", "ΔE2000, noise floor", "ΔE2000,<br>noise floor"),
-        ("dE_ITP", "ΔE ITP, mean", "ΔE ITP,<br>mean"),
-        ("dE_CAM16UCS", "CAM16-UCS, mean", "CAM16-UCS,<br>mean"),
-        ("rmse", "RMSE, linear", "RMSE,<br>linear"),
-        ("marked", "significant pixels", "Significant<br>pixels"),
-        ("heuristic_s", "time of the heuristic", "Heuristic,<br>all passes"),
-        ("reference_s", "time of the reference", "Reference,<br>all passes"),
+def columns() -> tuple[Column, ...]:
+    """The columns of the overview after the scene's name, in order."""
+    lead, name = LEADING.label, LEADING.name
+    return (
+        Column(name, LEADING.heading, _mean(LEADING), style="strong", leading=True),
+        Column("shape", f"{lead}, best exposure", lambda r: r.metrics[name].after_exposure.mean),
+        Column(
+            "noise", f"{lead}, noise floor", lambda r: r.metrics[name].noise_floor, style="quiet"
+        ),
+        *(
+            Column(metric.name, metric.heading, _mean(metric))
+            for metric in METRICS.values()
+            if metric is not LEADING
+        ),
+        Column("marked", "significant pixels", lambda r: r.significant.fraction, "percent"),
+        Column(
+            "heuristic_s", "heuristic, all passes", lambda r: r.time.heuristic.total_s, "seconds"
+        ),
+        Column(
+            "reference_s", "reference, all passes", lambda r: r.time.reference.total_s, "seconds"
+        ),
     )
-)
 
 
-def keys(record: Mapping[str, Any]) -> dict[str, float]:
-    """What each of `COLUMNS` but the name sorts a scene by."""
-    metrics, time = record["metrics"], record["time"]
-    return {
-        "dE2000": metrics["dE2000"]["mean"],
-        "shape": metrics["dE2000"]["after_exposure"]["mean"],
-        "noise": metrics["dE2000"]["noise_floor"],
-        "dE_ITP": metrics["dE_ITP"]["mean"],
-        "dE_CAM16UCS": metrics["dE_CAM16UCS"]["mean"],
-        "rmse": metrics["rmse"]["value"],
-        "marked": metrics["significant"]["fraction"],
-        "heuristic_s": time["heuristic"]["total_s"],
-        "reference_s": time["reference"]["total_s"],
-    }
+def _mean(metric: Metric) -> Callable[[ComparisonRecord], float]:
+    return lambda record: record.metrics[metric.name].mean
 
 
-def is_significant(record: Mapping[str, Any]) -> bool:
+def keys(record: ComparisonRecord) -> dict[str, float]:
+    """What each of `columns` sorts a scene by."""
+    return {column.key: column.value(record) for column in columns()}
+
+
+def is_significant(record: ComparisonRecord) -> bool:
     """Whether a scene departs by more than noise: in some pixels, and in its mean."""
-    metrics = record["metrics"]
-    return metrics["significant"]["fraction"] > 0 and not about_noise(metrics["dE2000"])
+    return record.significant.fraction > 0 and not about_noise(record.metrics[LEADING.name])
 
 
 def identifier(name: str, taken: set[str]) -> str:

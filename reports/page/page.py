@@ -1,7 +1,7 @@
 """The report: one offline HTML file with the pictures, maps and numbers of a run.
 
-`render` reads the records of `comparison.json` (schema: ``reports/comparison.schema.json``) and
-images that are encoded already; it computes nothing that is not in them but how to print a number.
+`render` reads records and images that are encoded already; it computes nothing that is not in them
+but how to print a number.
 Names and messages come from users' files, so everything is escaped, and the page may load nothing:
 a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
 
@@ -22,15 +22,23 @@ from urllib.parse import quote
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from msgspec import structs
 
-from comparisons.departure.metrics import LOG2_EPSILON, LOG2_RANGE, METRICS
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
+from comparisons.departure.regions import Region
 from comparisons.departure.spaces import luminance
+from comparisons.records import plain
+from comparisons.verification import Verification
 from heuristic.equations import Entry
 from reports.charts import histograms, price_chart, vega
 from reports.files import images
 from reports.page import cost_overview, overview
+from reports.page.hard_cases import HardCasesView
 from reports.page.legends import legends
-from reports.run.stages import Run
+from reports.page.scene_view import SceneView
+from reports.run.cost_files import CostView
+from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
 
 #: The page's heading.
@@ -47,8 +55,9 @@ TEMPLATES = Path(__file__).parent / "templates"
 #: The parts of the page's style and of its script, in their order.
 STYLES = ("base", "overview", "scene", "viewer", "print")
 SCRIPTS = (
-    "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address", "viewport",
-    "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts", "main",
+    "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
+    "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
+    "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
@@ -56,45 +65,27 @@ EARLY = 'document.documentElement.className = "js";'
 
 
 def render(
-    comparisons: Sequence[Mapping[str, Any]],
+    views: Sequence[SceneView],
     title: str = TITLE,
     equations: Sequence[Entry] = (),
-    verifications: Sequence[Mapping[str, Any]] = (),
-    hard_cases: Mapping[str, Any] | None = None,
-    failures: Sequence[tuple[str, str]] = (),
+    verifications: Sequence[Verification] = (),
+    hard_cases: HardCasesView | None = None,
+    failures: Sequence[Failure] = (),
     run: Run | None = None,
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
-    Each comparison is a mapping with
-
-    record
-        The scene's record, as in ``comparison.json``.
-    images
-        PNG bytes by name: "heuristic", "reference", the metrics' names, "log2_luminance" and
-        "significant". `reports.files.images.pictures` makes them. A missing one is left out.
-    thumbnails (optional)
-        Small PNG bytes by name: "heuristic", "reference" and "dE2000".
-    embedded (optional)
-        The scene's `reports.page.embedding.Embedded`, without which it has no viewer.
-    charts (optional)
-        `reports.charts.vega.Figure` records of what accuracy costs.
-    cost (optional)
-        What `reports.run.cost_files.view` returns, where the cost of accuracy was studied.
-    files (optional)
-        Paths relative to the page by label, shown as links.
-
-    `equations` is the index of `heuristic.equations`, `verifications` the data of
-    `comparisons.verification`, `hard_cases` what `reports.page.hard_cases.view` returns; each is a
-    section of its own, left out where it is empty. `failures` are the scenes that could not be
-    compared, each with its message. `run` says where the time went.
+    `equations` is the index of `heuristic.equations`; it, `verifications` and `hard_cases` are
+    sections of their own, left out where they are empty. `failures` are the scenes that could not
+    be compared. `run` says where the time went.
     """
     taken: set[str] = set()
-    scenes = [_scene(comparison, taken) for comparison in comparisons]
+    scenes = [_scene(view, taken) for view in views]
     failed = [
-        {"id": overview.identifier(name, taken), "name": name, "message": message}
-        for name, message in failures
+        {"id": overview.identifier(failure.scene, taken), "failure": failure}
+        for failure in failures
     ]
+    costs = [scene["cost"].record for scene in scenes if scene["cost"]]
     charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
     scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
@@ -109,53 +100,50 @@ def render(
             scenes=scenes,
             failures=failed,
             metrics=METRICS,
-            columns=overview.COLUMNS,
+            leading=LEADING,
+            columns=overview.columns(),
             legends=legends(),
             equations=equations,
             hard_cases=hard_cases,
             verifications=verifications,
-            cost_methods=cost_overview.METHODS,
-            cost_rows=cost_overview.rows(s["cost"]["record"] for s in scenes if s["cost"]),
+            cost_methods=cost_overview.methods(costs),
+            cost_rows=cost_overview.rows(costs),
             run=run,
         )
     )
 
 
-def _scene(comparison: Mapping[str, Any], taken: set[str]) -> dict[str, Any]:
-    """What the templates show of a comparison."""
-    record = comparison["record"]
-    return {
-        "id": overview.identifier(record["scene"], taken),
-        "record": record,
-        "images": {name: _data_uri(png) for name, png in comparison["images"].items()},
-        "thumbnails": {
-            name: _data_uri(png) for name, png in comparison.get("thumbnails", {}).items()
-        },
-        "embedded": comparison.get("embedded"),
-        "histograms": histograms.figures(record),
-        "charts": comparison.get("charts", ()),
-        "cost": _cost(comparison.get("cost")),
-        "files": {
-            label: "./" + quote(str(path)) for label, path in comparison.get("files", {}).items()
-        },
+def _scene(view: SceneView, taken: set[str]) -> dict[str, Any]:
+    """What the templates show of a scene: its view with addresses, and what follows from it."""
+    return structs.asdict(view) | {
+        "id": overview.identifier(view.record.scene, taken),
+        "images": {name: _data_uri(png) for name, png in view.images.items()},
+        "thumbnails": {name: _data_uri(png) for name, png in view.thumbnails.items()},
+        "histograms": histograms.figures(view.record),
+        "cost": _cost(view.cost),
+        "files": {label: "./" + quote(path) for label, path in view.files.items()},
     }
 
 
-def _cost(view: Mapping[str, Any] | None) -> dict[str, Any] | None:
+def _cost(view: CostView | None) -> CostView | None:
+    """Turn the pictures into addresses."""
     if view is None:
         return None
-    return {**view, "images": {name: _data_uri(png) for name, png in view["images"].items()}}
+    uris = {name: _data_uri(png) for name, png in view.images.items()}
+    return structs.replace(view, images=uris)
 
 
 def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
     """What the page's script needs: the scenes, and how maps are drawn."""
+    maps = [
+        {"name": item.name, "title": item.title, "kind": item.kind, "top": item.top}
+        for item in legends()
+    ]
+    effects = {"name": "effects", "title": price_chart.TITLE, "kind": "effects", "top": 1}
     return {
         "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
-        "titles": {legend.name: legend.title for legend in legends()}
-        | {"effects": price_chart.TITLE},
+        "maps": [*maps, effects],
         "noEffect": price_chart.NO_EFFECT,
-        "ranges": {name: metric.map_range[1] for name, metric in METRICS.items()}
-        | {"log2_luminance": LOG2_RANGE},
         "colours": {
             "error": images.colour_table(images.ERROR_COLOURS),
             "signed": images.colour_table(images.SIGNED_COLOURS),
@@ -168,29 +156,31 @@ def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str
 
 
 def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
-    record, embedded = scene["record"], scene["embedded"]
+    record: ComparisonRecord = scene["record"]
+    embedded, cost = scene["embedded"], scene["cost"]
     return {
         "id": scene["id"],
-        "name": record["scene"],
-        "width": record["resolution"][0],
-        "height": record["resolution"][1],
-        "exposure": record["viewing"]["exposure"],
-        "regions": record.get("regions", []),
+        "name": record.scene,
+        "width": record.resolution[0],
+        "height": record.resolution[1],
+        "exposure": record.viewing.exposure,
+        "regions": plain(record.regions),
         "images": embedded.manifest() if embedded else None,
-        "effects": scene["cost"]["effects"] if scene["cost"] else None,
+        "effects": plain(cost.effects) if cost else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
         "failed": False,
     }
 
 
-def _failed_data(failure: Mapping[str, str]) -> dict[str, Any]:
-    return {"id": failure["id"], "name": failure["name"], "significant": False, "failed": True}
+def _failed_data(failed: Mapping[str, Any]) -> dict[str, Any]:
+    name = failed["failure"].scene
+    return {"id": failed["id"], "name": name, "significant": False, "failed": True}
 
 
-def _zoom_to(region: Mapping[str, int]) -> float:
+def _zoom_to(region: Region) -> float:
     """Screen pixels for one of the image, where a region is looked at."""
-    return round(min(16.0, REGION_SIZE / max(region["width"], region["height"])), 2)
+    return round(min(16.0, REGION_SIZE / max(region.width, region.height)), 2)
 
 
 def _data_uri(png: bytes) -> str:
@@ -222,6 +212,7 @@ def _environment() -> Environment:
         percent=percent,
         code_spans=code_spans,
         zoom_to=_zoom_to,
+        plain=plain,
     )
     environment.tests["about_noise"] = about_noise
     environment.globals.update(

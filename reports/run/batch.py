@@ -13,7 +13,7 @@ from heuristic.errors import FotismosError
 from reports.asked import jobs
 from reports.run import single
 from reports.run.single import Wanted
-from reports.run.stages import Run
+from reports.run.stages import Failure, Run
 from reports.terminal import verbosity
 
 
@@ -91,7 +91,7 @@ def _compare(run, places, folder, wanted, views, failures):
                 continue
             views[task.name] = done.view
             run.did(done)
-            verbosity.remark(progress.details(done.view["record"]))
+            verbosity.remark(progress.details(done.view.record))
 
 
 def _write(run, folder, views, failures, with_figures, shown):
@@ -99,18 +99,18 @@ def _write(run, folder, views, failures, with_figures, shown):
     from reports.run import output
     from reports.terminal import progress, tables
 
-    run.failures = [{"scene": name, "error": str(error)} for name, error in failures.items()]
+    run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]
     run.begin_page()
     output.write_page(
         folder,
         list(views.values()),
-        failures=[(failure["scene"], failure["error"]) for failure in run.failures],
+        failures=run.failures,
         run=run,
         **shown,
     )
-    output.write_run(folder, run.data())
+    output.write_run(folder, run.record())
     if views:
-        records = [view["record"] for view in views.values()]
+        records = [view.record for view in views.values()]
         tables.write(folder / output.TABLES, records)
         if with_figures:
             from reports.charts import figures

@@ -4,19 +4,17 @@
 key of all that it depends on. It is written with the other results, atomically.
 """
 
-from base64 import b64decode, b64encode
-from dataclasses import asdict
+from pathlib import Path
 
-from markupsafe import Markup
+import msgspec
 
+from comparisons.departure.metrics import METRICS
+from comparisons.records import VERSION, plain
 from comparisons.store import Entry
-from reports.charts.vega import Figure
-from reports.page.embedding import Embedded, Plane
+from heuristic.errors import InputError
+from reports.page.scene_view import SceneView
 
 FILE = "view.json"
-
-PICTURES = ("images", "thumbnails")
-"""Of a view: PNG bytes by name."""
 
 
 def key_of(passes, options, with_cost, figures):
@@ -24,59 +22,24 @@ def key_of(passes, options, with_cost, figures):
 
     ``passes`` is what `reports.run.kept.key_of` returns.
     """
-    return f"{passes} noise={options.noise} cost={with_cost} figures={figures}"
+    written = f"version={VERSION} metrics={','.join(METRICS)} cost={with_cost} figures={figures}"
+    return f"{passes} noise={options.noise} {written}"
 
 
-def save(place, key, view):
-    """Write the file of a view, which `reports.run.output.write_scene` returns, to a folder."""
-    study = view["cost"]
-    _entry(place, key).save(
-        view
-        | {name: _encoded(view[name]) for name in PICTURES}
-        | {
-            "embedded": asdict(view["embedded"]),
-            "charts": [asdict(figure) for figure in view["charts"]],
-            "cost": study and study | {"images": _encoded(study["images"])},
-        }
-    )
+def save(place: Path, key: str, view: SceneView) -> None:
+    """Write the file of a view, which `output.write_scene` returns, to a folder."""
+    Entry(place / FILE, key).save({"view": plain(view)})
 
 
-def load(place, key):
+def load(place: Path, key: str) -> SceneView | None:
     """Return the view of the results in a folder; None where they are not those of the key."""
-    view = _entry(place, key).load()
-    if view is None:
+    kept = Entry(place / FILE, key).load()
+    if kept is None:
         return None
     try:
-        if not all((place.parent / file).is_file() for file in view["files"].values()):
-            return None
-        study = view["cost"]
-        return (
-            view
-            | {name: _decoded(view[name]) for name in PICTURES}
-            | {
-                "embedded": _embedded(view["embedded"]),
-                "charts": [
-                    Figure(**figure | {"svg": Markup(figure["svg"])}) for figure in view["charts"]
-                ],
-                "cost": study and study | {"images": _decoded(study["images"])},
-            }
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None  # not a view
-
-
-def _entry(place, key):
-    return Entry(place / FILE, key)
-
-
-def _embedded(given):
-    planes = tuple(Plane(**plane) for plane in given["planes"])
-    return Embedded(**given | {"planes": planes})
-
-
-def _encoded(pictures):
-    return {name: b64encode(png).decode("ascii") for name, png in pictures.items()}
-
-
-def _decoded(pictures):
-    return {name: b64decode(text, validate=True) for name, text in pictures.items()}
+        # JSON has no bytes: pictures are text in it.
+        view = msgspec.convert(kept.get("view"), SceneView, builtin_types=())
+    except (msgspec.ValidationError, InputError):
+        return None  # not a view of this version
+    linked = [place.parent / file for file in view.files.values()]
+    return view if all(map(Path.is_file, linked)) else None

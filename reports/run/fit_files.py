@@ -1,18 +1,16 @@
 """Fits as tables for a terminal and in Markdown, and the files of one fit."""
 
-import json
 from io import BytesIO
 from pathlib import Path
 
 import matplotlib
 from PIL import Image, ImageDraw, ImageFont
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING, drawn
+from comparisons.records import to_json
 from reports.files import images, ownership
+from reports.terminal import tables
 from reports.terminal.tables import printed, ruled
-
-SHOWN = "dE2000"
-"""The metric of the residual map in the picture."""
 
 SMALLEST_TILE = 256
 """Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
@@ -26,8 +24,7 @@ def write(folder, fit):
     """Write ``fit.json`` and ``fit.png`` to a folder."""
     ownership.folder(folder)
     ownership.write(folder / "fit.png", picture(fit))
-    text = json.dumps(fit.data, indent=2, ensure_ascii=False, allow_nan=False)
-    ownership.write(folder / "fit.json", text + "\n")
+    ownership.write(folder / "fit.json", to_json(fit.record))
 
 
 def picture(fit):
@@ -35,14 +32,13 @@ def picture(fit):
 
     Pictures as a display shows them; the map is over the metric's fixed range.
     """
-    exposure = fit.data["viewing"]["exposure"]
-    metric = METRICS[SHOWN]
-    high = metric.map_range[1]
+    exposure = fit.record.viewing.exposure
+    high, residual = LEADING.map_range[1], fit.images.maps[LEADING.name]
     tiles = {
         "paired": images.tonemap(fit.images.before, exposure),
         "reference": images.tonemap(fit.images.reference, exposure),
-        f"fitted ({_form(_best(fit.data))})": images.tonemap(fit.images.after, exposure),
-        f"{metric.label} left, 0 to {high:g}": images.error_map(fit.images.maps[SHOWN], high),
+        f"fitted ({_form(fit.record.nearest)})": images.tonemap(fit.images.after, exposure),
+        f"{LEADING.label} left, 0 to {high:g}": images.error_map(residual, high),
     }
     width, height = next(iter(tiles.values())).size
     factor = max(1, -(-SMALLEST_TILE // min(width, height)))
@@ -59,17 +55,17 @@ def picture(fit):
     return buffer.getvalue()
 
 
-def lines(data):
+def lines(record):
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
-    best = _best(data)
-    yield f"{data['scene']}: {data['loss']['name']} loss, {_form(best)} comes nearest"
+    best = record.nearest
+    yield f"{record.scene}: {record.loss.name} loss, {_form(best)} comes nearest"
     yield ""
-    yield from printed(_departures(data))
+    yield from printed(_departures(record))
     yield ""
     yield from printed(_parameters(best))
-    for material in best["materials"]:
-        if material["reference"]:
-            yield f"reference of {material['name']}: {_described(material['reference'])}"
+    for material in best.materials:
+        if material.reference:
+            yield f"reference of {material.name}: {_described(material.reference)}"
     yield ""
 
 
@@ -86,83 +82,79 @@ def markdown(records, scenes):
         " give (*floor*). *Parameter error* is before less after, *model error* is after."
     )
     yield ""
-    labels = [metric.label for metric in METRICS.values()]
+    labels = [metric.label for metric in drawn().values()]
     heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
-    yield from _row([*heading, "parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"])
-    yield from _row(["---"] * 2 + ["---:"] * (len(labels) + 3))
-    for data in records:
-        best, seconds = _best(data), sum(data["time"].values())
-        departures = [best["departure"][name] for name in METRICS]
-        cells = [
-            f"{d['before']:.3f} → {d['after']:.3f} ({d['noise_floor']:.3f})" for d in departures
-        ]
-        parts = [_three(departures[0][key]) for key in ("parameter_error", "model_error")]
-        yield from _row([data["scene"], best["form"], *cells, *parts, f"{seconds:.1f}"])
+    heading += ["parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"]
+    yield from tables.markdown(heading, map(_scene_cells, records), right=2)
     yield ""
     yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
     yield ""
-    yield from _row(["scene", "form", "k_a", "k_d", "k_s", "n", "reference"])
-    yield from _row(["---"] * 7)
-    for data in records:
-        for record in (fit for fit in data["fits"] if not fit["normalised"]):
-            for material in record["materials"]:
-                found = {
-                    p["name"]: f"{p['paired']:.3g} → {_value(p)}" for p in material["parameters"]
-                }
-                cells = [found.get(name, "") for name in ("k_a", "k_d", "k_s", "n")]
-                reference = _described(material["reference"] or {"plugin": ""})
-                yield from _row([data["scene"], record["form"], *cells, reference])
+    heading = ("scene", "form", "k_a", "k_d", "k_s", "n", "reference")
+    rows = (
+        [record.scene, fit.form, *_material_cells(material)]
+        for record in records
+        for fit in record.fits
+        if not fit.normalised
+        for material in fit.materials
+    )
+    yield from tables.markdown(heading, rows, right=len(heading))
 
 
-def _row(cells):
-    yield f"| {' | '.join(cells)} |"
+def _scene_cells(record):
+    departures = [record.nearest.departure[name] for name in drawn()]
+    cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
+    parts = [_three(departures[0].parameter_error), _three(departures[0].model_error)]
+    return [record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"]
 
 
-def _best(data):
-    return data["fits"][data["best"]]
+def _material_cells(material):
+    found = {p.name: f"{p.paired:.3g} → {_value(p)}" for p in material.parameters}
+    reference = _described(material.reference or {"plugin": ""})
+    return [*(found.get(name, "") for name in ("k_a", "k_d", "k_s", "n")), reference]
 
 
 def _form(fit):
-    return fit["form"] + (" (normalised)" if fit["normalised"] else "")
+    return fit.form + (" (normalised)" if fit.normalised else "")
 
 
-def _departures(data):
-    table = ruled("mean of", *(metric.label for metric in METRICS.values()), "loss")
-    first = data["fits"][0]["departure"]
-    table.add_row("paired", *(f"{first[name]['before']:.3f}" for name in METRICS), "")
-    for fit in data["fits"]:
-        means = [f"{fit['departure'][name]['after']:.3f}" for name in METRICS]
-        table.add_row(_form(fit), *means, f"{fit['loss']:.4g}")
-    table.add_row("noise floor", *(f"{first[name]['noise_floor']:.3f}" for name in METRICS), "")
-    best = _best(data)["departure"]
-    for key in ("parameter_error", "model_error"):
-        means = [_three(best[name][key]) for name in METRICS]
-        table.add_row(key.replace("_", " "), *means, "")
+def _departures(record):
+    table = ruled("mean of", *(metric.label for metric in drawn().values()), "loss")
+
+    def add(name, form, field, loss=""):
+        means = (getattr(form.departure[metric], field) for metric in drawn())
+        table.add_row(name, *map(_three, means), loss)
+
+    add("paired", record.fits[0], "before")
+    for fit in record.fits:
+        add(_form(fit), fit, "after", f"{fit.loss:.4g}")
+    add("noise floor", record.fits[0], "noise_floor")
+    add("parameter error", record.nearest, "parameter_error")
+    add("model error", record.nearest, "model_error")
     return table
 
 
 def _parameters(fit):
     table = ruled("material or light", "parameter", "paired", "fitted", "95 %, by noise", "")
-    for owner in fit["materials"]:
-        for parameter in owner["parameters"]:
-            _add_parameter(table, owner["name"], parameter)
-    for light in fit["lights"]:
-        _add_parameter(table, light["light"], light)
+    for owner in fit.materials:
+        for parameter in owner.parameters:
+            _add_parameter(table, owner.name, parameter)
+    for light in fit.lights:
+        _add_parameter(table, light.light, light)
     return table
 
 
 def _add_parameter(table, owner, parameter):
-    interval = parameter["interval"]
-    note = parameter["reason"] and f"not identifiable: {parameter['reason']}"
-    if parameter["partners"]:
-        note += f" ({', '.join(parameter['partners'])})"
-    if parameter["at_bound"] and not note:
+    interval = parameter.interval
+    note = parameter.reason and f"not identifiable: {parameter.reason}"
+    if parameter.partners:
+        note += f" ({', '.join(parameter.partners)})"
+    if parameter.at_bound and not note:
         note = "at its bound"
+    factor = " (factor)" if parameter.is_factor else ""
     table.add_row(
         owner,
-        f"{parameter['name']} {parameter['channel']}".strip()
-        + (" (factor)" if parameter["is_factor"] else ""),
-        f"{parameter['paired']:.4g}",
+        f"{parameter.name} {parameter.channel}".strip() + factor,
+        f"{parameter.paired:.4g}",
         _value(parameter),
         f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
         note,
@@ -170,7 +162,7 @@ def _add_parameter(table, owner, parameter):
 
 
 def _value(parameter):
-    return "–" if parameter["fitted"] is None else f"{parameter['fitted']:.4g}"
+    return "–" if parameter.fitted is None else f"{parameter.fitted:.4g}"
 
 
 def _described(reference):

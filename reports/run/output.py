@@ -1,13 +1,14 @@
 """Writing the results of a run atomically, and never at the cost of an earlier result."""
 
-import json
 import os
 from pathlib import Path
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import drawn
+from comparisons.records import to_json
 from heuristic.errors import InputError
 from reports.files import exr, images, ownership
 from reports.page import embedding, page
+from reports.page.scene_view import SceneView
 from reports.run import finished
 
 LONGEST_IN_PAGE = 1024
@@ -63,47 +64,32 @@ def write_scene(folder, name, comparison, study=None, key=None):
 
     Returns
     -------
-    dict
-        What the page needs of it: record, pictures and links.
+    SceneView
+        What the page needs of it.
     """
-    data, shown = comparison.data, comparison.images
+    record, shown = comparison.record, comparison.images
     if study:
         from reports.run import cost_files
-    maps = {key: shown.maps[key] for key in (*METRICS, "log2_luminance")}
-    exposure = data["viewing"]["exposure"]
-
-    def pictures(longest=None):
-        return images.pictures(
-            shown.heuristic,
-            shown.reference,
-            maps,
-            shown.significant,
-            counted=shown.counted,
-            exposure=exposure,
-            longest=longest,
-        )
-
+    exposure = record.viewing.exposure
     layers = _layers(shown)
-    pictured = pictures()
+    pictured = images.pictures(shown, exposure)
+    reduced = max(record.resolution) > LONGEST_IN_PAGE
     priced = cost_files.documents(study) if study else {}
-    largest = max(data["resolution"])
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
-    view = {
-        "record": data,
-        "images": pictured if largest <= LONGEST_IN_PAGE else pictures(LONGEST_IN_PAGE),
-        "thumbnails": images.thumbnails(
-            shown.heuristic, shown.reference, shown.maps["dE2000"], exposure
-        ),
-        "embedded": embedding.embed(exr.channels(layers), shown.counted),
-        "files": {file: f"{name}/{file}" for file in links},
-        "charts": cost_files.figures(study.data) if study else (),
-        "cost": cost_files.view(study, priced) if study else None,
-    }
+    view = SceneView(
+        record=record,
+        images=images.pictures(shown, exposure, LONGEST_IN_PAGE) if reduced else pictured,
+        thumbnails=images.thumbnails(shown, exposure),
+        embedded=embedding.embed(exr.channels(layers), shown.counted),
+        files={file: f"{name}/{file}" for file in links},
+        charts=tuple(cost_files.figures(study.record)) if study else (),
+        cost=cost_files.view(study, priced) if study else None,
+    )
     with ownership.replacing_folder(folder / name, keep=None if study else COST_FILES) as place:
         for png_name, png in pictured.items():
             (place / f"{png_name}.png").write_bytes(png)
-        exr.write(place / "comparison.exr", layers, _header(data))
-        (place / "comparison.json").write_text(_json(data), encoding="utf-8")
+        exr.write(place / "comparison.exr", layers, _header(record))
+        (place / "comparison.json").write_text(to_json(record), encoding="utf-8")
         for file, content in priced.items():
             (place / file).write_bytes(content)
         if key is not None:
@@ -116,9 +102,9 @@ def write_page(folder, views, **shown):
     ownership.write(folder / "index.html", page.render(views, **shown))
 
 
-def write_run(folder, data):
+def write_run(folder, record):
     """Write ``run.json``: the command, where its time went, machine and versions."""
-    ownership.write(folder / "run.json", _json(data))
+    ownership.write(folder / "run.json", to_json(record))
 
 
 def folder_name(name, taken):
@@ -131,10 +117,6 @@ def folder_name(name, taken):
     return chosen
 
 
-def _json(data):
-    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
 def _layers(shown):
     return {
         "heuristic": shown.heuristic,
@@ -142,19 +124,19 @@ def _layers(shown):
         "reference_stderr": shown.reference_stderr,
         "P": shown.position,
         "N": shown.normal,
-        **{name: shown.maps[name] for name in METRICS},
+        **{name: shown.maps[name] for name in drawn()},
         "significant": shown.significant,
     }
 
 
-def _header(data):
+def _header(record):
     header = {
-        "scene": data["scene"],
-        "variant": data["variant"],
-        "seed": data["seed"],
-        "spp": data["plan"]["spp"],
-        "passes": data["plan"]["passes"],
-        "pairing": data["pairing"]["convention"],
+        "scene": record.scene,
+        "variant": record.variant,
+        "seed": record.seed,
+        "spp": record.plan.spp,
+        "passes": record.plan.passes,
+        "pairing": record.pairing.convention,
     }
-    header |= {f"version {name}": version for name, version in data["versions"].items()}
+    header |= {f"version {name}": version for name, version in record.versions.items()}
     return {key: str(value) for key, value in header.items()}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
+
+from msgspec import structs
 
 from reports.asked import jobs
 from reports.run.stages import Done
@@ -68,7 +70,7 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     study = None
     if wanted.with_cost:
         with done.timing("cost"):
-            study = _cost(case, progress, result.data)
+            result, study = _priced(case, progress, result)
     with done.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
             from reports.charts import figures
@@ -79,14 +81,16 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
     return done
 
 
-def _cost(case, progress, data):
+def _priced(case, progress, comparison):
     """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
     from comparisons.cost.cost import quick
     from comparisons.effects.dominance import in_region
 
     study = quick(case.source, case.options, progress, case.command() + " --cost")
-    for region in data["regions"]:
-        effect = in_region(region, data["resolution"], study.effects)
-        if effect is not None:
-            region["effect"] = effect
-    return study
+    record = comparison.record
+    regions = tuple(
+        structs.replace(region, effect=in_region(region, record.resolution, study.effects))
+        for region in record.regions
+    )
+    record = structs.replace(record, regions=regions)
+    return replace(comparison, record=record), study

@@ -1,12 +1,43 @@
 """Where the time of a run went, and the record of it, ``run.json``."""
 
-from collections.abc import Iterator, Mapping
+from __future__ import annotations
+
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Annotated
+
+from msgspec import Meta
+
+from comparisons.circumstances import Machine, Versions
+from comparisons.records import VERSION, Record
+
+if TYPE_CHECKING:
+    from comparisons.comparison import TimeSpent
+    from reports.page.scene_view import SceneView
 
 START = perf_counter()
+
+
+class Failure(Record):
+    """A scene that could not be compared; ``scene`` is the folder that its results would be in."""
+
+    scene: str
+    error: str
+
+
+class RunRecord(Record, kw_only=True):
+    """What one command did, beside the records of its scenes: ``run.json``."""
+
+    command: str
+    stages: Annotated[
+        dict[str, float], Meta(description="Wall time in seconds; together they are the run's.")
+    ]
+    failures: tuple[Failure, ...]
+    machine: Machine
+    versions: Versions
+    record_version: int = VERSION
 
 
 @dataclass
@@ -16,7 +47,7 @@ class Done:
     ``compared`` is None where the scene was found finished.
     """
 
-    view: Mapping[str, Any] = field(default_factory=dict)
+    view: SceneView | None = None
     compared: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -31,8 +62,7 @@ class Done:
 class Run:
     """Wall time of one run by stage, in seconds, from the start of the program.
 
-    To be made when start-up is over. `failures` are the scenes that could not be compared:
-    ``scene`` and ``error``.
+    To be made when start-up is over. `failures` are the scenes that could not be compared.
     """
 
     def __init__(self, command: str) -> None:
@@ -41,7 +71,7 @@ class Run:
         self.command = command
         self.machine, self.versions = record.machine(), record.versions()
         self._seconds = {"start-up": perf_counter() - START}
-        self.failures: list[dict[str, str]] = []
+        self.failures: list[Failure] = []
         self._page: float | None = None
 
     @contextmanager
@@ -51,17 +81,16 @@ class Run:
         yield
         self.add(stage, perf_counter() - begin)
 
-    def compared(self, record: Mapping[str, Any], seconds: float) -> None:
-        """Count a comparison that took so long, by what its record says of it.
+    def compared(self, time: TimeSpent, seconds: float) -> None:
+        """Count a comparison that took so long, by what its record says of its time.
 
         Passes that an interrupted run had rendered took their time then: rendering is at most what
         passed now.
         """
-        time = record["time"]
         preparing = sum(
-            time["stages"].get(name, 0.0) for name in ("scene and pairing", "planning", "geometry")
+            time.stages.get(name, 0.0) for name in ("scene and pairing", "planning", "geometry")
         )
-        passes = time["heuristic"]["total_s"] + time["reference"]["total_s"]
+        passes = time.heuristic.total_s + time.reference.total_s
         rendering = min(passes, seconds - preparing)
         self.add("scenes and plans", preparing)
         self.add("rendering", rendering)
@@ -72,7 +101,7 @@ class Run:
         for stage, seconds in done.seconds.items():
             self.add(stage, seconds)
         if done.compared is not None:
-            self.compared(done.view["record"], done.compared)
+            self.compared(done.view.record.time, done.compared)
 
     def begin_page(self) -> None:
         """Say that from now on the page is written, which ends the run."""
@@ -87,15 +116,15 @@ class Run:
             self.add("other", max(0.0, now - START - sum(self._seconds.values())))
         return dict(self._seconds)
 
-    def data(self) -> dict[str, Any]:
+    def record(self) -> RunRecord:
         """The record of the run."""
-        return {
-            "command": self.command,
-            "stages": self.stages(),
-            "failures": self.failures,
-            "machine": self.machine,
-            "versions": self.versions,
-        }
+        return RunRecord(
+            command=self.command,
+            stages=self.stages(),
+            failures=tuple(self.failures),
+            machine=self.machine,
+            versions=self.versions,
+        )
 
     def add(self, stage: str, seconds: float) -> None:
         """Count seconds towards a stage."""

@@ -1,59 +1,73 @@
 """Plans and their verification, as lines for a terminal."""
 
+from comparisons import record
+from comparisons.amounts import Amount
+from comparisons.comparison import Simulation
+from comparisons.records import VERSION, Record
 from reports.terminal.tables import printed, ruled
 
 
-def data(scene, ready, variant):
-    """Return the plan of a prepared comparison as plain data."""
-    plan = ready.plan
-    return {
-        "scene": scene,
-        "effects": [
-            {
-                "name": decision.effect.label,
-                "called_for": decision.called_for,
-                "rule": decision.rule,
-                "evidence": decision.evidence,
-                "heuristic": decision.effect.heuristic,
-                "reference": decision.effect.reference,
-                "cost": decision.effect.cost,
-            }
-            for decision in plan.decisions
-        ],
-        "kernel_terms": list(plan.kernel_terms),
-        "variant": variant,
-        "integrator": plan.integrator,
-        "max_depth": plan.max_depth,
-        "shadows": plan.shadows,
-        "tabulated_environment": plan.tabulate_environment,
-        "sampler": plan.sampler,
-        "spp": ready.reference.spp * ready.passes,
-        "passes": ready.passes,
-        "planning_s": ready.planning_seconds,
-    }
+class PlannedEffect(Record):
+    """Whether a scene calls for an effect, why, and what it would take on either side."""
+
+    name: str
+    called_for: bool
+    rule: str
+    evidence: str
+    heuristic: str
+    reference: str
+    cost: str
+
+
+class PlanReport(Simulation, kw_only=True):
+    """What ``fotismos plan --json`` prints."""
+
+    scene: str
+    variant: str
+    effects: tuple[PlannedEffect, ...]
+    planning_s: Amount
+    record_version: int = VERSION
+
+
+def report(scene, ready, variant):
+    """Return the plan of a prepared comparison."""
+    effects = (
+        PlannedEffect(
+            name=decision.effect.label,
+            called_for=decision.called_for,
+            rule=decision.rule,
+            evidence=decision.evidence,
+            heuristic=decision.effect.heuristic,
+            reference=decision.effect.reference,
+            cost=decision.effect.cost,
+        )
+        for decision in ready.plan.decisions
+    )
+    return PlanReport(
+        scene=scene,
+        variant=variant,
+        effects=tuple(effects),
+        planning_s=ready.planning_seconds,
+        **record.simulation(ready.plan, ready.reference.spp * ready.passes, ready.passes),
+    )
 
 
 def lines(plan):
     """Yield the lines of a plan: the table of effects, then what will be simulated."""
     table = ruled("effect", "called for", "rule", "evidence", "what it costs")
-    for effect in plan["effects"]:
-        table.add_row(
-            effect["name"],
-            "yes" if effect["called_for"] else "no",
-            effect["rule"],
-            effect["evidence"],
-            effect["cost"],
-        )
+    for effect in plan.effects:
+        called = "yes" if effect.called_for else "no"
+        table.add_row(effect.name, called, effect.rule, effect.evidence, effect.cost)
     yield from printed(table)
-    depth = "no limit" if plan["max_depth"] < 0 else plan["max_depth"]
-    rays = "" if plan["shadows"] else ", no shadow rays"
-    rays += ", environment from a table" if plan["tabulated_environment"] else ""
-    yield f"kernel terms  {', '.join(plan['kernel_terms']) or 'none'}"
-    yield f"variant       {plan['variant']}"
-    yield f"integrator    {plan['integrator']}{rays}"
+    depth = "no limit" if plan.max_depth < 0 else plan.max_depth
+    rays = "" if plan.shadows else ", no shadow rays"
+    rays += ", environment from a table" if plan.tabulated_environment else ""
+    yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
+    yield f"variant       {plan.variant}"
+    yield f"integrator    {plan.integrator}{rays}"
     yield f"depth         {depth}"
-    yield f"samples       {plan['spp']} a pixel in {plan['passes']} passes, {plan['sampler']}"
-    yield f"planning      {plan['planning_s'] * 1e3:.0f} ms"
+    yield f"samples       {plan.spp} a pixel in {plan.passes} passes, {plan.sampler}"
+    yield f"planning      {plan.planning_s * 1e3:.0f} ms"
 
 
 def verification_lines(results):
@@ -61,13 +75,13 @@ def verification_lines(results):
     table = ruled("scene", "planned", "significant", "of pixels", "kernel", "faster", "planning")
     for result in results:
         table.add_row(
-            result["scene"],
-            result["planned"],
-            f"{result['significant']}",
-            f"{result['pixels']}",
-            f"{result['heuristic_largest']:.1e}",
-            f"{result['gain']:.3g} x",
-            f"{result['planning_s'] * 1e3:.0f} ms of {result['saved_s']:.3g} s saved",
+            result.scene,
+            result.planned,
+            f"{result.significant}",
+            f"{result.pixels}",
+            f"{result.heuristic_largest:.1e}",
+            f"{result.gain:.3g} x",
+            f"{result.planning_s * 1e3:.0f} ms of {result.saved_s:.3g} s saved",
         )
     yield from printed(table)
     yield "significant: pixels that differ by more than both sides' noise"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from markupsafe import Markup
+
+from comparisons.departure.statistics import Summary
 
 #: A mean up to this many times its noise floor is said to be about noise.
 NOISE_MARGIN = 1.1
@@ -54,9 +55,9 @@ def code_spans(text: str) -> Markup:
     )
 
 
-def about_noise(metric: Mapping[str, float]) -> bool:
+def about_noise(metric: Summary) -> bool:
     """Whether a metric's mean is about what its noise floor gives (see `NOISE_MARGIN`)."""
-    return metric["noise_floor"] > 0 and metric["mean"] <= NOISE_MARGIN * metric["noise_floor"]
+    return metric.noise_floor > 0 and metric.mean <= NOISE_MARGIN * metric.noise_floor
 
 
 def _minus(digits: str) -> str:

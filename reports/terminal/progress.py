@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
 from reports.terminal import verbosity
 from reports.terminal.printing import seconds
@@ -50,56 +51,55 @@ def shown(unit="passes"):
 def summary(records):
     """Yield a line for each scene: departure, noise, shape, and times."""
     records = list(records)
-    headings = ("mean ΔE2000", "noise", "shape", "significant", "heuristic", "reference")
+    headings = (f"mean {LEADING.label}", "noise", "shape", "significant", "heuristic", "reference")
     table = ruled("scene", *headings)
     for column in table.columns[1:]:
         column.justify = "right"
     for record in records:
-        metric, time = record["metrics"]["dE2000"], record["time"]
+        metric, time = record.metrics[LEADING.name], record.time
         table.add_row(
-            record["scene"],
-            f"{metric['mean']:.3f}",
-            f"{metric['noise_floor']:.3f}",
-            f"{metric['after_exposure']['mean']:.3f}",
-            f"{record['metrics']['significant']['fraction']:.1%}",
-            f"{time['heuristic']['total_s']:.2f} s",
-            f"{time['reference']['total_s']:.2f} s",
+            record.scene,
+            f"{metric.mean:.3f}",
+            f"{metric.noise_floor:.3f}",
+            f"{metric.after_exposure.mean:.3f}",
+            f"{record.significant.fraction:.1%}",
+            f"{time.heuristic.total_s:.2f} s",
+            f"{time.reference.total_s:.2f} s",
         )
     yield from printed(table)
     for record in records:
-        if record.get("heuristic", PHONG.name) != PHONG.name:
-            yield f"{record['scene']}: heuristic {record['heuristic']}"
-        if "noise_target" in record:
+        if record.heuristic != PHONG.name:
+            yield f"{record.scene}: heuristic {record.heuristic}"
+        if record.noise_target:
             yield _noise(record)
 
 
 def details(record):
     """Yield what a verbose command says of a scene: simulation, pairing, warnings, times."""
-    plan, pairing = record["plan"], record["pairing"]
-    shadows = "" if plan["shadows"] else ", no shadow rays"
+    plan, pairing = record.plan, record.pairing
+    shadows = "" if plan.shadows else ", no shadow rays"
     yield (
-        f"{record['scene']}: {plan['integrator']}{shadows}, {plan['spp']} samples a pixel in"
-        f" {plan['passes']} passes, {plan['sampler']}"
+        f"{record.scene}: {plan.integrator}{shadows}, {plan.spp} samples a pixel in"
+        f" {plan.passes} passes, {plan.sampler}"
     )
-    for light in pairing["emitters"]:
-        note = f" ({light['note']})" if light["note"] else ""
-        yield f"  {light['name']}: {light['given']} as {light['derived']}{note}"
-    for miss in pairing["misses"]:
-        wanted, reached = (f"{miss[key]:.3g} {key}" for key in ("wanted", "reached"))
-        yield f"  missed: {miss['what']}, {wanted}, {reached}"
-    for warning in record["warnings"]:
+    for light in pairing.emitters:
+        note = f" ({light.note})" if light.note else ""
+        yield f"  {light.name}: {light.given} as {light.derived}{note}"
+    for miss in pairing.misses:
+        yield f"  missed: {miss.what}, {miss.wanted:.3g} wanted, {miss.reached:.3g} reached"
+    for warning in record.warnings:
         yield f"  warning: {warning}"
-    stages = record["time"]["stages"]
+    stages = record.time.stages
     yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
 
 
 def _noise(record):
     """Say what a noise target came to, and what stopped the run."""
-    stop, plan = record["noise_target"], record["plan"]
-    asked = f"target {stop['target']:g}"
-    if stop["stopped_by"] == "samples":
-        asked += f" not reached: stopped by the limit of {stop['limit_spp']} samples a pixel"
+    stop = record.noise_target
+    asked = f"target {stop.target:g}"
+    if stop.stopped_by == "samples":
+        asked += f" not reached: stopped by the limit of {stop.limit_spp} samples a pixel"
     return (
-        f"{record['scene']}: 95 % of pixels have noise under ΔE2000 = {stop['reached']:.3g}"
-        f" after {plan['spp']} samples a pixel ({asked})"
+        f"{record.scene}: 95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
+        f" after {record.plan.spp} samples a pixel ({asked})"
     )

@@ -11,7 +11,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from comparisons.comparison import ComparisonRecord
+from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import METRICS
+from comparisons.records import plain
 from reports.files import ownership
 from reports.terminal.printing import number, percent
 
@@ -19,11 +22,12 @@ from reports.terminal.printing import number, percent
 WIDTH = 120
 
 
-def ruled(*headings: str) -> Table:
-    """Return an empty table with these headings, without lines."""
+def ruled(*headings: str, right: int | None = None) -> Table:
+    """Return an empty table with these headings, without lines; set to the right from a column."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
+    for place, heading in enumerate(headings):
+        justify = "left" if right is None or place < right else "right"
+        table.add_column(heading, overflow="fold", justify=justify)
     return table
 
 
@@ -36,16 +40,16 @@ def printed(table: Table) -> Iterator[str]:
 
 
 def markdown(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], right: bool = True
+    headings: Sequence[str], rows: Iterable[Sequence[str]], right: int = 1
 ) -> Iterator[str]:
-    """Yield the lines of a table in Markdown, all columns but the first set to the right."""
+    """Yield the lines of a table in Markdown, set to the right from a column on."""
     yield _row(headings)
-    yield _row(["---"] + ["---:" if right else "---"] * (len(headings) - 1))
+    yield _row(["---"] * right + ["---:"] * (len(headings) - right))
     for row in rows:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
 
-def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
     """Write ``metrics.csv`` and ``metrics.md`` of the records of a run to a folder."""
     ownership.folder(folder)
     records = list(records)
@@ -53,68 +57,70 @@ def write(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
     ownership.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
 
 
-def write_cost(folder: Path, name: str, data: Mapping[str, Any]) -> None:
+def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
     ownership.folder(folder)
-    for part, (headings, rows) in {"cost": methods(data), "prices": prices(data)}.items():
+    for part, (headings, rows) in {"cost": methods(record), "prices": prices(record)}.items():
         ownership.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
         shown = [[_shown(cell) for cell in row] for row in rows]
         ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(headings, shown)) + "\n")
 
 
-def methods(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+def methods(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
     """Return headings and rows of a study's methods: seconds for one image, and mean ΔE2000."""
     headings = ("method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front")
     rows = [
         [
-            point["rung"],
-            point["spp"],
-            *(point["seconds"][key] for key in ("median", "low", "high")),
-            point["error"],
-            point["error_stderr"],
-            "yes" if point["pareto"] else "no",
+            point.rung,
+            point.spp,
+            *(point.seconds.median, point.seconds.low, point.seconds.high),
+            point.error,
+            point.error_stderr,
+            "yes" if point.pareto else "no",
         ]
-        for point in data["points"]
+        for point in record.points
     ]
     return headings, rows
 
 
-def prices(data: Mapping[str, Any]) -> tuple[Sequence[str], list[list[Any]]]:
+def prices(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
     """Return headings and rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
     headings = ("effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s")
     rows = [
         [
-            price["effect"],
-            *(price["removes"][key] for key in ("value", "low", "high")),
-            price["alone"],
-            price["last"],
-            price["adds_s"]["value"],
+            price.effect,
+            *(price.removes.value, price.removes.low, price.removes.high),
+            price.alone,
+            price.last,
+            price.adds_s.value,
         ]
-        for price in data["prices"]["effects"]
+        for price in record.prices.effects
     ]
     return headings, rows
 
 
-def metrics_csv(records: Iterable[Mapping[str, Any]]) -> str:
+def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
     """Return a line for each scene and metric, with every number of the record in full.
 
     Columns are named as in ``comparison.json``; ``after_exposure.`` begins those of the shape.
-    The root mean square error in linear light has ``value`` as its mean and no percentiles.
     """
-    columns = ("mean", "p50", "p95", "max", "noise_floor")
-    after = ("exposure", "mean", "p50", "p95", "max")
-    headings = (*columns, *(f"after_exposure.{name}" for name in after), "significant")
-    rows = []
-    for record in records:
-        significant = record["metrics"]["significant"]["fraction"]
-        for name in (*METRICS, "rmse"):
-            metric = record["metrics"][name]
-            exposed = metric["after_exposure"]
-            whole = {"mean": metric.get("value")} | metric
-            shape = {"mean": exposed.get("value")} | exposed
-            cells = [whole.get(key, "") for key in columns] + [shape.get(key, "") for key in after]
-            rows.append([record["scene"], name, *cells, significant])
-    return comma_separated(("scene", "metric", *headings), rows)
+    rows = [
+        {"scene": record.scene, "metric": name}
+        | dict(_flat(plain(summary)))
+        | {"significant": record.significant.fraction}
+        for record in records
+        for name, summary in record.metrics.items()
+    ]
+    headings = list(dict.fromkeys(key for row in rows for key in row))
+    return comma_separated(headings, [[row.get(key, "") for key in headings] for row in rows])
+
+
+def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in record.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
 
 
 def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
@@ -126,27 +132,22 @@ def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> s
     return text.getvalue()
 
 
-def metrics_markdown(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
     """Yield the lines of a table of a run: each metric's mean, its shape and its noise floor."""
-    labels = [metric.label for metric in METRICS.values()]
-    rows = []
-    for record in records:
-        metrics = record["metrics"]
-        cells = [
-            f"{number(m['mean'])} ({number(m['after_exposure']['mean'])};"
-            f" {number(m['noise_floor'])})"
-            for m in (metrics[name] for name in METRICS)
+    rows = [
+        [
+            record.scene,
+            *(
+                f"{number(m.mean)} ({number(m.after_exposure.mean)}; {number(m.noise_floor)})"
+                for m in (record.metrics[name] for name in METRICS)
+            ),
+            percent(record.significant.fraction),
+            f"{record.plan.spp}",
         ]
-        rows.append(
-            [
-                record["scene"],
-                *cells,
-                number(metrics["rmse"]["value"]),
-                percent(metrics["significant"]["fraction"]),
-                f"{record['plan']['spp']}",
-            ]
-        )
-    yield from markdown(["scene", *labels, "RMSE", "significant", "samples a pixel"], rows)
+        for record in records
+    ]
+    labels = [metric.label for metric in METRICS.values()]
+    yield from markdown(["scene", *labels, "significant", "samples per pixel"], rows)
     yield ""
     yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
     yield "that makes it smallest, and what the reference's noise alone would give."

@@ -7,15 +7,19 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from msgspec import structs
 from playwright.sync_api import sync_playwright
 
+from comparisons.circumstances import Pixels
 from comparisons.cost.cost import Study
 from comparisons.departure import regions
 from comparisons.departure.histogram import histogram
-from comparisons.departure.metrics import METRICS, log2_luminance_ratio
-from comparisons.record import Comparison, Images
+from comparisons.departure.metrics import drawn, log2_luminance_ratio
+from comparisons.departure.regions import Region
+from comparisons.record import Comparison
+from comparisons.records import plain
 from reports.run import output
-from reports.run.stages import Run
+from reports.run.stages import Failure, Run
 from tests import cost_records, records
 
 WIDTH, HEIGHT = 48, 32
@@ -44,14 +48,17 @@ def report(tmp_path_factory):
     for name, comparison, priced in ((NOISY, noisy(), study), (EXACT, exact(), None)):
         place = output.folder_name(name, ())
         views.append(output.write_scene(folder, place, comparison, priced))
-        found.records[name] = comparison.data
+        found.records[name] = plain(comparison.record)
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
             found.channels[name] = {key: c.pixels.copy() for key, c in file.channels().items()}
     found.study = study
     run = Run("fotismos compare")
     run.begin_page()
     output.write_page(
-        folder, views, failures=[(FAILED, "lost.xml: there is no such file")], run=run
+        folder,
+        views,
+        failures=[Failure(scene=FAILED, error="lost.xml: there is no such file")],
+        run=run,
     )
     return found
 
@@ -75,40 +82,43 @@ def noisy():
 def exact():
     """Two equal halves; nothing is significant."""
     half = np.full((HEIGHT, WIDTH, 3), 0.25)
-    maps = dict.fromkeys(METRICS, np.zeros((HEIGHT, WIDTH)))
+    maps = dict.fromkeys(drawn(), np.zeros((HEIGHT, WIDTH)))
     found = comparison(EXACT, half, half, maps, np.zeros((HEIGHT, WIDTH), bool))
-    for name in METRICS:
-        found.data["metrics"][name] = records.metric(0.0)
-    found.data["metrics"]["significant"]["fraction"] = 0.0
-    box = {"x": 8, "y": 4, "width": 10, "height": 8, "share": 0.5, "mean_dE2000": 1.0}
-    found.data["regions"] = [box | {"effect": "extended lights"}]
-    found.data["warnings"] = found.data["unrepresentable"] = []
-    return found
+    box = Region(x=8, y=4, width=10, height=8, share=0.5, mean_dE2000=1.0, effect="extended lights")
+    record = structs.replace(
+        found.record,
+        metrics=found.record.metrics | {name: records.summary(0.0) for name in drawn()},
+        significant=structs.replace(found.record.significant, fraction=0.0),
+        regions=(box,),
+        warnings=(),
+        unrepresentable=(),
+    )
+    return Comparison(record, found.images)
 
 
 def comparison(name, heuristic, reference, maps, significant):
     counted = np.ones((HEIGHT, WIDTH), bool)
     counted[0] = False
-    data = records.record() | {
-        "scene": name,
-        "resolution": [WIDTH, HEIGHT],
-        "pixels": {"counted": int(counted.sum()), "total": counted.size},
-        "regions": [region.data() for region in regions.find(maps["dE2000"], counted)],
-        "histograms": {key: histogram(maps[key][counted]).data() for key in METRICS},
-    }
-    for region in data["regions"][:1]:
-        region["effect"] = "interreflection"
-    images = Images(
+    first, *others = regions.find(maps["dE2000"], counted) or [None]
+    first = first and structs.replace(first, effect="interreflection")
+    record = records.record(
+        scene=name,
+        resolution=(WIDTH, HEIGHT),
+        pixels=Pixels(counted=int(counted.sum()), total=counted.size),
+        regions=tuple(filter(None, (first, *others))),
+        histograms={key: histogram(maps[key][counted]) for key in drawn()},
+    )
+    images = records.images(
+        HEIGHT,
+        WIDTH,
+        maps | {"log2_luminance": log2_luminance_ratio(heuristic, reference)},
         heuristic=heuristic.astype(np.float32),
         reference=reference.astype(np.float32),
         reference_stderr=0.01 * np.abs(reference),
-        position=np.zeros((HEIGHT, WIDTH, 3)),
-        normal=np.zeros((HEIGHT, WIDTH, 3)),
-        maps=maps | {"log2_luminance": log2_luminance_ratio(heuristic, reference)},
         significant=significant,
         counted=counted,
     )
-    return Comparison(data, images)
+    return Comparison(record, images)
 
 
 @pytest.fixture(scope="session")

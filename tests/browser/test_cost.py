@@ -35,13 +35,13 @@ def test_a_point_of_the_chart_tells_its_method_time_and_error(visitor, report):
     page = enlivened(visitor)
     chart = page.locator(".scene.open .charts.wide .chart").first
     symbols = chart.locator(".mark-symbol path")
-    points = report.study.data["points"]
+    points = report.study.record.points
     assert symbols.count() == len(points)
     symbols.nth(2).hover()
     tooltip = page.locator("#vg-tooltip-element.visible")
     tooltip.wait_for()
     text = tooltip.text_content()
-    for part in (points[2]["rung"], "16", "56.7", "1.23"):
+    for part in (points[2].rung, "16", "56.7", "1.23"):
         assert part in text
 
 

@@ -1,6 +1,7 @@
 """A page of one scene, from disk and in a notebook's frame."""
 
 import pytest
+from msgspec import structs
 
 from reports.notebook import Shown
 from reports.page import page
@@ -13,7 +14,7 @@ SEEN = "document.documentElement.dataset.view"
 @pytest.fixture
 def alone(tmp_path):
     """The page's text."""
-    return page.render([output.write_scene(tmp_path, EXACT, exact()) | {"files": {}}])
+    return page.render([structs.replace(output.write_scene(tmp_path, EXACT, exact()), files={})])
 
 
 @pytest.fixture

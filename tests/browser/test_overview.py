@@ -18,7 +18,7 @@ def test_cards_show_the_records_figures(visitor, report):
         metrics["dE2000"]["mean"],
         metrics["dE2000"]["after_exposure"]["mean"],
         metrics["dE2000"]["noise_floor"],
-        metrics["significant"]["fraction"],
+        report.records[NOISY]["significant"]["fraction"],
     ]
     pictures = page.locator(".card:visible img")
     assert pictures.count() == 6

@@ -21,7 +21,7 @@
 
 /** @type {View} */
 const DEFAULT_VIEW = Object.freeze({
-  scene: "", mode: "split", map: "dE2000", tone: "clip", ev: 0, zoom: null, x: null, y: null, split: 0.5,
+  scene: "", mode: "split", map: page.maps[0].name, tone: "clip", ev: 0, zoom: null, x: null, y: null, split: 0.5,
   pixel: null, boxes: true, sort: "run", only: "", q: "", list: "cards",
 });
 

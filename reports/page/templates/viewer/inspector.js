@@ -11,14 +11,13 @@ function inspect(painter, scene, [x, y]) {
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
   const flags = images.codes.flags[place];
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
+  const mapText = (/** @type {{name: string, kind: string}} */ { name, kind }) =>
+    kind === "error" ? shown(name) : kind === "ratio" ? `${significant(painter.ratio(place), 2)} stops` : "";
   return {
     position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
     heuristic: ["R", "G", "B"].map((colour) => shown(`heuristic.${colour}`)),
     reference: ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)),
-    dE2000: shown("dE2000"),
-    dE_ITP: shown("dE_ITP"),
-    dE_CAM16UCS: shown("dE_CAM16UCS"),
-    log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
+    ...Object.fromEntries(painter.page.maps.map((/** @type {any} */ map) => [map.name, mapText(map)])),
     standard_error: shown("standard_error"),
     significant: flags & COUNTED ? (flags & SIGNIFICANT ? "yes" : "no") : "not counted",
     effect: effectAt(scene, x, y),

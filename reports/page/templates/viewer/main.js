@@ -1,6 +1,5 @@
 // The page: which scene is seen, and how, is what the address's fragment says.
 
-const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
 const address = makeAddress();
 const overview = makeOverview(byId("overview-section"), page.scenes, change);
 const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);

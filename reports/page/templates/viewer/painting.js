@@ -20,7 +20,7 @@ class Painter {
   /**
    * @param {Images} images
    * @param {number} exposure the factor that the comparison was viewed at
-   * @param {any} page what the page says about its maps: colours, ranges, luminance
+   * @param {any} page what the page says about its maps: colours, maps, luminance
    * @param {Effects | null} effects what dominates where, if that is known
    */
   constructor(images, exposure, page, effects) {
@@ -45,11 +45,12 @@ class Painter {
 
   /** A map by its name. @param {string} name */
   map(name) {
+    const { kind, top } = mapOf(this.page, name);
     return this.picture("map", name, (pixels) => {
-      if (name === "log2_luminance") this.paintRatio(pixels);
-      else if (name === "significant") this.paintFlags(pixels);
-      else if (name === "effects") this.paintEffects(pixels);
-      else this.paintError(pixels, name);
+      if (kind === "ratio") this.paintRatio(pixels, top);
+      else if (kind === "mask") this.paintFlags(pixels);
+      else if (kind === "effects") this.paintEffects(pixels);
+      else this.paintError(pixels, name, top);
     });
   }
 
@@ -92,17 +93,15 @@ class Painter {
     }
   }
 
-  /** @param {Uint32Array} pixels @param {string} metric */
-  paintError(pixels, metric) {
-    const top = this.page.ranges[metric];
+  /** @param {Uint32Array} pixels @param {string} metric @param {number} top the end of its range */
+  paintError(pixels, metric, top) {
     const colour = Uint32Array.from(VALUES, (value) => this.tables.error[clamp(Math.floor((256 * value) / top), 0, 255)]);
     const codes = this.images.codes[metric];
     for (let i = 0; i < pixels.length; i++) pixels[i] = colour[codes[i]];
   }
 
-  /** @param {Uint32Array} pixels */
-  paintRatio(pixels) {
-    const range = this.page.ranges.log2_luminance;
+  /** @param {Uint32Array} pixels @param {number} range half of it, in stops */
+  paintRatio(pixels, range) {
     for (let i = 0; i < pixels.length; i++) {
       pixels[i] = this.tables.signed[clamp(Math.floor(128 + (128 * this.ratio(i)) / range), 0, 255)];
     }

@@ -57,7 +57,7 @@ class Viewer {
 
   /** @param {View} view */
   show(view) {
-    const known = this.page.titles[view.map] && (view.map !== "effects" || this.scene.effects);
+    const known = mapOf(this.page, view.map) && (view.map !== "effects" || this.scene.effects);
     this.view = known ? view : { ...view, map: DEFAULT_VIEW.map };
     this.element.dataset.mode = view.mode;
     this.showControls();
@@ -77,7 +77,7 @@ class Viewer {
 
   paint() {
     if (!this.painter || !this.canvas.clientWidth) return;
-    const extra = { swapped: this.swapped, regions: this.scene.regions, title: this.page.titles[this.view.map] };
+    const extra = { swapped: this.swapped, regions: this.scene.regions, title: mapOf(this.page, this.view.map).title };
     this.drawing.draw(this.view, this.viewport, this.painter, extra);
     this.canvas.style.touchAction = this.view.zoom === null ? "pan-y" : "none";
     this.canvas.setAttribute("aria-label", this.description());
@@ -85,11 +85,12 @@ class Viewer {
   }
 
   description() {
+    const { title } = mapOf(this.page, this.view.map);
     const modes = {
       split: "textbook shading on the left, physical reference on the right",
       flicker: this.swapped ? "physical reference" : "textbook shading",
-      side: `textbook shading, physical reference and ${this.page.titles[this.view.map]}`,
-      error: this.page.titles[this.view.map],
+      side: `textbook shading, physical reference and ${title}`,
+      error: title,
     };
     return `${this.scene.name}: ${modes[/** @type {keyof modes} */ (this.view.mode)]}. Press ? for the keys.`;
   }

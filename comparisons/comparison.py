@@ -1,0 +1,185 @@
+"""The record of a comparison, ``comparison.json``, as types."""
+
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
+
+from comparisons.amounts import Amount, Count, Positive, Resolution, Share, Size
+from comparisons.circumstances import Pixels, Versions
+from comparisons.departure.histogram import Histogram
+from comparisons.departure.limits import LimitCounts
+from comparisons.departure.regions import Region
+from comparisons.departure.spaces import Viewing
+from comparisons.departure.statistics import RatioSummary, Summary
+from comparisons.records import VERSION, Record
+
+Depth = Annotated[
+    int, Meta(ge=-1, description="As Mitsuba counts: 2 is direct light alone, -1 is unlimited.")
+]
+
+
+class Decision(Record):
+    """Whether a scene calls for an effect, and why: a structural proof or a measurement."""
+
+    name: str
+    called_for: bool
+    rule: str
+
+
+class Simulation(Record):
+    """What is simulated of a scene, and with how many samples."""
+
+    kernel_terms: Annotated[
+        tuple[str, ...], Meta(description="Coefficients whose terms the heuristic kernel holds.")
+    ]
+    integrator: Annotated[str, Meta(description="Mitsuba integrator of the reference.")]
+    max_depth: Depth
+    shadows: Annotated[bool, Meta(description="Whether the reference traces shadow rays.")]
+    tabulated_environment: Annotated[
+        bool, Meta(description="Whether a constant environment comes from a table of albedos.")
+    ]
+    spp: Annotated[Size, Meta(description="Samples per pixel, over all passes.")]
+    passes: Size
+    sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
+
+
+class PlanRecord(Simulation, kw_only=True):
+    """Which effects the scene calls for, and what was simulated."""
+
+    effects: tuple[Decision, ...]
+
+
+class Significant(Record):
+    """Pixels whose difference is more than the noise of both renderings."""
+
+    fraction: Share
+    level: Annotated[
+        float,
+        Meta(gt=0, lt=1, description="Chance that an image without difference has one such pixel."),
+    ]
+
+
+class BsdfPair(Record):
+    """A BSDF and its partner; colours of one value are that value."""
+
+    name: str
+    given: str
+    derived: str
+    parameters: dict[str, Any]
+
+
+class EmitterPair(Record):
+    """A light and its partner, and the factor between their intensities."""
+
+    name: str
+    given: str
+    derived: str
+    factor: float
+    exact: bool
+    note: str = ""
+
+
+class Missed(Record):
+    """A quantity that no partner reaches."""
+
+    what: str
+    wanted: float
+    reached: float
+
+
+class Pairing(Record):
+    """How heuristic and physical materials and lights correspond."""
+
+    convention: str
+    bsdfs: tuple[BsdfPair, ...]
+    emitters: tuple[EmitterPair, ...]
+    misses: tuple[Missed, ...]
+
+
+class Times(Record):
+    """Wall times of one rendering in seconds, evaluated and synchronised."""
+
+    median_s: Annotated[Amount, Meta(description="Median of a pass, once compiled.")]
+    passes: Size
+    first_s: Annotated[Amount, Meta(description="The first pass, with compilation.")]
+    total_s: Amount
+    compile_s: Annotated[Amount | None, Meta(description="Code generation and back end.")]
+
+
+class TimeSpent(Record):
+    """Times of both renderings, and of other work by its name."""
+
+    heuristic: Times
+    reference: Times
+    stages: dict[str, float]
+
+
+class Unrepresentable(Record):
+    """What the heuristic model has no form for; compared nevertheless."""
+
+    name: Annotated[str, Meta(description="Id, or place in the file.")]
+    plugin: str
+    lost: str
+    nearest: Annotated[str, Meta(description="What is taken in its place, and by which rule.")]
+
+
+class Override(Record):
+    """What the scene asks for and does not get, and what it gets instead."""
+
+    what: str
+    given: str
+    used: str
+
+
+class NoiseTarget(Record):
+    """Where a run with a noise target ended.
+
+    Both are 95th percentiles of the noise in ΔE2000 over the counted pixels: as asked for, and
+    predicted from the spread of the passes.
+    """
+
+    target: Positive
+    reached: Amount
+    stopped_by: Literal["target", "samples"]
+    limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
+
+
+class ComparisonRecord(Record, kw_only=True):
+    """One scene by textbook shading (heuristic) and by physically based rendering (reference).
+
+    Times are in seconds; linear values are in units of display white; every number is finite.
+    """
+
+    scene: Annotated[str, Meta(description="Built-in name or path of the file, as given.")]
+    variant: Annotated[str, Meta(description="Mitsuba variant of the reference.")]
+    heuristic_variant: str
+    heuristic: str
+    interpolation: Literal["flat", "gouraud", "phong"]
+    seed: Annotated[Count, Meta(description="From which the seed of each pass is hashed.")]
+    resolution: Resolution
+    plan: PlanRecord
+    viewing: Viewing
+    metrics: Annotated[
+        dict[str, Summary], Meta(description="By the name of each metric that was declared.")
+    ]
+    log2_luminance: RatioSummary
+    significant: Significant
+    pixels: Pixels
+    limits: LimitCounts
+    regions: Annotated[
+        tuple[Region, ...],
+        Meta(description="Boxes that hold most of dE2000, of greatest worth first."),
+    ]
+    histograms: Annotated[
+        dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratio.")
+    ]
+    pairing: Pairing
+    time: TimeSpent
+    unrepresentable: tuple[Unrepresentable, ...]
+    integrator_given: Annotated[str | None, Meta(description="The scene's own integrator.")]
+    overridden: tuple[Override, ...]
+    warnings: tuple[str, ...]
+    versions: Versions
+    command: Annotated[str, Meta(description="What repeats this comparison.")]
+    noise_target: NoiseTarget | None = None
+    record_version: int = VERSION

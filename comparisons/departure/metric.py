@@ -1,0 +1,202 @@
+"""What a metric is, and where metrics are declared.
+
+A metric is a function of two images and the viewing conditions, whose value is a map. One
+declaration is all that it takes: records, tables, the page and the checks list what is declared.
+:class:`Metric` takes any such function, so that one which looks at neighbourhoods fits;
+:class:`Pixelwise` splits it into a colour space and a distance, so that a reference is converted
+once and compared with many images.
+
+Metrics come from outside, too, by :func:`declare`, or by an entry point of the group
+``fotismos.metrics`` whose object is a :class:`Metric`::
+
+    declare(
+        Metric(
+            name="absolute",
+            label="Mean absolute difference",
+            unit="1 is display white",
+            definition="Mean over the channels of the absolute linear difference.",
+            caution="It knows nothing of eyes.",
+            map_range=(0.0, 1.0),
+            function=lambda test, reference, viewing: np.abs(test - reference).mean(axis=-1),
+        )
+    )
+
+Every image is a float array (H, W, 3) of linear light with the sRGB primaries (ITU-R BT.709, D65);
+1.0 is display white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
+from heuristic.errors import InputError
+from reference.rendering.finite import require_finite
+
+#: Of the entry points of other packages that declare metrics.
+GROUP = "fotismos.metrics"
+
+#: Names of the layers and columns that stand beside the metrics.
+RESERVED = frozenset(
+    {
+        "heuristic", "reference", "reference_stderr", "standard_error", "flags", "P", "N",
+        "log2_luminance", "significant", "effects", "name", "shape", "noise", "marked",
+    }
+)  # fmt: skip
+
+Distances = Callable[..., Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A distance between two images.
+
+    name
+        An identifier: its key in records, its layer in EXR files, its column in tables.
+    label, unit, definition, caution
+        As printed in reports; `caution` says where not to trust it.
+    map_range
+        Fixed (low, high) of the colour bar, so that maps of different scenes compare.
+    function
+        ``(test, reference, viewing) -> (H, W)``: a map of distances, ≥ 0 and finite, of linear
+        images (H, W, 3). `Pixelwise` needs none.
+    visible
+        Thresholds in the metric's unit; summaries say which share of the pixels is above each.
+    rounding
+        Difference that the rounding of float32 renderings can make in its mean.
+    heading
+        In tables where its mean stands for it; `label`, and "mean", where it is not given.
+    drawn
+        Whether its map is shown and kept.
+    linear
+        Whether it is a difference of linear values: its mean is then the root of the mean square,
+        and its best exposure is that of least squares.
+    """
+
+    name: str
+    label: str
+    unit: str
+    definition: str
+    caution: str
+    map_range: tuple[float, float]
+    function: Callable[[Array, Array, Viewing], Array] | None = None
+    visible: tuple[float, ...] = ()
+    rounding: float = 1e-3
+    heading: str = ""
+    drawn: bool = True
+    linear: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.heading:
+            object.__setattr__(self, "heading", f"{self.label}, mean")
+
+    def __call__(
+        self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
+    ) -> Array:
+        """The map (H, W) of distances between two linear images (H, W, 3)."""
+        test, reference = checked_pair(test, reference)
+        return self.against(reference, ..., viewing)(test)
+
+    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
+        """Return a function of test images, for distances from the reference at some pixels.
+
+        where
+            Any index of pixels, such as a boolean mask (H, W).
+
+        The function is ``(test, within=None, factor=1.0)``: distances of ``factor · test`` at
+        `where`, or at those of its pixels that the mask `within` holds (`where` is a mask then).
+        """
+
+        def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
+            values = self.function(factor * test, reference, viewing)
+            return values[where if within is None else within]
+
+        return distances
+
+    def mean(self, values: Array) -> float:
+        """The mean of distances as the metric takes it; 0 where there are none."""
+        if not values.size:
+            return 0.0
+        return float(np.sqrt(np.mean(values**2)) if self.linear else values.mean())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pixelwise(Metric):
+    """A distance of two pixels, whatever stands around them.
+
+    coordinates
+        ``(rgb, viewing) -> (..., 3)``: linear RGB to a colour space.
+    difference
+        ``(coordinates, coordinates) -> (...)``: distance, ≥ 0. The first is the reference's where
+        it matters; none of the built-in metrics is asymmetric.
+    """
+
+    coordinates: Callable[[ArrayLike, Viewing], Array]
+    difference: Callable[[Array, Array], Array]
+
+    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
+        """Return a function as `Metric.against` does; images may be lists of pixels (N, 3)."""
+        fixed = self.coordinates(reference[where], viewing)
+
+        def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
+            if within is None:
+                return self.difference(fixed, self.coordinates(factor * test[where], viewing))
+            shown = self.coordinates(factor * test[within], viewing)
+            return self.difference(fixed[within[where]], shown)
+
+        return distances
+
+
+_DECLARED: dict[str, Metric] = {}
+
+#: All metrics by name, in the order of reports: first that by which scenes are judged.
+METRICS: Mapping[str, Metric] = MappingProxyType(_DECLARED)
+
+
+def declare(metric: Metric) -> Metric:
+    """Declare a metric, so that everything lists it.
+
+    Raises `InputError` for a name that is taken or that is not an identifier.
+    """
+    if not metric.name.isidentifier() or metric.name in RESERVED:
+        raise InputError(
+            f"metric {metric.name!r}: a name has letters, digits and _ alone, and is none of"
+            f" {', '.join(sorted(RESERVED))}. Give it another one."
+        )
+    if metric.name in _DECLARED:
+        raise InputError(f"metric {metric.name!r} is declared already. Give it another name.")
+    _DECLARED[metric.name] = metric
+    return metric
+
+
+def declare_from_outside() -> None:
+    """Declare what the entry points of other packages name."""
+    for point in entry_points(group=GROUP):
+        declare(point.load())
+
+
+def drawn() -> dict[str, Metric]:
+    """The metrics by name whose maps are shown."""
+    return {name: metric for name, metric in METRICS.items() if metric.drawn}
+
+
+def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
+    """Both images as float64, checked: same shape (..., 3) and finite.
+
+    Raises `InputError` for the shapes, `NonFiniteError` for a NaN or an infinity.
+    """
+    test, reference = np.asarray(test, np.float64), np.asarray(reference, np.float64)
+    if test.shape != reference.shape or test.shape[-1:] != (3,):
+        raise InputError(
+            f"images of shapes {test.shape} and {reference.shape} cannot be compared: "
+            "both must be (height, width, 3)"
+        )
+    require_finite(test, "test image")
+    require_finite(reference, "reference image")
+    return test, reference

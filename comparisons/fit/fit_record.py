@@ -1,0 +1,171 @@
+"""The record of a fit, ``fit.json``."""
+
+from typing import Any, Literal
+
+from comparisons.amounts import Amount, Count, Resolution, Size
+from comparisons.circumstances import Pixels, Versions
+from comparisons.departure.spaces import Viewing
+from comparisons.fit.optimise import Start
+from comparisons.records import VERSION, Record
+
+
+class Departure(Record):
+    """Means of a metric over the counted pixels, in its unit.
+
+    Attributes
+    ----------
+    before, after
+        With the paired parameters, and with the fitted ones.
+    noise_floor
+        What the reference's noise alone would give.
+    parameter_error
+        ``before - after``: what better parameters remove.
+    model_error
+        ``after``: what no parameters remove.
+    """
+
+    before: Amount
+    after: Amount
+    p95_after: Amount
+    noise_floor: Amount
+    parameter_error: float
+    model_error: Amount
+
+
+class Fitted(Record, kw_only=True):
+    """A parameter in the terms of the chapters, and of this form of the lobe.
+
+    Attributes
+    ----------
+    channel
+        Of a coefficient that has a number for each; otherwise empty.
+    is_factor
+        Whether the numbers are factors: on a texture, or on a paired intensity.
+    paired
+        By the pairing table.
+    fitted
+        The best value; null where the image does not tell it.
+    stopped_at
+        Where the search ended; of a parameter that is not identifiable, any value would do.
+    interval
+        95 %, by the reference's noise alone; null at a bound, and where not identifiable.
+    reason
+        Why it is not identifiable, otherwise empty.
+    partners
+        Parameters that make up for it.
+    """
+
+    name: Literal["k_a", "k_d", "k_s", "n", "intensity"]
+    channel: Literal["", "R", "G", "B"] = ""
+    is_factor: bool
+    paired: float
+    fitted: float | None
+    stopped_at: float
+    interval: tuple[float, float] | None
+    bounds: tuple[float, float]
+    at_bound: bool
+    identifiable: bool
+    reason: str
+    partners: tuple[str, ...] = ()
+
+
+class FittedLight(Fitted, kw_only=True):
+    """The factor on the intensity of a light."""
+
+    light: str
+
+
+class FittedMaterial(Record):
+    """A material.
+
+    Attributes
+    ----------
+    reference
+        Plugin and plain parameters of the material in the reference.
+    pixels
+        Counted pixels that see it.
+    """
+
+    name: str
+    reference: dict[str, Any] | None
+    pixels: Count
+    parameters: tuple[Fitted, ...]
+
+
+class FormFit(Record):
+    """The best fit of one form of the lobe; a form and its normalised variant are one fit.
+
+    Attributes
+    ----------
+    normalised
+        Whether k_s is the lobe's albedo at normal incidence.
+    loss
+        At the best parameters, in the loss's own unit.
+    lights
+        Factors on intensities; empty where they were not fitted.
+    convergence
+        All searches.
+    """
+
+    form: Literal["phong", "blinn"]
+    normalised: bool
+    loss: Amount
+    departure: dict[str, Departure]
+    materials: tuple[FittedMaterial, ...]
+    lights: tuple[FittedLight, ...]
+    convergence: tuple[Start, ...]
+
+
+class LossName(Record):
+    """What was minimised."""
+
+    name: str
+    unit: str
+
+
+class FitTimes(Record):
+    """Seconds."""
+
+    rendering_s: Amount
+    fitting_s: Amount
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return self.rendering_s + self.fitting_s
+
+
+class FitRecord(Record, kw_only=True):
+    """The heuristic parameters that come nearest to one scene's reference, and what they leave.
+
+    Attributes
+    ----------
+    best
+        Index in fits of the form with the least loss.
+    command
+        Repeats the fit.
+    """
+
+    record_version: int = VERSION
+    scene: str
+    variant: str
+    seed: Count
+    resolution: Resolution
+    spp: Size
+    passes: Size
+    viewing: Viewing
+    pairing: str
+    loss: LossName
+    intensities: bool
+    pixels: Pixels
+    fits: tuple[FormFit, ...]
+    best: Count
+    warnings: tuple[str, ...]
+    versions: Versions
+    time: FitTimes
+    command: str
+
+    @property
+    def nearest(self) -> FormFit:
+        """The fit of the form with the least loss."""
+        return self.fits[self.best]

@@ -1,0 +1,56 @@
+"""Standard errors and intervals of repeated measurements."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from comparisons.records import Record
+
+LEVEL = 0.95
+
+
+class Estimated(Record):
+    """A number with a 95 % interval of Student's t over the replicates."""
+
+    value: float
+    low: float
+    high: float
+
+
+def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
+    """Return the standard error of a statistic, from its values (n, ...) without one of n repeats.
+
+    It holds for statistics that are not linear: those of single repeats, which are noisier than
+    their mean, would not average to its own.
+    """
+    left_out = np.asarray(left_out, float)
+    return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
+
+
+def student(value: float, error: float, count: int) -> Estimated:
+    """Return the interval around a value whose standard error is known from ``count`` repeats."""
+    from scipy.stats import t
+
+    half = float(t.ppf(0.5 + LEVEL / 2, count - 1)) * error
+    return Estimated(value, value - half, value + half)
+
+
+def of_mean(values: ArrayLike) -> Estimated:
+    """Return the mean of independent values, with its interval."""
+    values = np.asarray(values, float)
+    error = values.std(ddof=1) / np.sqrt(len(values))
+    return student(float(values.mean()), float(error), len(values))
+
+
+def median_ranks(count: int) -> tuple[int, int, float]:
+    """Return the places, from 0, of the ordered values that enclose a median, and their coverage.
+
+    Each of ``count`` values is below the median with chance 1/2, whatever the distribution. The
+    enclosing values are the closest whose coverage is :data:`LEVEL`; with fewer than six values not
+    even the extremes reach it.
+    """
+    from scipy.stats import binom
+
+    place = max(0, int(binom.ppf((1 - LEVEL) / 2, count, 0.5)) - 1)
+    return place, count - 1 - place, float(1 - 2 * binom.cdf(place, count, 0.5))

@@ -1,0 +1,32 @@
+"""Standard errors and intervals, by closed forms."""
+
+import numpy as np
+import pytest
+
+from comparisons import intervals
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error():
+    values = np.random.default_rng(2).normal(size=(9, 3))
+    left_out = [np.delete(values, place, axis=0).mean(axis=0) for place in range(9)]
+    expected = values.std(axis=0, ddof=1) / 3
+    np.testing.assert_allclose(intervals.jackknife_error(left_out), expected, rtol=1e-12)
+
+
+def test_the_interval_of_a_mean_is_that_of_students_table():
+    found = intervals.of_mean([1.0, 2.0, 3.0, 4.0])  # t(0.975, 3) = 3.182446
+    half = 3.182446 * np.std([1, 2, 3, 4], ddof=1) / 2
+    assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
+    assert found.high - 2.5 == 2.5 - found.low
+
+
+def test_without_error_the_interval_is_the_value():
+    assert intervals.student(0.25, 0.0, 16) == intervals.Estimated(0.25, 0.25, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("count", "expected"),
+    [(2, (0, 1, 0.5)), (5, (0, 4, 1 - 2 / 32)), (9, (1, 7, 1 - 20 / 512))],
+)
+def test_the_ranks_around_a_median_are_those_of_the_sign_test(count, expected):
+    assert intervals.median_ranks(count) == pytest.approx(expected, abs=1e-15)

@@ -1,0 +1,52 @@
+"""Records: what schemas say of them, and which files are read."""
+
+import pytest
+
+from comparisons import records
+from comparisons.records import VERSION, Record
+from heuristic.errors import InputError
+
+
+class Toy(Record):
+    """A toy.
+
+    It is small.
+
+    Attributes
+    ----------
+    colour, sheen
+        Of its skin, as
+        :class:`tests.Skin`.
+    """
+
+    colour: str
+    sheen: float = 0.0
+    record_version: int = VERSION
+
+
+def test_a_docstring_describes_the_attributes_in_the_schema():
+    toy = records.schema(Toy)["$defs"]["Toy"]
+    assert toy["description"] == "A toy. It is small."
+    described = {name: field.get("description") for name, field in toy["properties"].items()}
+    words = "Of its skin, as tests.Skin."
+    assert described == {"colour": words, "sheen": words, "record_version": None}
+
+
+def test_what_was_written_is_read():
+    assert records.read(Toy, records.to_json(Toy("red", 0.5)), "toy.json") == Toy("red", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{", "not JSON"),
+        ("[]", "array"),
+        ('{"colour": "red"}', "of fotismos 0.1"),
+        ('{"colour": "red", "record_version": 9}', "version 9"),
+        ('{"colour": 5, "record_version": 2}', "got `int`"),
+        ('{"colour": "red", "size": 1, "record_version": 2}', "unknown field `size`"),
+    ],
+)
+def test_what_is_not_such_a_record_is_refused(text, expected):
+    with pytest.raises(InputError, match=f"^toy.json: .*{expected}"):
+        records.read(Toy, text, "toy.json")
