@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Estimate, Mean, add_difference
 
@@ -164,7 +164,7 @@ def noise_percentile(sums, counted, viewing):
 
     The noise image is that of the difference of the halves, what both share cancelled.
     """
-    metric = METRICS["dE2000"]
+    metric = LEADING
     reference, noise = sums[1].mean()[counted], sums[2].noise()[counted]
     if not counted.any() or not noise.any():
         return 0.0

@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from comparisons import intervals
 from comparisons.amounts import Amount, Positive
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING
 from comparisons.records import Record
 from reference.rendering.passes import passes
 
@@ -64,7 +64,7 @@ class Judge:
     """
 
     def __init__(self, reference, counted, viewing):
-        self.metric = METRICS["dE2000"]
+        self.metric = LEADING
         self.viewing = viewing
         self.counted = counted
         self.reference = reference.mean[counted]

@@ -89,10 +89,11 @@ def summarise(
     factor = best_exposure(metric, test, reference, mask, viewing)
     has_noise = noise is not None and np.any(noise)
     distance, exposed, noisy = np.zeros(test.shape[:-1]), [], []
+    pixelwise = isinstance(metric, Pixelwise)
     for rows in _blocks(metric, test):
         shown, truth, here = test[rows], reference[rows], mask[rows]
-        # Equal colours are 0 apart: what lies around the objects of a figure costs nothing.
-        wanted = here | (shown != truth).any(axis=-1)
+        # Equal pixels are 0 apart: what lies around the objects of a figure costs nothing.
+        wanted = here | (not pixelwise or (shown != truth).any(axis=-1))
         distances = metric.against(truth, wanted, viewing)
         distance[rows][wanted] = distances(shown)
         if factor != 1.0:

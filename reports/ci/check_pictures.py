@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from PIL import Image, ImageDraw, ImageFont
 
 from comparisons.check.measurement import HALVES, block_edges
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import luminance
 from reports.files import images
 
@@ -42,7 +42,7 @@ def pictures(check, before=None):
         made[f"{half}-p"] = _p_values(check, half, now)
         if before is not None:
             size = before[half].shape[:2]
-            distance = METRICS["dE2000"](_reduced_to(now, size), before[half])
+            distance = LEADING(_reduced_to(now, size), before[half])
             made[f"{half}-error"] = _enlarged(images.error_map(distance, LARGEST_ERROR))
     return {name: images.png(picture) for name, picture in made.items()}
 

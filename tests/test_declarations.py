@@ -1,0 +1,172 @@
+"""What is declared outside the package is found everywhere without another line changed.
+
+Each declaration is a toy of a few lines. A fixture declares it and takes it back.
+"""
+
+import csv
+import json
+import re
+from dataclasses import replace
+from io import StringIO
+
+import jsonschema
+import numpy as np
+import OpenEXR
+import pytest
+from scipy.ndimage import uniform_filter
+
+from comparisons.check.measurement import measurement
+from comparisons.check.moved import differences
+from comparisons.departure import metric as declarations
+from comparisons.departure.metric import GROUP, Metric, declare
+from comparisons.departure.metrics import BUILT_IN, METRICS
+from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
+from comparisons.fit.summary import departure
+from comparisons.study import columns
+from heuristic.errors import InputError
+from tests.schemas import schema
+
+# -- A metric ------------------------------------------------------------------------------------
+
+
+def blurred(test, reference, viewing):
+    """Mean absolute difference of images blurred by boxes of 3 by 3: it knows neighbourhoods."""
+    images = (uniform_filter(image, (3, 3, 1)) for image in (test, reference))
+    return viewing.exposure * np.abs(np.subtract(*images)).mean(axis=-1)
+
+
+BLURRED = Metric(
+    name="blurred",
+    label="Blurred <difference>",
+    unit="1 is display white",
+    definition="Mean absolute difference after a blur.",
+    caution="It is a toy.",
+    map_range=(0.0, 0.5),
+    visible=(0.25,),
+    rounding=0.125,
+    function=blurred,
+)
+
+
+@pytest.fixture
+def metric():
+    """The toy, declared."""
+    yield declare(BLURRED)
+    declarations._DECLARED.pop(BLURRED.name)
+
+
+@pytest.fixture
+def results(metric, run, scene_file, tmp_path):
+    """The folder of a run that knows the toy."""
+    run("compare", scene_file, "-o", tmp_path / "out", "--spp", 4, "--figures")
+    return tmp_path / "out"
+
+
+def layer(results, name):
+    """Return a layer of the comparison's EXR file, its channels last."""
+    path = str(results / "my-scene/comparison.exr")
+    with OpenEXR.File(path, separate_channels=True) as file:
+        pixels = {key: channel.pixels for key, channel in file.channels().items()}
+    return np.stack([pixels[f"{name}.{c}"] for c in "RGBXYZ" if f"{name}.{c}" in pixels], axis=-1)
+
+
+def test_a_metric_from_outside_is_in_the_record_and_the_exr(results):
+    record = json.loads((results / "my-scene/comparison.json").read_text(encoding="utf-8"))
+    jsonschema.validate(record, schema("comparison"))
+    found = record["metrics"]["blurred"]
+    image = layer(results, "blurred")[..., 0]
+    halves = [layer(results, half) for half in ("heuristic", "reference")]
+    np.testing.assert_allclose(image, blurred(*halves, DEFAULT_VIEWING), rtol=1e-3, atol=1e-6)
+    seen = layer(results, "N").any(axis=-1)
+    assert found["mean"] == pytest.approx(image[seen].mean(dtype=float), rel=1e-3)
+    assert found["visible"] == {"0.25": pytest.approx((image[seen] > 0.25).mean(), abs=0.01)}
+    assert 0 < found["noise_floor"] < found["mean"]
+    assert found["after_exposure"]["mean"] <= found["mean"]
+    assert sum(record["histograms"]["blurred"]["counts"]) > 0
+    assert (results / "my-scene/blurred.png").stat().st_size > 0
+    assert (results / "figures/my-scene-histogram-blurred.svg").stat().st_size > 0
+
+
+def test_a_metric_from_outside_is_in_the_tables(results):
+    rows = list(csv.DictReader(StringIO((results / "tables/metrics.csv").read_text("utf-8"))))
+    assert [row["metric"] for row in rows] == [*BUILT_IN, "blurred"]
+    assert float(rows[-1]["mean"]) > 0
+    assert float(rows[-1]["visible.0.25"]) >= 0
+    assert "| Blurred <difference> |" in (results / "tables/metrics.md").read_text("utf-8")
+
+
+def test_a_metric_from_outside_is_on_the_page_and_in_its_viewer(results):
+    html = (results / "index.html").read_text(encoding="utf-8")
+    data = re.search(r'id="page-data">(.*?)</script>', html, re.DOTALL)[1]
+    (scene,) = json.loads(data)["scenes"]
+    maps = {one["name"]: one for one in json.loads(data)["maps"]}
+    assert maps["blurred"]["kind"] == "error"
+    assert maps["blurred"]["top"] == 0.5
+    assert scene["keys"]["blurred"] > 0
+    assert "blurred" in {plane["name"] for plane in scene["images"]["planes"]}
+    label = "Blurred &lt;difference&gt;"
+    for place in (
+        '<option value="blurred">',  # to sort by
+        f'data-sort="blurred">{label},<br>mean',  # the overview's column
+        f"<dt>{label}</dt>",  # how to read it
+        "It is a toy.",
+        f'<th scope="row">{label}</th>',  # the scene's numbers
+        'data-legend="blurred"',
+        'data-value="blurred"',  # the inspector
+    ):
+        assert place in html, place
+    assert "Blurred <difference>" not in html.split('id="page-data"')[0]
+
+
+def test_a_metric_from_outside_is_measured_by_checks_which_read_older_baselines(metric):
+    images = np.random.default_rng(0).uniform(0.1, 0.9, (4, 2, 8, 8, 3))
+    counted = np.ones((8, 8), bool)
+    found = measurement(images, counted, DEFAULT_VIEWING)
+    expected = blurred(*images.mean(axis=0), DEFAULT_VIEWING).mean()
+    assert found.metrics["blurred"].value == pytest.approx(expected)
+    assert found.metrics["blurred"].error > 0
+    (quantity,) = (one for one in found.quantities() if one.name == "blurred")
+    assert quantity.rounding == 0.125
+    older = found.of(BUILT_IN)
+    names = {move.quantity for move in differences(older, found.of(older.metrics))}
+    assert "blurred" not in names
+    assert set(BUILT_IN) < names
+
+
+def test_a_metric_from_outside_is_in_fits_and_studies(metric):
+    rng = np.random.default_rng(0)
+    before, after, reference = rng.random((3, 8, 8, 3))
+    counted = np.ones((8, 8), bool)
+    data, maps = departure(before, after, reference, counted, 0 * after, DEFAULT_VIEWING)
+    expected = blurred(after, reference, DEFAULT_VIEWING)
+    np.testing.assert_array_equal(maps["blurred"], expected)
+    assert data["blurred"].after == expected.mean()
+    assert columns.results()["blurred"].meaning == "Blurred <difference>, mean"
+
+
+def test_a_metric_of_neighbourhoods_sees_the_whole_image(metric):
+    """Its values at some pixels are those of its map, not of an image of these pixels alone."""
+    test, reference = np.random.default_rng(1).random((2, 6, 7, 3))
+    where = np.zeros((6, 7), bool)
+    where[2, 3:5] = True
+    viewing = Viewing(exposure=0.5)
+    expected = blurred(test, reference, viewing)
+    np.testing.assert_array_equal(metric(test, reference, viewing), expected)
+    np.testing.assert_array_equal(metric.against(reference, where, viewing)(test), expected[where])
+
+
+@pytest.mark.parametrize("name", ["dE2000", "heuristic", "no name", "a.b", ""])
+def test_a_name_that_is_taken_or_unfit_is_refused(name):
+    with pytest.raises(InputError, match="name"):
+        declare(replace(BLURRED, name=name))
+    assert list(METRICS) == list(BUILT_IN)
+
+
+def test_metrics_of_installed_packages_are_declared(monkeypatch):
+    class Point:
+        def load(self):
+            return BLURRED
+
+    monkeypatch.setattr(declarations, "entry_points", lambda group: [Point()] * (group == GROUP))
+    declarations.declare_from_outside()
+    assert declarations._DECLARED.pop("blurred") is BLURRED
