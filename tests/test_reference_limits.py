@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from comparisons import records
 from comparisons.departure.limits import (
     SMALLEST_ALPHA,
     WEDGE_LOST,
