@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from comparisons import records
 from comparisons.departure.limits import (
     SMALLEST_ALPHA,
     WEDGE_LOST,
@@ -44,7 +45,7 @@ def noise(seed=0, size=0.01):
 
 def test_a_surface_without_limits_has_none(plain):
     limits = find(plain, GREY, noise())
-    assert plain(limits.counts()) == {
+    assert records.plain(limits.counts()) == {
         "clamped": 0, "terminator": 0, "energy_loss": 0, "fireflies": 0, "any": 0
     }  # fmt: skip
 
