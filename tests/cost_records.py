@@ -52,6 +52,7 @@ def _record(scene):
         "scene": scene,
         "variant": "llvm_ad_rgb",
         "heuristic_variant": "llvm_ad_rgb",
+        "heuristic": "phong",
         "interpolation": "phong",
         "seed": 7,
         "resolution": [WIDTH, HEIGHT],

@@ -73,6 +73,7 @@ def data():
         "scene": "fig-8-9",
         "variant": "llvm_ad_rgb",
         "heuristic_variant": "llvm_ad_rgb",
+        "heuristic": "phong",
         "interpolation": "phong",
         "seed": 7,
         "resolution": [6, 4],

@@ -100,7 +100,7 @@ def test_a_map_of_more_parameters_says_what_it_averages(shipped):
         ({"kind": "pie"}, "map, lines"),
         ({"y": None}, "lacks y"),
         ({"part": "nix"}, "part = 'nix'"),
-        ({"x": "wall"}, "'wall' is no parameter"),
+        ({"x": "wall"}, "parameter 'wall' is not known"),
         ({"colour": "red"}, "has colour"),
     ],
 )
@@ -113,7 +113,7 @@ def test_a_figure_that_cannot_be_drawn_is_refused(change, expected, shipped):
 
 def test_facts_are_asked_for_by_what_there_is(shipped):
     facts = query.Facts(shipped[1])
-    with pytest.raises(InputError, match="no column 'dE1976'"):
+    with pytest.raises(InputError, match="column 'dE1976' is not known"):
         facts.value("incidence", "dE1976")
     with pytest.raises(InputError, match="no part 'x'"):
         facts.value("x", "dE2000")
