@@ -56,6 +56,7 @@ def main():
                                               [p.reference for p in pairs]])  # fmt: skip
     shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
     _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
+    _architecture()
     _example()
     _notebook()
 
@@ -120,6 +121,14 @@ def _sheet(name, titles, rows):
     for place, title in zip(axes[0], titles, strict=True):
         place.set_title(title, fontsize=8, pad=3)
     atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
+
+
+def _architecture():
+    """Draw the rooms that one comparison passes through."""
+    import rooms  # beside this script
+
+    found = rooms.rooms(rooms.way())
+    atomic.write(DOCS / "architecture.svg", figures.drawn(rooms.picture(found), "svg"))
 
 
 def _example():

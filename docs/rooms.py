@@ -6,15 +6,21 @@ the code as it is.
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
+from inspect import CO_OPTIMIZED
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import fill
 
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("heuristic", "reference", "comparisons", "reports")
 SCENE = "fig-8-9"
+FILLS = ("#e8eef7", "#e9f4ea", "#fdf3e1", "#f6e9f2")
+"""Colours of the floors."""
 
 
 @contextmanager
@@ -23,8 +29,10 @@ def watched() -> Iterator[list[str]]:
     files: list[str] = []
 
     def note(frame, event, _):
-        name = frame.f_code.co_filename
-        if event == "call" and name.startswith(str(ROOT)) and (not files or files[-1] != name):
+        code = frame.f_code
+        is_function = bool(code.co_flags & CO_OPTIMIZED)
+        name = code.co_filename
+        if event == "call" and is_function and name.startswith(str(ROOT)) and files[-1:] != [name]:
             files.append(name)
 
     sys.setprofile(note)
@@ -35,16 +43,21 @@ def watched() -> Iterator[list[str]]:
 
 
 def way() -> list[str]:
-    """Compare a scene in a small size, and return the modules that it passes through, in order."""
+    """Compare a scene in a small size, and return the modules that it passes through, in order.
+
+    It is compared twice, and the second time watched: the first imports what is needed.
+    """
     from reports import cli
 
-    arguments = ["compare", SCENE, "--resolution", "16x16", "-q"]
-    with TemporaryDirectory() as folder:
-        sys.argv = ["fotismos", *arguments, "-o", folder]
+    words = ["fotismos", "compare", SCENE, "--resolution", "16x16", "-q", "--fresh", "-o"]
+    with TemporaryDirectory() as folder, redirect_stdout(StringIO()):
+        sys.argv = [*words, folder]
+        with suppress(SystemExit):
+            cli.main()
         with watched() as files, suppress(SystemExit):
             cli.main()
     paths = [Path(file).relative_to(ROOT) for file in files]
-    return [str(path) for path in paths if path.parts[0] in FLOORS]
+    return [str(path) for path in paths if path.parts[0] in FLOORS and path.suffix == ".py"]
 
 
 def rooms(modules: list[str]) -> dict[str, list[str]]:
@@ -60,24 +73,22 @@ def rooms(modules: list[str]) -> dict[str, list[str]]:
 
 def picture(found: dict[str, list[str]]) -> Figure:
     """Draw the rooms from top to bottom as they are entered, each floor a column."""
-    height = 0.42
-    figure = Figure(figsize=(9, 0.9 + height * len(found)))
+    figure = Figure(figsize=(9, 0.5 + 0.5 * len(found)))
     axes = figure.add_axes((0, 0, 1, 1))
-    axes.set_xlim(0, 4)
-    axes.set_ylim(len(found) + 0.4, -1.2)
+    axes.set_xlim(-0.2, 4.05)
+    axes.set_ylim(len(found) - 0.4, -1.1)
     axes.axis("off")
     for column, floor in enumerate(FLOORS):
-        axes.text(column + 0.5, -0.8, floor, ha="center", weight="bold", size=10)
-        if column:
-            axes.axvline(column, color="0.85", linewidth=0.8)
-    before = None
+        axes.text(column + 0.48, -0.8, floor, ha="center", va="center", weight="bold", size=11)
     for row, (room, modules) in enumerate(found.items()):
-        column = FLOORS.index(Path(room).parts[0]) + 0.5
-        name = "/".join(Path(room).parts[1:]) or "."
-        axes.text(column, row, name, ha="center", va="center", size=9, weight="bold")
-        axes.text(column, row + 0.36, ", ".join(modules), ha="center", va="center", size=4.5)
-        if before is not None:
-            arrow = {"arrowstyle": "->", "color": "0.6", "shrinkA": 9, "shrinkB": 9}
-            axes.annotate("", (column, row), before, arrowprops=arrow)
-        before = (column, row)
+        parts = Path(room).parts
+        column = FLOORS.index(parts[0])
+        middle = column + 0.48
+        axes.plot((-0.05, column), (row, row), color="0.85", linewidth=0.8, zorder=0)
+        axes.text(-0.12, row, str(row + 1), ha="center", va="center", size=8, color="0.4")
+        axes.add_patch(Rectangle((column, row - 0.42), 0.96, 0.84, facecolor=FILLS[column]))
+        axes.text(middle, row - 0.22, "/".join(parts[1:]) or parts[0], ha="center", va="center",
+                  size=8.5, weight="bold")  # fmt: skip
+        text = fill(", ".join(modules), 50)
+        axes.text(middle, row + 0.13, text, ha="center", va="center", size=5.5, linespacing=1.05)
     return figure
