@@ -1,4 +1,4 @@
-"""What charts say beside their plots: texts that stand apart, and lines that lead to them."""
+"""Places of the texts beside a plot, so that they stand apart."""
 
 LABEL_GAP = 15
 """Pixels from one name to the next, at least."""
@@ -29,33 +29,3 @@ def spread(wanted, gap, length):
 
 def _top(block, gap):
     return sum(block) / len(block) - gap * (len(block) - 1) / 2
-
-
-def rule(start, end, **style):
-    """Return a line between two places in pixels, as a layer."""
-    return {
-        "data": {"values": [{}]},
-        "mark": {"type": "rule", "clip": False, **style},
-        "encoding": {
-            "x": {"value": start[0]},
-            "y": {"value": start[1]},
-            "x2": {"value": end[0]},
-            "y2": {"value": end[1]},
-        },
-    }
-
-
-def label(text, x, y):
-    """Return a text to the right of a place in pixels, as a layer."""
-    return {
-        "data": {"values": [{}]},
-        "mark": {
-            "type": "text",
-            "text": text,
-            "align": "left",
-            "baseline": "middle",
-            "fontSize": 12,
-            "clip": False,
-        },
-        "encoding": {"x": {"value": x}, "y": {"value": y}},
-    }
