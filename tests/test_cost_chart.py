@@ -8,22 +8,22 @@ import vl_convert
 from msgspec import convert, structs
 
 from comparisons.cost.timing import Measured
-from reports.charts import error_over_time, labels
+from reports.charts import error_over_time
 from tests import cost_records
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_names_stand_apart_in_order_and_inside(seed):
     wanted = np.sort(np.random.default_rng(seed).uniform(0, 380, 3 + seed))
-    places = labels.spread(list(wanted), 15, 380)
+    places = error_over_time.spread(list(wanted), 15, 380)
     assert np.all(np.diff(places) >= 15 - 1e-9)
     assert min(places) >= 0
     assert max(places) <= 380 + 1e-9
 
 
 def test_names_with_room_stay_where_they_want_to_be():
-    assert labels.spread([10, 50, 300], 15, 380) == [10, 50, 300]
-    assert labels.spread([100, 102], 15, 380) == [93.5, 108.5]
+    assert error_over_time.spread([10, 50, 300], 15, 380) == [10, 50, 300]
+    assert error_over_time.spread([100, 102], 15, 380) == [93.5, 108.5]
 
 
 def point(rung, spp, time, error, pareto=False):
@@ -99,6 +99,6 @@ def test_names_stand_beside_the_plot_and_lead_to_their_slowest_point():
     assert {x for x, _ in found.values()} == {error_over_time.WIDTH + 14}
     places = dict(zip(("first", "full plan", "Phong kernel"), symbols(svg), strict=True))
     between = abs(found["full plan"][1] - found["Phong kernel"][1])
-    assert between >= labels.LABEL_GAP
+    assert between >= error_over_time.LABEL_GAP
     for name, (_, y) in found.items():
-        assert y == pytest.approx(places[name][1] + 3, abs=labels.LABEL_GAP)
+        assert y == pytest.approx(places[name][1] + 3, abs=error_over_time.LABEL_GAP)

@@ -3,13 +3,17 @@
 from math import log10
 
 import altair as alt
+import numpy as np
+from scipy.optimize import isotonic_regression
 
-from reports.charts.labels import LABEL_GAP, spread
 from reports.charts.theme import FAINT
 from reports.charts.vega import specification
 
 WIDTH, HEIGHT = 560, 380
 """Pixels of the plot itself; names stand to its right."""
+
+LABEL_GAP = 15
+"""Pixels from one name to the next, at least."""
 
 LEAST_ERROR = 1e-3
 """ΔE2000: smaller ones are drawn at the lower border, since a logarithmic axis has no 0."""
@@ -28,7 +32,12 @@ def error_over_time(record):
 
     It stands alone, with a title and a white ground; :func:`plot` is what a page shows.
     """
-    subtitle = [f"{size(record)}, {machine(record)}", *reading(record)]
+    (width, height), machine = record.resolution, record.machine
+    subtitle = [
+        f"{width} × {height} pixels, {record.rounds} rounds, {machine.cores} cores,"
+        f" {machine.processor}",
+        *reading(record),
+    ]
     title = {"text": f"{record.scene}: error against time", "subtitle": subtitle}
     description = f"Error against time of the methods on {record.scene}"
     return plot(record, "white") | {"title": title, "description": description}
@@ -59,17 +68,6 @@ def plot(record, ground="transparent"):
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
     chart = alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding)
     return specification(chart)
-
-
-def size(record):
-    """Say how large the images were, and how often each was rendered."""
-    width, height = record.resolution
-    return f"{width} × {height} pixels, {record.rounds} rounds"
-
-
-def machine(record):
-    """Say what machine the times are of."""
-    return f"{record.machine.cores} cores, {record.machine.processor}"
 
 
 def reading(record):
@@ -193,3 +191,14 @@ def _names(rows, times, errors):
             x=alt.value(WIDTH + 14), y=beside, text="rung:N"
         ),
     ]
+
+
+def spread(wanted, gap, length):
+    """Move places on a line apart: at least ``gap`` between neighbours, in the same order.
+
+    ``wanted`` are pixels in ascending order. Neighbours that would touch become a block about the
+    mean of what they want; blocks stay within ``[0, length]`` where they fit.
+    """
+    least = gap * np.arange(len(wanted))  # each place less what those before it take
+    moved = isotonic_regression(np.asarray(wanted) - least).x
+    return (np.clip(moved, 0, max(length - least[-1], 0)) + least).tolist()

@@ -54,11 +54,8 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
     figure = strip(comparison)
     for kind in FORMATS:
         ownership.write(folder / f"{name}.{kind}", drawn(figure, kind))
-    record = comparison.record
-    for metric, histogram in record.histograms.items():
-        if counted := record.pixels.counted:
-            spec = histograms.spec(metric, histogram, record.metrics[metric], counted)
-            write_chart(folder, f"{name}-histogram-{metric}", spec)
+    for metric, spec in histograms.specs(comparison.record).items():
+        write_chart(folder, f"{name}-histogram-{metric}", spec)
 
 
 def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:

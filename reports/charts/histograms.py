@@ -40,18 +40,22 @@ TEXT = {
 
 
 def figures(record: ComparisonRecord) -> list[vega.Figure]:
-    """The histograms of a record, where it has them and any pixel counts."""
-    counted = record.pixels.counted
-    if not counted:
-        return []
+    """The histograms of a record for the page."""
+    counted, found = record.pixels.counted, record.histograms
     return [
-        vega.figure(
-            METRICS[name].label,
-            spec(name, histogram, record.metrics[name], counted),
-            note(histogram, counted),
-        )
-        for name, histogram in record.histograms.items()
+        vega.figure(METRICS[name].label, chart, note(found[name], counted))
+        for name, chart in specs(record).items()
     ]
+
+
+def specs(record: ComparisonRecord) -> dict[str, dict[str, Any]]:
+    """The specifications by metric: of the histograms of a record, where any pixel counts."""
+    counted = record.pixels.counted
+    return {
+        name: spec(name, histogram, record.metrics[name], counted)
+        for name, histogram in record.histograms.items()
+        if counted
+    }
 
 
 def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dict[str, Any]:

@@ -136,17 +136,15 @@ def _map(figure, table, part, data):
 
 def _places(names, table, part):
     """Return the axes of a map: steps of a grid's parameters, or the spans of sampled ones."""
-    x, y = (_axis(axis, table, name) for axis, name in zip((alt.X, alt.Y), names, strict=True))
+    x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
     if part.design == "grid":
         x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
         return {"x": x, "y": y.type("ordinal").sort("descending").axis(labelOverlap="greedy")}
-    scaled = (
-        axis.scale(type="log", nice=False)
-        if getattr(part.spans[name], "logarithmic", False)
-        else axis
-        for axis, name in zip((x, y), names, strict=True)
-    )
-    return dict(zip("xy", scaled, strict=True))
+    logarithmic = [getattr(part.spans[name], "logarithmic", False) for name in names]
+    return {
+        axis: place.scale(type="log" if is_log else "linear", nice=not is_log)
+        for axis, place, is_log in zip("xy", (x, y), logarithmic, strict=True)
+    }
 
 
 def _lines(figure, table, part, data):
@@ -161,10 +159,13 @@ def _lines(figure, table, part, data):
     x_scale, y_scale = (
         {"type": "log"} if axis in figure.get("log", ()) else {"zero": axis == "y"} for axis in "xy"
     )
-    chart = alt.Chart(alt.Data(values=values)).mark_line(strokeWidth=2)
-    chart = chart.encode(
-        x=_axis(alt.X, table, x).scale(nice=False, **x_scale),
-        y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(**y_scale),
+    chart = (
+        alt.Chart()
+        .mark_line(strokeWidth=2)
+        .encode(
+            x=_axis(alt.X, table, x).scale(nice=False, **x_scale),
+            y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(**y_scale),
+        )
     )
     if series:
         inks = alt.Scale(range=_inks(len({value["y"] for value in values})))

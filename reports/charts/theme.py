@@ -21,15 +21,13 @@ FAINT = "#8a8a8a"
 
 def themed(spec: Mapping[str, Any], theme: Mapping[str, Any]) -> dict[str, Any]:
     """Return a specification in a theme; its own config has the last word."""
-    own = spec.get("config", {})
-    return {**spec, "config": {key: _merged(theme, own, key) for key in {**theme, **own}}}
+    return {**spec, "config": _merged(theme, spec.get("config", {}))}
 
 
-def _merged(theme, own, key):
-    default, value = theme.get(key), own.get(key)
-    if isinstance(default, Mapping) and isinstance(value, Mapping):
-        return {**default, **value}
-    return default if value is None else value
+def _merged(theme, own):
+    if not isinstance(theme, Mapping):
+        return own
+    return {**theme, **{key: _merged(theme.get(key), value) for key, value in own.items()}}
 
 
 def _theme(ink, **own):
