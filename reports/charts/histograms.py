@@ -75,7 +75,7 @@ def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dic
     x = {"field": "value", "type": "quantitative", "title": METRICS[name].label}
     x["scale"] = {"type": "log", "domain": domain, "nice": False, "clamp": True}
     x["axis"] = {"values": [0.01, 0.1, 1, 10, 100, 1000], "format": "~g", "grid": False}
-    y = {"field": "density", "type": "quantitative", "title": "pixels a decade"}
+    y = {"field": "density", "type": "quantitative", "title": "pixels per decade"}
     y["scale"] = {"domain": [0, 1.45 * top], "nice": False}
     y["axis"] = {"format": ".0%", "tickCount": 3}
     area = {"type": "area", "interpolate": "step-after", "color": AREA, "tooltip": True}

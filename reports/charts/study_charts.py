@@ -22,6 +22,9 @@ are viridis and magma, whose lightness rises steadily, so that they survive with
 from collections import defaultdict
 
 import altair as alt
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from comparisons.study import query
 from heuristic.errors import InputError, unknown
@@ -49,7 +52,7 @@ DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
 
 
 def check(figure, study):
-    """See that a figure of a TOML file is complete, and that its part and parameters exist.
+    """Ensure that a figure of a TOML file is complete, and that its part and parameters exist.
 
     Raises
     ------
@@ -81,11 +84,9 @@ def default_figures(study):
         names = part.varying
         if part.name in shown or not names:
             continue
+        over = {"kind": "lines"} if len(names) == 1 else {"kind": "map", "y": names[0]}
         figure = {"name": part.name, "title": part.name, "part": part.name, "values": ["dE2000"]}
-        if len(names) == 1:
-            yield figure | {"kind": "lines", "x": names[0]}
-        else:
-            yield figure | {"kind": "map", "x": names[-1], "y": names[0]}
+        yield figure | over | {"x": names[-1]}
 
 
 def chart(figure, table, study):
@@ -197,11 +198,7 @@ def _mean(data, keys, column):
 
 def _inks(count):
     """Return colours along viridis without its light end, which would not show on white."""
-    import matplotlib
-
-    colours = matplotlib.colormaps["viridis"]
-    at = [0.8 * number / max(count - 1, 1) for number in range(count)]
-    return [matplotlib.colors.to_hex(colours(place)) for place in at]
+    return [to_hex(ink) for ink in colormaps["viridis"](np.linspace(0, 0.8, count))]
 
 
 def _axis(channel, table, name):
