@@ -9,7 +9,7 @@ import pytest
 from reference.effects import kernel_terms
 from reference.effects.effect import PARTS
 from reference.effects.enumeration import EFFECTS, labelled
-from reports.charts.price_chart import COLOURS
+from reports.charts.theme import EFFECT_COLOURS
 
 TERMS = {kernel_terms.EMISSION, kernel_terms.AMBIENT, kernel_terms.DIFFUSE, kernel_terms.SPECULAR}
 
@@ -47,9 +47,9 @@ def test_every_effect_that_tells_the_halves_apart_has_a_part_and_a_colour_of_its
     assert {effect for effect in EFFECTS if effect.colour} == apart
     assert {effect for effect in EFFECTS if effect.part} == apart
     assert {effect.part for effect in apart} == set(PARTS)
-    assert list(COLOURS) == [effect.label for effect in EFFECTS if effect in apart]
-    assert len(set(COLOURS.values())) == len(COLOURS)
-    assert all(re.fullmatch("#[0-9a-f]{6}", colour) for colour in COLOURS.values())
+    assert list(EFFECT_COLOURS) == [effect.label for effect in EFFECTS if effect in apart]
+    assert len(set(EFFECT_COLOURS.values())) == len(EFFECT_COLOURS)
+    assert all(re.fullmatch("#[0-9a-f]{6}", colour) for colour in EFFECT_COLOURS.values())
 
 
 def test_what_is_grafted_or_left_out_also_says_where_the_halves_differ():

@@ -115,7 +115,7 @@ def test_facts_are_asked_for_by_what_there_is(shipped):
     facts = query.Facts(shipped[1])
     with pytest.raises(InputError, match="column 'dE1976' is not known"):
         facts.value("incidence", "dE1976")
-    with pytest.raises(InputError, match="no part 'x'"):
+    with pytest.raises(InputError, match="part 'x' is not known"):
         facts.value("x", "dE2000")
     with pytest.raises(InputError, match="no point"):
         facts.value("incidence", "dE2000", alpha=0.33)

@@ -2,8 +2,10 @@
 
 import json
 import re
+import subprocess
+import sys
 
-from reports.charts import vega
+from reports.charts import theme, vega
 from reports.page import page
 from tests import records
 from tests.test_page import HOSTILE, Page
@@ -36,8 +38,25 @@ def test_a_specifications_own_config_has_the_last_word():
     assert spec["config"]["axis"]["labelFontSize"] == 7
     assert spec["config"]["axis"]["labelColor"] == "currentColor"
     assert spec["config"]["bar"] == {"size": 3}
-    assert "labelFontSize" in vega.CONFIG["axis"]
-    assert vega.CONFIG["axis"]["labelFontSize"] != 7
+    assert "labelFontSize" in theme.PAGE["axis"]
+    assert theme.PAGE["axis"]["labelFontSize"] != 7
+
+
+def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
+    svg = vega.paper(bars()).decode()
+    assert 'fill="white"' in svg
+    assert "currentColor" not in svg
+    assert vega.paper(bars(), "pdf").startswith(b"%PDF")
+    for part in ("axis", "legend", "title"):
+        inked = {**theme.PAPER[part]}
+        differing = {key for key, value in theme.PAGE[part].items() if inked[key] != value}
+        assert all("olor" in key for key in differing), differing
+
+
+def test_a_comparison_without_a_study_of_cost_does_not_wait_for_altair():
+    told = "import sys, reports.page.page, reports.run.single; print('altair' in sys.modules)"
+    shown = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "False"
 
 
 def test_two_charts_on_a_page_share_no_id():
@@ -59,10 +78,8 @@ def test_two_charts_on_a_page_share_no_id():
 
 
 def test_text_in_a_chart_stays_text():
-    record = records.record()
-    record["histograms"] = {}
     figure = vega.figure(HOSTILE, bars(HOSTILE, title=HOSTILE), HOSTILE)
-    html = page.render([{"record": record, "images": {}, "charts": [figure]}])
+    html = page.render([records.view(records.data() | {"histograms": {}}, charts=(figure,))])
     shown = Page(html)
     assert not [attrs for tag, attrs in shown.tags if tag == "img"]
     assert HOSTILE not in html
@@ -71,12 +88,11 @@ def test_text_in_a_chart_stays_text():
 
 
 def test_the_library_is_in_the_page_once_and_only_where_a_chart_is():
-    record = records.record()
-    view = {"record": record, "images": {}}
+    view = records.view(records.data())
     assert page.render([view, view]).count("window.vegaEmbed=") == 1
-    del record["histograms"]
-    assert "window.vegaEmbed=" not in page.render([view])
-    assert "How the error is distributed" not in page.render([view])
+    bare = page.render([records.view(records.data() | {"histograms": {}})])
+    assert "window.vegaEmbed=" not in bare
+    assert "How the error is distributed" not in bare
 
 
 def test_the_library_can_stand_in_a_script_element():

@@ -1,16 +1,19 @@
-"""Charts as Vega-Lite specifications: plain dictionaries, which a page shows and vl-convert draws.
-
-A specification carries its data and names no address, so that nothing is loaded.
-"""
+"""Error against time of the methods of a study of cost, as a chart."""
 
 from math import log10
 
-from reports.charts.labels import LABEL_GAP, label, rule, spread
+import altair as alt
+import numpy as np
+from scipy.optimize import isotonic_regression
 
-SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
+from reports.charts.theme import FAINT
+from reports.charts.vega import specification
 
 WIDTH, HEIGHT = 560, 380
 """Pixels of the plot itself; names stand to its right."""
+
+LABEL_GAP = 15
+"""Pixels from one name to the next, at least."""
 
 LEAST_ERROR = 1e-3
 """ΔE2000: smaller ones are drawn at the lower border, since a logarithmic axis has no 0."""
@@ -23,30 +26,21 @@ MARKS = {
 """Colour and shape of each family; the shape tells them apart without colour.
 Each is seen on white and on a dark ground."""
 
-FAINT = "#8a8a8a"
-
 
 def error_over_time(record):
     """Return the chart of a ``Cost``: mean ΔE2000 over seconds, both logarithmic.
 
     It stands alone, with a title and a white ground; :func:`plot` is what a page shows.
     """
-    return plot(record, ground="white") | {
-        "$schema": SCHEMA,
-        "description": f"Error against time of the methods on {record.scene}",
-        "title": {
-            "text": f"{record.scene}: error against time",
-            "subtitle": [f"{size(record)}, {machine(record)}", *reading(record)],
-            "anchor": "start",
-        },
-        "config": {
-            "font": "sans-serif",
-            "background": "white",
-            "axis": {"labelFontSize": 12, "titleFontSize": 13, "gridColor": "#e4e4e4"},
-            "title": {"fontSize": 15, "subtitleFontSize": 12, "subtitleColor": "#555555"},
-            "view": {"stroke": "#bbbbbb"},
-        },
-    }
+    (width, height), machine = record.resolution, record.machine
+    subtitle = [
+        f"{width} × {height} pixels, {record.rounds} rounds, {machine.cores} cores,"
+        f" {machine.processor}",
+        *reading(record),
+    ]
+    title = {"text": f"{record.scene}: error against time", "subtitle": subtitle}
+    description = f"Error against time of the methods on {record.scene}"
+    return plot(record, "white") | {"title": title, "description": description}
 
 
 def plot(record, ground="transparent"):
@@ -57,36 +51,23 @@ def plot(record, ground="transparent"):
     nothing can be told.
     """
     families = {rung.name: rung.family for rung in record.rungs}
-    points = [_row(point, families[point.rung]) for point in record.points]
+    rows = [_row(point, families[point.rung]) for point in record.points]
     floor = record.reference.noise_floor
-    times = [point[bound] for point in points for bound in ("low", "high")]
-    errors = [point["error"] for point in points] + ([floor] if floor > 0 else [])
-    x = _Axis(min(times), max(times), WIDTH)
-    lowest = max(min(errors), LEAST_ERROR)
-    y = _Axis(lowest, max(lowest, *errors), HEIGHT, flipped=True)
-    for point in points:
-        point["shown"] = max(point["error"], y.low)
+    times = _domain([row[bound] for row in rows for bound in ("low", "high")])
+    told = [row["error"] for row in rows] + ([floor] if floor > 0 else [])
+    errors = _domain([max(error, LEAST_ERROR) for error in told])
+    for row in rows:
+        row["shown"] = max(row["error"], errors[0])
     layers = [
-        *_slope(points, x, y),
-        *_floor(floor, y),
-        _lines(points, x, y),
-        _symbols(points, x, y, ground),
-        *_names(points, x, y),
+        *_slope(rows, times, errors),
+        *_floor(floor, times, errors),
+        *_points(rows, times, errors, ground),
+        *_names(rows, times, errors),
     ]
     # Names may be wider in the reader's font than where the picture is drawn.
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
-    return {"width": WIDTH, "height": HEIGHT, "padding": padding, "layer": layers}
-
-
-def size(record):
-    """Say how large the images were, and how often each was rendered."""
-    width, height = record.resolution
-    return f"{width} × {height} pixels, {record.rounds} rounds"
-
-
-def machine(record):
-    """Say what machine the times are of."""
-    return f"{record.machine.cores} cores, {record.machine.processor}"
+    chart = alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding)
+    return specification(chart)
 
 
 def reading(record):
@@ -97,22 +78,6 @@ def reading(record):
         "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
         f"{slope}dotted: noise of the reference itself",
     ]
-
-
-class _Axis:
-    """A logarithmic axis with room at both ends: its domain, and the pixels of its values."""
-
-    def __init__(self, low, high, length, flipped=False):
-        room = max(0.06 * log10(high / low), 0.05)
-        self.low, self.high = low * 10**-room, high * 10**room
-        self.length, self.flipped = length, flipped
-
-    def pixel(self, value):
-        share = log10(value / self.low) / log10(self.high / self.low)
-        return self.length * (1 - share if self.flipped else share)
-
-    def scale(self):
-        return {"type": "log", "domain": [self.low, self.high], "nice": False}
 
 
 def _row(point, family):
@@ -128,94 +93,75 @@ def _row(point, family):
     }
 
 
-def _lines(points, x, y):
-    return {
-        "data": {"values": points},
-        "mark": {"type": "line", "strokeWidth": 1.2, "opacity": 0.75},
-        "encoding": _encoding(x, y) | {"detail": {"field": "rung"}, "color": _colour()},
-    }
+def _domain(values):
+    """Return the ends of a logarithmic axis: room on both sides of the values."""
+    low, high = min(values), max(values)
+    room = 10 ** max(0.06 * log10(high / low), 0.05)
+    return low / room, high * room
 
 
-def _symbols(points, x, y, ground):
-    symbol = {
-        "mark": {"type": "point", "size": 55, "strokeWidth": 1.6, "opacity": 1},
-        "encoding": _encoding(x, y)
-        | {
-            "color": _colour(),
-            "shape": {
-                "field": "family",
-                "legend": None,
-                "scale": {"domain": list(MARKS), "range": [shape for _, shape in MARKS.values()]},
-            },
-            "fill": {
-                "condition": {"test": "datum.front", **_colour()},
-                "value": ground,
-            },
-            "tooltip": [
-                {"field": "rung", "title": "method"},
-                {"field": "spp", "title": "samples a pixel"},
-                {"field": "time", "title": "time (ms)", "format": ".3~g"},
-                {"field": "error", "title": "mean ΔE2000", "format": ".3~g"},
+def _time(field, times):
+    return _logarithmic(alt.X(f"{field}:Q"), times, "time for one image (ms, logarithmic)")
+
+
+def _error(field, errors):
+    return _logarithmic(alt.Y(f"{field}:Q"), errors, "mean ΔE2000 to the reference (logarithmic)")
+
+
+def _logarithmic(channel, domain, title):
+    scaled = channel.scale(type="log", domain=domain, nice=False)
+    return scaled.axis(format="~g", tickCount=6).title(title)
+
+
+def _chart(rows, times, errors):
+    data = alt.Data(values=rows)
+    return alt.Chart(data).encode(x=_time("time", times), y=_error("shown", errors))
+
+
+def _points(rows, times, errors, ground):
+    """Return the lines of the rungs, and their points with intervals and tooltips."""
+    colours, shapes = zip(*MARKS.values(), strict=True)
+    colour, shape = (
+        channel("family:N", legend=None, scale=alt.Scale(domain=list(MARKS), range=styles))
+        for channel, styles in ((alt.Color, colours), (alt.Shape, shapes))
+    )
+    titles = {"time": "time (ms)", "error": "mean ΔE2000"}
+    chart = _chart(rows, times, errors).encode(color=colour)
+    return [
+        chart.mark_line(strokeWidth=1.2, opacity=0.75).encode(detail="rung:N"),
+        chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(x=_time("low", times), x2="high"),
+        chart.mark_point(size=55, strokeWidth=1.6, opacity=1).encode(
+            shape=shape,
+            fill=alt.condition("datum.front", colour, alt.value(ground)),
+            tooltip=[
+                alt.Tooltip("rung:N", title="method"),
+                alt.Tooltip("spp:Q", title="samples per pixel"),
+                *(alt.Tooltip(f"{name}:Q", title=titles[name], format=".3~g") for name in titles),
             ],
-        },
-    }
-    interval = {
-        "mark": {"type": "rule", "strokeWidth": 1.2, "opacity": 0.8},
-        "encoding": {
-            "x": {"field": "low", "type": "quantitative", "scale": x.scale()},
-            "x2": {"field": "high"},
-            "y": _encoding(x, y)["y"],
-            "color": _colour(),
-        },
-    }
-    return {"data": {"values": points}, "layer": [interval, symbol]}
+        ),
+    ]
 
 
-def _encoding(x, y):
-    return {
-        "x": {
-            "field": "time",
-            "type": "quantitative",
-            "scale": x.scale(),
-            "title": "time for one image (ms, logarithmic)",
-            "axis": {"format": "~g", "tickCount": 6},
-        },
-        "y": {
-            "field": "shown",
-            "type": "quantitative",
-            "scale": y.scale(),
-            "title": "mean ΔE2000 to the reference (logarithmic)",
-            "axis": {"format": "~g", "tickCount": 6},
-        },
-    }
-
-
-def _colour():
-    return {
-        "field": "family",
-        "type": "nominal",
-        "legend": None,
-        "scale": {"domain": list(MARKS), "range": [colour for colour, _ in MARKS.values()]},
-    }
-
-
-def _slope(points, x, y):
+def _slope(rows, times, errors):
     """Return the line of slope −1/2 through the best point of any Monte Carlo rung."""
-    names = _sampled([point["rung"] for point in points])
-    sampled = [point for point in points if point["rung"] in names]
+    names = _sampled([row["rung"] for row in rows])
+    sampled = [row for row in rows if row["rung"] in names]
     if not sampled:
         return []
-    last = min(sampled, key=lambda point: point["error"])
+    best = min(sampled, key=lambda row: row["shown"])
+    ends = [best["shown"] * (time / best["time"]) ** -0.5 for time in times]
+    return [_guide(ends, times, errors, [6, 4])]
 
-    def at(error):
-        return last["time"] * (last["error"] / error) ** 2
 
-    begin, end = max(x.low, at(y.high)), min(x.high, at(y.low))
-    a, b = (
-        (x.pixel(time), y.pixel(last["error"] * (time / last["time"]) ** -0.5))
-        for time in (begin, end)
-    )
-    return [rule(a, b, color=FAINT, strokeWidth=1.2, strokeDash=[6, 4])]
+def _floor(floor, times, errors):
+    return [_guide([floor, floor], times, errors, [1, 3])] if floor > errors[0] else []
+
+
+def _guide(ends, times, errors, dash):
+    """Return a faint line from border to border through errors at both ends of the time axis."""
+    rows = [{"time": time, "shown": end} for time, end in zip(times, ends, strict=True)]
+    style = {"color": FAINT, "strokeWidth": 1.2, "strokeDash": dash, "clip": True, "aria": False}
+    return _chart(rows, times, errors).mark_line(**style)
 
 
 def _sampled(rungs):
@@ -223,28 +169,36 @@ def _sampled(rungs):
     return {rung for rung in rungs if rungs.count(rung) > 1}
 
 
-def _floor(floor, y):
-    if floor <= y.low:
-        return []
-    place = y.pixel(floor)
-    return [rule((0, place), (WIDTH, place), color=FAINT, strokeWidth=1.2, strokeDash=[1, 3])]
-
-
-def _names(points, x, y):
+def _names(rows, times, errors):
     """Return the rungs' names beside the plot, apart from each other, with lines to their points.
 
     Each name belongs to its rung's slowest point.
     """
-    last = {}
-    for point in sorted(points, key=lambda p: p["time"]):
-        last[point["rung"]] = point
-    ordered = sorted(last.values(), key=lambda p: y.pixel(p["shown"]))
-    places = spread([y.pixel(p["shown"]) for p in ordered], LABEL_GAP, HEIGHT)
-    layers = []
-    for point, place in zip(ordered, places, strict=True):
-        start = x.pixel(point["time"]) + 6, y.pixel(point["shown"])
-        layers += [
-            rule(start, (WIDTH + 10, place), color="#9a9a9a", strokeWidth=0.7, opacity=0.6),
-            label(point["rung"], WIDTH + 14, place),
-        ]
-    return layers
+    low, high = errors
+    last = {row["rung"]: row for row in sorted(rows, key=lambda row: row["time"])}
+    ordered = sorted(last.values(), key=lambda row: -row["shown"])
+    wanted = [HEIGHT * log10(high / row["shown"]) / log10(high / low) for row in ordered]
+    places = spread(wanted, LABEL_GAP, HEIGHT)
+    named = [
+        row | {"beside": high * (low / high) ** (place / HEIGHT)}
+        for row, place in zip(ordered, places, strict=True)
+    ]
+    chart, beside = _chart(named, times, errors), _error("beside", errors)
+    leading = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
+    return [
+        chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),
+        chart.mark_text(align="left", fontSize=12).encode(
+            x=alt.value(WIDTH + 14), y=beside, text="rung:N"
+        ),
+    ]
+
+
+def spread(wanted, gap, length):
+    """Move places on a line apart: at least ``gap`` between neighbours, in the same order.
+
+    ``wanted`` are pixels in ascending order. Neighbours that would touch become a block about the
+    mean of what they want; blocks stay within ``[0, length]`` where they fit.
+    """
+    least = gap * np.arange(len(wanted))  # each place less what those before it take
+    moved = isotonic_regression(np.asarray(wanted) - least).x
+    return (np.clip(moved, 0, max(length - least[-1], 0)) + least).tolist()

@@ -12,6 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import altair as alt
 from matplotlib import rc_context
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -21,7 +22,7 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import LEADING
 from comparisons.record import Comparison
-from reports.charts import error_over_time, histograms
+from reports.charts import error_over_time, histograms, vega
 from reports.files import images, ownership
 from reports.terminal.printing import number
 
@@ -39,12 +40,11 @@ FONT_SIZE = 8
 #: Departures below are drawn at the left border, since a logarithmic axis has no 0.
 LEAST, LARGEST = 1e-3, 100.0
 
-#: How charts look on paper; fonts as Vega names them.
-PRINT = {
-    "background": "white",
-    "font": "DejaVu Sans, sans-serif",
-    "axis": {"labelFontSize": 11, "titleFontSize": 11, "titleFontWeight": "normal"},
-    "view": {"stroke": None},
+#: Colour and shape of what is drawn of each scene.
+MARKS = {
+    "as it is": ("#08519c", "circle"),
+    "after exposure": ("#b3450b", "diamond"),
+    "noise floor": ("#6b6b6b", "triangle-up"),
 }
 
 
@@ -54,32 +54,25 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
     figure = strip(comparison)
     for kind in FORMATS:
         ownership.write(folder / f"{name}.{kind}", drawn(figure, kind))
-    record = comparison.record
-    for metric, histogram in record.histograms.items():
-        if counted := record.pixels.counted:
-            spec = histograms.spec(metric, histogram, record.metrics[metric], counted)
-            write_chart(folder, f"{name}-histogram-{metric}", spec)
+    for metric, spec in histograms.specs(comparison.record).items():
+        write_chart(folder, f"{name}-histogram-{metric}", spec)
 
 
 def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:
     """Write the departures of all scenes of a run as ``folder/departures`` in each format."""
-    ownership.folder(folder)
     write_chart(folder, "departures", departures(list(records)))
 
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
-    ownership.folder(folder)
     write_chart(folder, f"{name}-cost", error_over_time.error_over_time(record))
 
 
 def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
     """Write a Vega-Lite specification as ``folder/name`` in each format."""
-    import vl_convert
-
-    spec = {**spec, "config": {**PRINT, **spec.get("config", {})}}
-    ownership.write(folder / f"{name}.svg", vl_convert.vegalite_to_svg(spec))
-    ownership.write(folder / f"{name}.pdf", vl_convert.vegalite_to_pdf(spec))
+    ownership.folder(folder)
+    for kind in FORMATS:
+        ownership.write(folder / f"{name}.{kind}", vega.paper(spec, kind))
 
 
 def strip(comparison: Comparison) -> Figure:
@@ -148,33 +141,17 @@ def departures(records: Sequence[ComparisonRecord]) -> dict[str, Any]:
             {"scene": record.scene, "what": what, "value": min(max(value, LEAST), LARGEST)}
             for what, value in values.items()
         ]
-    place = {
-        "field": "value",
-        "type": "quantitative",
-        "scale": {"type": "log", "domain": [LEAST, LARGEST], "nice": False},
-        "title": f"mean {LEADING.label} (0.001 and less at the left border)",
-        "axis": {"values": [0.001, 0.01, 0.1, 1, 10, 100], "format": "~g"},
-    }
-    scene = {"field": "scene", "type": "nominal", "sort": None, "title": None}
-    kinds = {
-        "as it is": ("#08519c", "circle"),
-        "after exposure": ("#b3450b", "diamond"),
-        "noise floor": ("#6b6b6b", "triangle-up"),
-    }
-    scales = [
-        {"domain": list(kinds), "range": [style[i] for style in kinds.values()]} for i in range(2)
-    ]
-    legend = {"title": None, "orient": "top"}
-    return {
-        "$schema": "https://vega.github.io/schema/vega-lite/v5.json",
-        "data": {"values": rows},
-        "width": 360,
-        "height": {"step": 18},
-        "mark": {"type": "point", "size": 60, "strokeWidth": 1.6, "opacity": 1},
-        "encoding": {
-            "x": place,
-            "y": {**scene, "axis": {"grid": True, "labelLimit": 260}},
-            "color": {"field": "what", "type": "nominal", "scale": scales[0], "legend": legend},
-            "shape": {"field": "what", "type": "nominal", "scale": scales[1]},
-        },
-    }
+    title = f"mean {LEADING.label} (0.001 and less at the left border)"
+    colours, shapes = (
+        alt.Scale(domain=list(MARKS), range=style) for style in zip(*MARKS.values(), strict=True)
+    )
+    chart = alt.Chart(alt.Data(values=rows), width=360, height=alt.Step(18))
+    chart = chart.mark_point(size=60, strokeWidth=1.6, opacity=1).encode(
+        x=alt.X("value:Q", title=title)
+        .scale(type="log", domain=[LEAST, LARGEST], nice=False)
+        .axis(values=[0.001, 0.01, 0.1, 1, 10, 100], format="~g"),
+        y=alt.Y("scene:N", sort=None, title=None).axis(grid=True, labelLimit=260),
+        color=alt.Color("what:N", scale=colours, title=None).legend(orient="top"),
+        shape=alt.Shape("what:N", scale=shapes),
+    )
+    return vega.specification(chart)

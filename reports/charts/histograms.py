@@ -18,23 +18,44 @@ WIDTH, HEIGHT = 300, 130
 #: Colour of the area (readable on light and dark grounds).
 AREA = "#7d8fb3"
 
-#: What is marked: key, word and dash.
-MARKS = (("mean", "mean", [1, 0]), ("p95", "95 %", [5, 3]), ("noise_floor", "noise floor", [1, 3]))
+#: What is marked: its word, and the dash of its line.
+MARKS = {
+    "mean": ("mean", [1, 0]),
+    "p95": ("95 %", [5, 3]),
+    "noise_floor": ("noise floor", [1, 3]),
+}
+
+#: A mark's line from the axis to its row, and the text to its right.
+LINE = {
+    "mark": {"type": "rule", "strokeWidth": 1.2},
+    "encoding": {
+        "y2": {"datum": 0},
+        "strokeDash": {"field": "dash", "type": "nominal", "scale": None},
+    },
+}
+TEXT = {
+    "mark": {"type": "text", "align": "left", "dx": 4, "baseline": "top"},
+    "encoding": {"text": {"field": "label"}},
+}
 
 
 def figures(record: ComparisonRecord) -> list[vega.Figure]:
-    """The histograms of a record, where it has them and any pixel counts."""
-    counted = record.pixels.counted
-    if not counted:
-        return []
+    """The histograms of a record for the page."""
+    counted, found = record.pixels.counted, record.histograms
     return [
-        vega.figure(
-            METRICS[name].label,
-            spec(name, histogram, record.metrics[name], counted),
-            note(histogram, counted),
-        )
-        for name, histogram in record.histograms.items()
+        vega.figure(METRICS[name].label, chart, note(found[name], counted))
+        for name, chart in specs(record).items()
     ]
+
+
+def specs(record: ComparisonRecord) -> dict[str, dict[str, Any]]:
+    """The specifications by metric: of the histograms of a record, where any pixel counts."""
+    counted = record.pixels.counted
+    return {
+        name: spec(name, histogram, record.metrics[name], counted)
+        for name, histogram in record.histograms.items()
+        if counted
+    }
 
 
 def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dict[str, Any]:
@@ -49,33 +70,19 @@ def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dic
         Pixels in all.
     """
     bins = _densities(histogram, counted)
-    top = max((row["density"] for row in bins), default=1.0) or 1.0
-    shown = (histogram.low, 4 * histogram.high)  # room for the last label
-    axis = {"type": "log", "domain": list(shown), "nice": False, "clamp": True}
-    place = {
-        "field": "value",
-        "type": "quantitative",
-        "scale": axis,
-        "title": METRICS[name].label,
-        "axis": {"values": [0.01, 0.1, 1, 10, 100, 1000], "format": "~g", "grid": False},
-    }
-    height = {
-        "field": "density",
-        "type": "quantitative",
-        "scale": {"domain": [0, 1.45 * top], "nice": False},
-        "title": "pixels a decade",
-        "axis": {"format": ".0%", "tickCount": 3},
-    }
-    area = {
-        "data": {"values": bins},
-        "mark": {"type": "area", "interpolate": "step-after", "color": AREA, "tooltip": True},
-        "encoding": {"x": place, "y": height},
-    }
-    return {
-        "width": WIDTH,
-        "height": HEIGHT,
-        "layer": [area, *_marks(summary, place, shown[0], top)],
-    }
+    top = max(row["density"] for row in bins) or 1.0
+    domain = [histogram.low, 4 * histogram.high]  # room for the last label
+    x = {"field": "value", "type": "quantitative", "title": METRICS[name].label}
+    x["scale"] = {"type": "log", "domain": domain, "nice": False, "clamp": True}
+    x["axis"] = {"values": [0.01, 0.1, 1, 10, 100, 1000], "format": "~g", "grid": False}
+    y = {"field": "density", "type": "quantitative", "title": "pixels per decade"}
+    y["scale"] = {"domain": [0, 1.45 * top], "nice": False}
+    y["axis"] = {"format": ".0%", "tickCount": 3}
+    area = {"type": "area", "interpolate": "step-after", "color": AREA, "tooltip": True}
+    layer = [{"data": {"values": bins}, "mark": area}]
+    if marks := _marks(summary, histogram.low, top):
+        layer.append({"data": {"values": marks}, "layer": [LINE, TEXT]})
+    return {"width": WIDTH, "height": HEIGHT, "encoding": {"x": x, "y": y}, "layer": layer}
 
 
 def note(histogram: Histogram, counted: int) -> str:
@@ -101,29 +108,14 @@ def _densities(histogram, counted):
     ]
 
 
-def _marks(summary, place, low, top):
+def _marks(summary, low, top):
     """A line and a label for each mark, in a row of its own: the further right, the lower.
 
     A line ends at its label's row and the label is to its right, so that nothing crosses.
     """
-    marks = [(getattr(summary, name), word, dash) for name, word, dash in MARKS]
-    marks = sorted(mark for mark in marks if mark[0] >= low)
-    layers = []
-    for row, (value, word, dash) in enumerate(marks):
-        height = {"datum": (1.45 - 0.14 * row) * top, "type": "quantitative"}
-        data = {"values": [{"value": value, "label": f"{word} {number(value)}"}]}
-        line = {"type": "rule", "strokeDash": dash, "strokeWidth": 1.2}
-        text = {"type": "text", "align": "left", "dx": 4, "baseline": "top"}
-        layers += [
-            {
-                "data": data,
-                "mark": line,
-                "encoding": {"x": place, "y": {"datum": 0, "type": "quantitative"}, "y2": height},
-            },
-            {
-                "data": data,
-                "mark": text,
-                "encoding": {"x": place, "y": height, "text": {"field": "label"}},
-            },
-        ]
-    return layers
+    marks = sorted((getattr(summary, name), *style) for name, style in MARKS.items())
+    return [
+        {"value": value, "label": f"{word} {number(value)}", "dash": dash}
+        | {"density": (1.45 - 0.14 * row) * top}
+        for row, (value, word, dash) in enumerate(mark for mark in marks if mark[0] >= low)
+    ]

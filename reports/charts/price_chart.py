@@ -1,72 +1,51 @@
-"""How effects are shown: a colour each, and their prices as a chart."""
+"""The prices of effects as a chart."""
 
-from reference.effects.enumeration import EFFECTS
+import altair as alt
 
-TITLE = "Effects"
-"""Of the map of what dominates where."""
-
-WIDTH, STEP = 340, 30
-"""Pixels of the plot, and of one effect's row."""
-
-COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
-"""Of the effects that have a price: the seven of Okabe and Ito for what often comes together, and
-three of Tol's muted scheme. Both are made to be told apart with the common colour deficiencies."""
-
-NO_EFFECT = "#dee2e6"
-"""Where no effect removes enough to be seen."""
+from reports.charts.theme import EFFECT_COLOURS
+from reports.charts.vega import specification
 
 
 def price_chart(record):
-    """Return the chart of the prices in ``cost.json``: ΔE2000 removed by each effect, as bars.
+    """Return the chart of the prices of a :class:`Cost`: ΔE2000 removed by each effect, as bars.
 
     Rules are 95 % intervals, the circle and the stroke what the effect removes where it is added
     first and last. A tooltip has the numbers.
     """
     rows = [_row(price) for price in record.prices.effects]
-    place = {"field": "effect", "type": "nominal", "sort": None, "title": None}
-    tooltip = [
-        {"field": "effect", "title": "effect"},
-        {"field": "removes", "title": "removes, ΔE2000", "format": ".3~g"},
-        {"field": "alone", "title": "added first", "format": ".3~g"},
-        {"field": "last", "title": "added last", "format": ".3~g"},
-        {"field": "adds", "title": "adds (ms)", "format": ".3~g"},
-    ]
-    axis = {"labelLimit": 200, "ticks": False, "domain": False}
-
-    def layer(mark, x, **more):
-        encoding = {"y": place | {"axis": axis}, "x": {"field": x, "type": "quantitative"}}
-        encoding["x"]["title"] = "mean ΔE2000 that it removes"
-        return {"mark": mark, "encoding": encoding | {"tooltip": tooltip} | more}
-
-    fill = {
-        "field": "effect",
-        "legend": None,
-        "scale": {
-            "domain": [row["effect"] for row in rows],
-            "range": [COLOURS[row["effect"]] for row in rows],
-        },
-    }
-    point = {"type": "point", "filled": False, "size": 45, "color": "currentColor"}
-    return {
-        "width": WIDTH,
-        "height": {"step": STEP},
-        "padding": {"left": 30, "right": 5, "top": 5, "bottom": 5},
-        "data": {"values": rows},
-        "layer": [
-            layer({"type": "bar", "size": 13}, "removes", color=fill),
-            layer({"type": "rule", "strokeWidth": 1.5}, "low", x2={"field": "high"}),
-            layer(point | {"shape": "circle"}, "alone"),
-            layer(point | {"shape": "stroke", "angle": 90, "size": 160}, "last"),
+    names = [row["effect"] for row in rows]
+    colours = alt.Scale(domain=names, range=[EFFECT_COLOURS[name] for name in names])
+    numbers = {"removes": "removes, ΔE2000", "alone": "added first", "last": "added last"}
+    numbers["adds"] = "adds (ms)"
+    chart = alt.Chart(alt.Data(values=rows)).encode(
+        y=alt.Y("effect:N", sort=None, title=None).axis(labelLimit=200, ticks=False, domain=False),
+        tooltip=[
+            "effect:N",
+            *(alt.Tooltip(f"{name}:Q", title=numbers[name], format=".3~g") for name in numbers),
         ],
-    }
+    )
+
+    def x(name):
+        return alt.X(f"{name}:Q", title="mean ΔE2000 that it removes")
+
+    removed = alt.Color("effect:N", legend=None, scale=colours)
+    layers = alt.layer(
+        chart.mark_bar(size=13).encode(x=x("removes"), color=removed),
+        chart.mark_rule(strokeWidth=1.5).encode(x=x("low"), x2="high"),
+        chart.mark_point(filled=False, size=45, shape="circle").encode(x=x("alone")),
+        chart.mark_point(filled=False, size=160, shape="stroke", angle=90).encode(x=x("last")),
+    )
+    padding = {"left": 30, "right": 5, "top": 5, "bottom": 5}
+    return specification(layers.properties(width=340, height=alt.Step(30), padding=padding))
 
 
 def _row(price):
+    removed = price.removes
     return {
         "effect": price.effect,
-        "removes": price.removes.value,
-        "low": price.removes.low,
-        "high": price.removes.high,
+        "removes": removed.value,
+        "low": removed.low,
+        "high": removed.high,
         "alone": price.alone,
         "last": price.last,
         "adds": price.adds_s.value * 1e3,

@@ -1,4 +1,4 @@
-"""The figures of a study as Vega-Lite specifications: plain dictionaries, drawn by vl-convert.
+"""The figures of a study as charts.
 
 A figure is a table of the study's TOML file::
 
@@ -21,10 +21,16 @@ are viridis and magma, whose lightness rises steadily, so that they survive with
 
 from collections import defaultdict
 
+import altair as alt
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
 from comparisons.study import query
 from heuristic.errors import InputError, unknown
+from reports.charts.theme import FAINT
+from reports.charts.vega import specification
 
-SCHEMA = "https://vega.github.io/schema/vega-lite/v5.json"
 KEYS = {"name", "title", "part", "kind", "x", "y", "values", "series", "where", "rule", "log"}
 NEEDED = {"map": {"name", "title", "part", "x", "y", "values"},
           "lines": {"name", "title", "part", "x", "values"}}  # fmt: skip
@@ -41,18 +47,12 @@ SYMBOLS = {
 WORDS = ("#fde725", "#5ec962", "#5aa0c8", "#c9b6e4")
 """Colours for words, light enough for the letter of the word that stands in each cell besides."""
 
-CONFIG = {
-    "font": "sans-serif",
-    "background": "white",
-    "axis": {"labelFontSize": 12, "titleFontSize": 13, "titleFontWeight": "normal"},
-    "legend": {"labelFontSize": 12, "titleFontSize": 12, "titleFontWeight": "normal"},
-    "title": {"fontSize": 15, "subtitleFontSize": 12, "subtitleColor": "#555555"},
-    "view": {"stroke": "#bbbbbb"},
-}
+DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
+"""Of the lines of several columns."""
 
 
 def check(figure, study):
-    """See that a figure of a TOML file is complete, and that its part and parameters exist.
+    """Ensure that a figure of a TOML file is complete, and that its part and parameters exist.
 
     Raises
     ------
@@ -84,11 +84,9 @@ def default_figures(study):
         names = part.varying
         if part.name in shown or not names:
             continue
+        over = {"kind": "lines"} if len(names) == 1 else {"kind": "map", "y": names[0]}
         figure = {"name": part.name, "title": part.name, "part": part.name, "values": ["dE2000"]}
-        if len(names) == 1:
-            yield figure | {"kind": "lines", "x": names[0]}
-        else:
-            yield figure | {"kind": "map", "x": names[-1], "y": names[0]}
+        yield figure | over | {"x": names[-1]}
 
 
 def chart(figure, table, study):
@@ -106,96 +104,82 @@ def chart(figure, table, study):
     shown = {figure["x"], figure.get("y"), figure.get("series"), *figure.get("where", ())}
     over = [name for name in part.varying if name not in shown]
     make = {"map": _map, "lines": _lines}[figure["kind"]]
-    title = {"text": figure["title"], "anchor": "start"}
+    title = {"text": figure["title"]}
     if over and part.design == "grid":
         title["subtitle"] = f"mean over {', '.join(map(_label, over))}"
-    return {
-        "$schema": SCHEMA,
-        "description": figure["title"],
-        "title": title,
-        "padding": 8,
-        "config": CONFIG,
-        **make(figure, table, part, data),
-    }
+    spec = specification(make(figure, table, part, data))
+    return spec | {"title": title, "description": figure["title"], "padding": 8}
 
 
 def _map(figure, table, part, data):
     (column,) = figure["values"]
-    x, y = figure["x"], figure["y"]
-    is_word = isinstance(data[0][column], str)
-    if part.design == "grid":
-        cells = _mean(data, (x, y), column)
-        x_axis = _field("x", table, x, "ordinal", sort="ascending")
-        y_axis = _field("y", table, y, "ordinal", sort="descending")
-        x_axis["axis"] |= {"labelOverlap": "greedy", "labelAngle": 0}
-        y_axis["axis"] |= {"labelOverlap": "greedy"}
-        mark = {"type": "rect"}
+    names = figure["x"], figure["y"]
+    is_grid, is_word = part.design == "grid", isinstance(data[0][column], str)
+    if is_grid:
+        cells = _mean(data, names, column)
     else:
-        cells = [{"x": row[x], "y": row[y], "value": row[column]} for row in data]
-        x_axis, y_axis = (_field(axis, table, name) for axis, name in (("x", x), ("y", y)))
-        for axis, name in ((x_axis, x), (y_axis, y)):
-            if getattr(part.spans[name], "logarithmic", False):
-                axis["scale"] = {"type": "log", "nice": False}
-        mark = {"type": "circle", "size": 60, "opacity": 1}
-    colour = {"field": "value", "title": _label(column).split(" ")}
+        cells = [{"x": row[names[0]], "y": row[names[1]], "value": row[column]} for row in data]
     if is_word:
+        cells = [cell | {"letter": cell["value"][0].upper()} for cell in cells]
         words = sorted({cell["value"] for cell in cells})
-        colour |= {"type": "nominal", "scale": {"domain": words, "range": WORDS[: len(words)]}}
-        colour["title"] = column
-        for cell in cells:
-            cell["letter"] = cell["value"][0].upper()
+        scale = alt.Scale(domain=words, range=WORDS[: len(words)])
+        colour = alt.Color("value:N", title=column, scale=scale)
     else:
-        scheme = "magma" if column.startswith("dE") else "viridis"
-        colour |= {"type": "quantitative", "scale": {"scheme": scheme}}
-    layer = [{"mark": mark, "encoding": {"color": colour}}]
-    if is_word and part.design == "grid":
-        text = {"field": "letter", "type": "nominal"}
-        layer.append({"mark": {"type": "text"}, "encoding": {"text": text}})
+        scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
+        colour = alt.Color("value:Q", title=_label(column).split(" "), scale=scale)
+    chart = alt.Chart(alt.Data(values=cells)).encode(**_places(names, table, part))
+    marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
+    layers = [marks.encode(color=colour)]
+    if is_word and is_grid:
+        layers.append(chart.mark_text().encode(text="letter:N"))
+    return alt.layer(*layers).properties(width=420, height=300)
+
+
+def _places(names, table, part):
+    """Return the axes of a map: steps of a grid's parameters, or the spans of sampled ones."""
+    x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
+    if part.design == "grid":
+        x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
+        return {"x": x, "y": y.type("ordinal").sort("descending").axis(labelOverlap="greedy")}
+    logarithmic = [getattr(part.spans[name], "logarithmic", False) for name in names]
     return {
-        "data": {"values": cells},
-        "width": 420,
-        "height": 300,
-        "encoding": {"x": x_axis, "y": y_axis},
-        "layer": layer,
+        axis: place.scale(type="log" if is_log else "linear", nice=not is_log)
+        for axis, place, is_log in zip("xy", (x, y), logarithmic, strict=True)
     }
 
 
 def _lines(figure, table, part, data):
-    x, series = figure["x"], figure.get("series")
-    values = []
-    for column in figure["values"]:
-        for cell in _mean(data, (x, series) if series else (x,), column):
-            values.append(cell | {"quantity": _label(column)})
-    columns = figure["values"]
-    unit = query.unit(table, columns[0])
+    x, series, columns = figure["x"], figure.get("series"), figure["values"]
+    keys = (x, series) if series else (x,)
+    values = [
+        cell | {"quantity": _label(column)}
+        for column in columns
+        for cell in _mean(data, keys, column)
+    ]
     title = _label(columns[0]) if len(columns) == 1 else _common(columns)
-    y_axis = {"field": "value", "type": "quantitative", "axis": {"title": _with(title, unit)}}
-    logarithmic = figure.get("log", ())
-    encoding = {"x": _field("x", table, x), "y": y_axis}
-    for axis in ("x", "y"):
-        encoding[axis]["scale"] = {"type": "log"} if axis in logarithmic else {"zero": axis == "y"}
-    encoding["x"]["scale"]["nice"] = False
+    x_scale, y_scale = (
+        {"type": "log"} if axis in figure.get("log", ()) else {"zero": axis == "y"} for axis in "xy"
+    )
+    chart = (
+        alt.Chart()
+        .mark_line(strokeWidth=2)
+        .encode(
+            x=_axis(alt.X, table, x).scale(nice=False, **x_scale),
+            y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(**y_scale),
+        )
+    )
     if series:
-        encoding["color"] = {
-            "field": "y",
-            "type": "ordinal",
-            "title": _title(table, series),
-            "scale": {"range": _inks(len({value["y"] for value in values}))},
-        }
+        inks = alt.Scale(range=_inks(len({value["y"] for value in values})))
+        chart = chart.encode(color=alt.Color("y:O", title=_title(table, series), scale=inks))
     if len(columns) > 1:
-        encoding["strokeDash"] = {
-            "field": "quantity",
-            "type": "nominal",
-            "title": None,
-            "sort": [_label(column) for column in columns],
-            "scale": {"range": [[1, 0], [6, 3], [2, 2], [8, 2, 2, 2]][: len(columns)]},
-            "legend": {"labelLimit": 300, "symbolSize": 400},
-        }
-    layer = [{"mark": {"type": "line", "strokeWidth": 2}, "encoding": encoding}]
+        dash = alt.StrokeDash("quantity:N", title=None, sort=[_label(name) for name in columns])
+        dash = dash.scale(range=DASHES[: len(columns)]).legend(labelLimit=300, symbolSize=400)
+        chart = chart.encode(strokeDash=dash)
+    layers = [chart]
     if "rule" in figure:
-        mark = {"type": "rule", "strokeDash": [3, 3], "color": "#8a8a8a"}
-        layer.append({"mark": mark, "encoding": {"y": {"datum": figure["rule"]}}})
-    return {"data": {"values": values}, "width": 460, "height": 300, "layer": layer}
+        rule = alt.Chart(alt.Data(values=[{}])).mark_rule(strokeDash=[3, 3], color=FAINT)
+        layers.append(rule.encode(y=alt.datum(figure["rule"])))
+    return alt.layer(*layers, data=alt.Data(values=values)).properties(width=460, height=300)
 
 
 def _mean(data, keys, column):
@@ -214,16 +198,12 @@ def _mean(data, keys, column):
 
 def _inks(count):
     """Return colours along viridis without its light end, which would not show on white."""
-    import matplotlib
-
-    colours = matplotlib.colormaps["viridis"]
-    at = [0.8 * number / max(count - 1, 1) for number in range(count)]
-    return [matplotlib.colors.to_hex(colours(place)) for place in at]
+    return [to_hex(ink) for ink in colormaps["viridis"](np.linspace(0, 0.8, count))]
 
 
-def _field(axis, table, name, kind="quantitative", **more):
-    formatted = {"title": _title(table, name), "format": ".3~g"}
-    return {"field": axis, "type": kind, "axis": formatted, **more}
+def _axis(channel, table, name):
+    field = {alt.X: "x", alt.Y: "y"}[channel]
+    return channel(f"{field}:Q", title=_title(table, name)).axis(format=".3~g")
 
 
 def _title(table, column):

@@ -1,8 +1,9 @@
-"""Charts: Vega-Lite specifications as plain dicts, drawn as SVG here and live in the page.
+"""Charts: Vega-Lite specifications, drawn as SVG here and live in the page.
 
 The SVG is what paper and browsers without JavaScript show; it takes the colour of the text around
 it, so that it fits a light and a dark page. The page replaces it by a live chart with the same
-specification, drawn by the Vega bundle that the page holds once.
+specification, drawn by the Vega bundle that the page holds once. A specification carries its data
+and names no address, so that nothing is loaded.
 """
 
 from __future__ import annotations
@@ -12,34 +13,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-#: How all charts look; `currentColor` is the text's. Charts are described by their page, not in
-#: themselves.
-CONFIG: Mapping[str, Any] = {
-    "aria": False,
-    "background": "transparent",
-    "font": "system-ui, sans-serif",
-    "view": {"stroke": None},
-    "axis": {
-        "labelColor": "currentColor",
-        "titleColor": "currentColor",
-        "titleFontWeight": "normal",
-        "labelFontSize": 11,
-        "titleFontSize": 11,
-        "domainColor": "currentColor",
-        "domainOpacity": 0.5,
-        "tickColor": "currentColor",
-        "tickOpacity": 0.5,
-        "gridColor": "currentColor",
-        "gridOpacity": 0.1,
-    },
-    "legend": {"labelColor": "currentColor", "titleColor": "currentColor"},
-    "header": {"labelColor": "currentColor", "titleColor": "currentColor"},
-    "title": {"color": "currentColor", "fontWeight": 600, "anchor": "start"},
-    "text": {"color": "currentColor"},
-    "rule": {"color": "currentColor"},
-}
+from reports.charts import theme
+
+if TYPE_CHECKING:
+    import altair
 
 
 @dataclass(frozen=True)
@@ -59,10 +38,24 @@ def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
     """
     import vl_convert
 
-    own = spec.get("config", {})
-    merged = {key: _merged(CONFIG.get(key), own.get(key)) for key in {**CONFIG, **own}}
-    spec = {**spec, "config": merged}
+    spec = theme.themed(spec, theme.PAGE)
     return Figure(title, note, spec, _inline(vl_convert.vegalite_to_svg(spec)))
+
+
+def paper(spec: Mapping[str, Any], kind: str = "svg") -> bytes:
+    """Return the file of a specification for print, as ``svg`` or ``pdf``."""
+    import vl_convert
+
+    convert = {"svg": vl_convert.vegalite_to_svg, "pdf": vl_convert.vegalite_to_pdf}[kind]
+    made = convert(theme.themed(spec, theme.PAPER))
+    return made.encode() if isinstance(made, str) else made
+
+
+def specification(chart: altair.TopLevelMixin) -> dict[str, Any]:
+    """Return the Vega-Lite specification of an Altair chart, without a look of its own."""
+    spec = chart.to_dict()
+    del spec["config"]  # Altair's default theme
+    return spec
 
 
 @lru_cache(maxsize=1)
@@ -71,12 +64,6 @@ def bundle() -> str:
     import vl_convert
 
     return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
-
-
-def _merged(default, own):
-    if isinstance(default, Mapping) and isinstance(own, Mapping):
-        return {**default, **own}
-    return default if own is None else own
 
 
 def _inline(svg: str) -> str:

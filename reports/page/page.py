@@ -31,7 +31,7 @@ from comparisons.departure.spaces import luminance
 from comparisons.records import plain
 from comparisons.verification import Verification
 from heuristic.equations import Entry
-from reports.charts import histograms, price_chart, vega
+from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import cost_overview, overview
 from reports.page.hard_cases import HardCasesView
@@ -139,11 +139,11 @@ def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str
         {"name": item.name, "title": item.title, "kind": item.kind, "top": item.top}
         for item in legends()
     ]
-    effects = {"name": "effects", "title": price_chart.TITLE, "kind": "effects", "top": 1}
+    effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}
     return {
         "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
         "maps": [*maps, effects],
-        "noEffect": price_chart.NO_EFFECT,
+        "noEffect": theme.NO_EFFECT,
         "colours": {
             "error": images.colour_table(images.ERROR_COLOURS),
             "signed": images.colour_table(images.SIGNED_COLOURS),
@@ -219,7 +219,7 @@ def _environment() -> Environment:
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),
-        effects_title=price_chart.TITLE,
+        effects_title=theme.EFFECTS_TITLE,
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
     )

@@ -7,7 +7,7 @@ from comparisons import records
 from comparisons.cost.cost_record import Cost
 from comparisons.effects.dominance import dominating
 from comparisons.records import Record
-from reports.charts import error_over_time, price_chart, vega
+from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.terminal.cost_tables import noise
 
@@ -48,7 +48,7 @@ def documents(study):
     Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
     brighter, over the range that the record's ``pictures`` states; effects are errors removed.
     """
-    import vl_convert
+    from reports.charts.error_over_time import error_over_time
 
     record = study.record
     exposed = partial(images.tonemap, exposure=record.viewing.exposure)
@@ -61,7 +61,7 @@ def documents(study):
     for name, values in study.effects.items():
         pictures[picture_name("effect", name)] = images.signed_map(values, limits.effect_limit)
     made = {f"{name}.png": images.png(picture) for name, picture in pictures.items()}
-    made["cost.svg"] = vl_convert.vegalite_to_svg(error_over_time.error_over_time(record)).encode()
+    made["cost.svg"] = vega.paper(error_over_time(record))
     made["cost.json"] = records.to_json(record).encode()
     return made
 
@@ -78,6 +78,8 @@ def write(place, study):
 
 def figures(record):
     """Return the charts of a :class:`Cost`: error against time, and the prices of effects."""
+    from reports.charts import error_over_time, price_chart
+
     made = [
         vega.figure(
             "Error against time",
@@ -112,7 +114,7 @@ def _effect_map(study):
         width=places.shape[1],
         height=places.shape[0],
         names=tuple(study.effects),
-        colours=tuple(price_chart.COLOURS[name] for name in study.effects),
+        colours=tuple(theme.EFFECT_COLOURS[name] for name in study.effects),
         map="".join(letters[int(place)] for place in places.ravel()),
     )
 

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
-import vl_convert
 
 from comparisons import atomic
 from comparisons.study import dataset, query
 from comparisons.study.running import POINTS
 from heuristic.errors import InputError
-from reports.charts import study_charts
+from reports.charts import study_charts, vega
 from reports.files import ownership
 
-VEGALITE = "5.21"
 FIGURES = "figures"
 
 
@@ -88,8 +86,7 @@ def drawn(study, table):
     for figure in (*study.figures, *study_charts.default_figures(study)):
         if figure["part"] in with_result:
             spec = study_charts.chart(figure, table, study)
-            svg = vl_convert.vegalite_to_svg(spec, vl_version=VEGALITE)
-            yield f"{figure['name']}.svg", svg
+            yield f"{figure['name']}.svg", vega.paper(spec)
 
 
 def findings(study, table, page):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from comparisons.effects.dominance import dominating
-from reports.charts import price_chart
+from reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.cost_records import HEIGHT as ROWS
 from tests.cost_records import WIDTH as COLUMNS
@@ -65,7 +65,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
     study = report.study
     known = dominating(study.effects, study.counted)[place(*pixel)]
     names = [*study.effects, "", "none to be seen"]
-    colours = [*map(price_chart.COLOURS.get, study.effects), "#82888f", price_chart.NO_EFFECT]
+    colours = [*map(theme.EFFECT_COLOURS.get, study.effects), "#82888f", theme.NO_EFFECT]
     shown = visitor.inspected()["effect"]
     assert shown == (names[known] or "–") or (shown == "" and not names[known])
     x, y = pixel[0] + (2 if pixel[0] != 23 else -2), pixel[1]  # beside the mark
