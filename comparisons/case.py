@@ -13,9 +13,8 @@ from heuristic.errors import InputError
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
-from reference.planning.planner import wants_spectra
+from reference.planning.plan import wants_spectra
 from reference.scene.graph import VARIANTS, set_variant
-from reference.scene.script import Script
 from reference.scene.source import Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
@@ -173,7 +172,11 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
         return _opened(Source(own, scene), asked, own)
     path = file_of(scene)
     if path is not None:
-        content = Script(path) if path.suffix == ".py" else path
+        content = path
+        if path.suffix == ".py":
+            from reference.scene.script import Script
+
+            content = Script(path)
         return _opened(Source(name or path.stem, content, asked.define), asked, str(path))
     known = builtin(str(scene))
     # Who names the variant means both halves.

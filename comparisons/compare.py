@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons import record, render
-from comparisons.circumstances import Pixels
 from comparisons.comparison import (
     ComparisonRecord,
     NoiseTarget,
@@ -22,10 +21,11 @@ from comparisons.departure.marks import significance
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
+from comparisons.records import Pixels
 from heuristic.errors import InputError
 from reference.pairing import halves
 from reference.pairing.halves import Pair
-from reference.planning.planner import Plan, plan, sampler
+from reference.planning.plan import Plan, plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Renderer, physical_integrator, variant
 

@@ -4,14 +4,23 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from comparisons.amounts import Amount, Count, Positive, Resolution, Share, Size
-from comparisons.circumstances import Pixels, Versions
 from comparisons.departure.histogram import Histogram
 from comparisons.departure.limits import LimitCounts
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import RatioSummary, Summary
-from comparisons.records import VERSION, Record
+from comparisons.records import (
+    VERSION,
+    Amount,
+    Count,
+    Pixels,
+    Positive,
+    Record,
+    Resolution,
+    Share,
+    Size,
+    Versions,
+)
 
 Depth = Annotated[
     int, Meta(ge=-1, description="As Mitsuba counts: 2 is direct light alone, -1 is unlimited.")

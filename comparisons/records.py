@@ -8,10 +8,11 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 import inspect
 import json
 import re
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from heuristic.errors import InputError
 
@@ -92,3 +93,54 @@ def _numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise NotImplementedError(f"{type(value).__name__} has no place in a record")
+
+
+Amount = Annotated[float, Meta(ge=0)]
+Positive = Annotated[float, Meta(gt=0)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+Count = Annotated[int, Meta(ge=0)]
+Size = Annotated[int, Meta(ge=1)]
+Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in pixels.")]
+
+
+Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
+
+
+class Pixels(Record):
+    """Pixels whose centre sees a surface, and all."""
+
+    counted: Count
+    total: Size
+
+
+class Machine(Record):
+    """What times depend on: model of the processor, cores that may be used, system."""
+
+    processor: str
+    cores: Size
+    system: str
+
+
+WIDTH = 110
+"""Columns: enough for the colours of a block of pixels, with their errors."""
+
+
+def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
+    """Return JSON: entries of the outer two levels on lines of their own, others where they fit.
+
+    ``before`` is what stands on the line already; ``ValueError`` for a NaN or an infinity.
+    """
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    is_empty = not isinstance(value, (dict, list, tuple)) or not value
+    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
+        return line
+    indent = "  " * (depth + 1)
+    if isinstance(value, dict):
+        keys, items = [f"{json.dumps(key)}: " for key in value], list(value.values())
+    else:
+        keys, items = [""] * len(value), list(value)
+    lines = [
+        indent + key + laid_out(item, depth + 1, indent + key)
+        for key, item in zip(keys, items, strict=True)
+    ]
+    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

@@ -41,7 +41,7 @@ def schedule(plan, pixels, spp=None, noise=None):
 
     Parameters
     ----------
-    plan : reference.planning.planner.Plan
+    plan : reference.planning.plan.Plan
         Its samples and passes, which hold where nothing else is asked for.
     pixels
         Of the image.

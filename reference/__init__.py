@@ -9,7 +9,7 @@ if mi.variant() is None:
 
 from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair
-from reference.planning.planner import Plan, plan
+from reference.planning.plan import Plan, plan
 from reference.rendering.renderer import Estimate, PassTimes
 from reference.scene.source import Source
 

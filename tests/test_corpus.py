@@ -16,7 +16,7 @@ from comparisons.compare import compare
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reference import Source
-from reference.planning.planner import wants_spectra
+from reference.planning.plan import wants_spectra
 from tests import corpus_files
 
 CORPUS = Path(__file__).parent / "corpus"

@@ -21,8 +21,8 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
-from reference.effects.enumeration import EFFECTS
-from reference.effects.shadows import OCCLUSION
+from reference.effects import EFFECTS
+from reference.effects.obstacles import OCCLUSION
 from reference.rendering.renderer import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source

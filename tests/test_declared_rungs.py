@@ -13,7 +13,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.effects.light_forms import EXTENDED
-from reference.effects.shadows import OCCLUSION
+from reference.effects.obstacles import OCCLUSION
 from reports.terminal import cost_tables, tables
 from tests.test_cost import TINY
 

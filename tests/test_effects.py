@@ -6,9 +6,8 @@ import re
 
 import pytest
 
-from reference.effects import kernel_terms
+from reference.effects import EFFECTS, kernel_terms, labelled
 from reference.effects.effect import PARTS
-from reference.effects.enumeration import EFFECTS, labelled
 from reports.charts.theme import EFFECT_COLOURS
 
 TERMS = {kernel_terms.EMISSION, kernel_terms.AMBIENT, kernel_terms.DIFFUSE, kernel_terms.SPECULAR}

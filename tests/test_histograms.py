@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from comparisons.circumstances import Pixels
 from comparisons.departure.histogram import BINS_A_DECADE, DECADES, histogram
+from comparisons.records import Pixels
 from reports.charts import histograms
 from tests import records
 

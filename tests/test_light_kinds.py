@@ -8,7 +8,7 @@ from heuristic.light import PLUGINS
 from reference import Source
 from reference.pairing import lights, nearest
 from reference.pairing.nearest.material import Nearest, rule
-from reference.planning.structure import examine
+from reference.planning.facts import examine
 
 PHYSICAL = [plugin for kind in lights.KINDS for plugin in kind.plugins]
 NEEDED = {"projector": {"irradiance": 1.0}}

@@ -6,7 +6,7 @@ import pytest
 from comparisons.departure.metrics import METRICS, log2_luminance_ratio, rmse
 from comparisons.departure.spaces import Viewing
 from heuristic.errors import NonFiniteError
-from reference.rendering.finite import require_finite
+from reference.rendering.renderer import require_finite
 
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
 PERCEPTUAL = pytest.mark.parametrize("metric", [m for m in METRICS.values() if not m.linear])

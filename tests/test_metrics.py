@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.departure.exposure import best_exposure
 from comparisons.departure.marks import critical_t, significance
 from comparisons.departure.metrics import (
     LOG2_EPSILON,
@@ -19,10 +18,15 @@ from comparisons.departure.metrics import (
     rmse,
 )
 from comparisons.departure.spaces import Viewing
-from comparisons.departure.statistics import noise_floor, summarise, summarise_log2_luminance
+from comparisons.departure.statistics import (
+    best_exposure,
+    noise_floor,
+    summarise,
+    summarise_log2_luminance,
+)
 from comparisons.records import plain
 from heuristic.errors import InputError, NonFiniteError
-from reference.rendering.finite import require_finite
+from reference.rendering.renderer import require_finite
 
 VIEWING = Viewing()
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())

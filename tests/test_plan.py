@@ -8,13 +8,12 @@ import pytest
 from comparisons.compare import Options, prepare
 from comparisons.gallery.builtin import SCENES
 from comparisons.verification import verify
+from reference.effects import EFFECTS
 from reference.effects.bsdf_forms import TRANSMISSION
-from reference.effects.enumeration import EFFECTS
-from reference.effects.interreflection import INTERREFLECTION
-from reference.effects.shadows import OCCLUSION
-from reference.planning.planner import wants_spectra
-from reference.planning.structure import examine
-from reference.rendering.environment import AlbedoTable
+from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
+from reference.planning.facts import examine
+from reference.planning.plan import wants_spectra
+from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
 
 WHITE = {"type": "diffuse", "reflectance": 0.7}
@@ -182,9 +181,9 @@ def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr("reference.effects.shadows.occlusion", lambda structure: (False, "wrong"))
+    monkeypatch.setattr("reference.effects.obstacles.occlusion", lambda structure: (False, "wrong"))
     monkeypatch.setattr(
-        "reference.effects.interreflection.interreflection", lambda structure: (False, "wrong")
+        "reference.effects.obstacles.interreflection", lambda structure: (False, "wrong")
     )
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
     assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0

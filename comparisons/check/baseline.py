@@ -13,12 +13,9 @@ import numpy as np
 from msgspec import Meta, structs
 
 from comparisons import record, records
-from comparisons.amounts import Amount
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
-from comparisons.circumstances import Versions
 from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
-from comparisons.layout import laid_out
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Amount, Record, Versions, laid_out
 from heuristic.errors import InputError
 
 FORMAT_0_1 = '"format": "fotismos baseline 1"'

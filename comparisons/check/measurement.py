@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from comparisons.amounts import Amount
 from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
-from comparisons.records import Record
+from comparisons.records import Amount, Record
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import passes
 

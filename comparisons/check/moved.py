@@ -12,9 +12,8 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from comparisons.amounts import Amount, Share
 from comparisons.check.measurement import Measurement
-from comparisons.records import Record
+from comparisons.records import Amount, Record, Share
 
 LEVEL = 0.01
 """Chance of an alarm though nothing changed, over all that one check tests."""

@@ -7,7 +7,6 @@ import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.circumstances import Machine, Pixels
 from comparisons.compare import prepare
 from comparisons.cost.cost_record import Converged, Cost, Pictures, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
@@ -18,6 +17,7 @@ from comparisons.effects.lattice import Lattice
 from comparisons.effects.prices import prices
 from comparisons.effects.split import split
 from comparisons.options import Options
+from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Accumulator, Renderer

@@ -4,14 +4,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from comparisons.amounts import Count, Resolution
-from comparisons.circumstances import Machine, Pixels, Versions
 from comparisons.cost.front import Reached, Within
 from comparisons.cost.timing import Measured
 from comparisons.departure.spaces import Viewing
 from comparisons.effects.prices import Prices
 from comparisons.effects.split import Part
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Count, Machine, Pixels, Record, Resolution, Versions
 from heuristic.interpolation import Interpolation
 
 Family = Literal["kernel", "phong BSDF", "physical"]

@@ -9,8 +9,7 @@ the measured counts nothing is said.
 from itertools import pairwise
 from math import exp, log
 
-from comparisons.amounts import Amount, Positive
-from comparisons.records import Record
+from comparisons.records import Amount, Positive, Record
 
 TIMES_S = (0.01, 0.1, 1.0, 10.0)
 ERRORS = (5.0, 2.0, 1.0, 0.5)

@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from comparisons.cost.rungs import DEPTHS, Family, Kernel, Physical, Rung, rungs
 from heuristic.heuristics import PHONG, Heuristic
 from heuristic.interpolation import Interpolation
+from reference.effects import EFFECTS
 from reference.effects.effect import Effect
-from reference.effects.enumeration import EFFECTS
-from reference.effects.interreflection import INTERREFLECTION
 from reference.effects.light_forms import ENVIRONMENT
-from reference.effects.shadows import OCCLUSION
+from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.plan import Plan
 
 UNLIMITED = -1

@@ -13,7 +13,7 @@ from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.heuristics import named
 from heuristic.interpolation import Interpolation
-from reference.effects.enumeration import EFFECTS
+from reference.effects import EFFECTS
 from reference.pairing.halves import INTEGRATOR, with_sampler
 from reference.rendering.renderer import Renderer, physical_integrator, variant
 from reference.scene.source import Source

@@ -4,7 +4,7 @@ A rung is a name and a method: the heuristic kernel with options, or the plan of
 effects left out or paths of limited depth. One from outside stands before the full plan::
 
     from comparisons.cost.rungs import Physical, Rung, declare
-    from reference.effects.shadows import OCCLUSION
+    from reference.effects.obstacles import OCCLUSION
 
     declare(Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION}), 2)))
 
@@ -18,9 +18,9 @@ from typing import Literal
 
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
+from reference.effects import EFFECTS
 from reference.effects.effect import Effect
-from reference.effects.enumeration import EFFECTS
-from reference.effects.interreflection import INTERREFLECTION
+from reference.effects.obstacles import INTERREFLECTION
 
 GROUP = "fotismos.rungs"
 

@@ -11,9 +11,8 @@ import numpy as np
 from msgspec import Meta
 
 from comparisons import intervals
-from comparisons.amounts import Amount, Positive
 from comparisons.departure.metrics import LEADING
-from comparisons.records import Record
+from comparisons.records import Amount, Positive, Record
 from reference.rendering.passes import passes
 
 

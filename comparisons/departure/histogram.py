@@ -8,8 +8,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from comparisons.amounts import Count, Positive
-from comparisons.records import Record
+from comparisons.records import Count, Positive, Record
 
 #: The bins' range in decades, log10 of the metric's unit, and the bins in each decade.
 DECADES, BINS_A_DECADE = (-2, 3), 12

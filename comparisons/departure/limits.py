@@ -30,8 +30,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from comparisons.amounts import Count
-from comparisons.records import Record
+from comparisons.records import Count, Record
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reference.rendering.finite import require_finite
+from reference.rendering.renderer import require_finite
 
 
 def critical_t(passes: int, values: int, level: float = 0.01) -> float:

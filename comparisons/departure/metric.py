@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from heuristic.errors import InputError
-from reference.rendering.finite import require_finite
+from reference.rendering.renderer import require_finite
 
 #: Of the entry points of other packages that declare metrics.
 GROUP = "fotismos.metrics"

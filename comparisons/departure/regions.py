@@ -15,8 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.amounts import Amount, Count, Share, Size
-from comparisons.records import Record
+from comparisons.records import Amount, Count, Record, Share, Size
 
 #: Cells along the longer side of the image.
 CELLS = 48

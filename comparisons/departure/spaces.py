@@ -15,8 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.amounts import Positive
-from comparisons.records import Record, plain
+from comparisons.records import Positive, Record, plain
 from heuristic.errors import InputError
 
 Array = NDArray[np.float64]

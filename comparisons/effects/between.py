@@ -12,14 +12,13 @@ from functools import cached_property
 
 import mitsuba as mi
 
+from reference.effects import EFFECTS
 from reference.effects.effect import Effect
-from reference.effects.enumeration import EFFECTS
 from reference.effects.light_forms import ENVIRONMENT
 from reference.pairing import lights
 from reference.pairing.halves import Pair, with_sampler
-from reference.planning.facts import Facts
+from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts, examine
 from reference.planning.plan import Plan
-from reference.planning.structure import BSDF, EMITTER, SHAPE, examine
 from reference.rendering.renderer import Renderer, physical_integrator
 from reference.scene.graph import Graph, properties
 

@@ -12,9 +12,8 @@ import numpy as np
 
 from comparisons.effects.between import Between
 from heuristic.interpolation import Interpolation
-from reference.effects.enumeration import EFFECTS
-from reference.effects.polygons import POLYGONS
-from reference.effects.wavelengths import SPECTRAL
+from reference.effects import EFFECTS
+from reference.effects.kernel_terms import POLYGONS, SPECTRAL
 from reference.pairing.halves import with_sampler
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Renderer, variant

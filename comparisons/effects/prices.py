@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons import intervals
-from comparisons.amounts import Amount, Positive
 from comparisons.effects import shapley
 from comparisons.intervals import Estimated
-from comparisons.records import Record
+from comparisons.records import Amount, Positive, Record
 
 
 class Price(Record):

@@ -19,12 +19,11 @@ form and transport are always there.
 
 import numpy as np
 
-from comparisons.amounts import Amount
 from comparisons.departure.metrics import delta_e_2000
 from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
-from comparisons.records import Record
+from comparisons.records import Amount, Record
 from reference.effects.effect import PARTS
-from reference.effects.polygons import POLYGONS
+from reference.effects.kernel_terms import POLYGONS
 
 ALWAYS = ("implementation", "BSDF form", "transport")
 

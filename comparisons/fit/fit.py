@@ -9,7 +9,6 @@ from time import perf_counter
 
 import numpy as np
 
-from comparisons.circumstances import Pixels
 from comparisons.compare import prepare
 from comparisons.fit import summary
 from comparisons.fit.fit_record import FitRecord, FitTimes, FormFit, LossName
@@ -22,6 +21,7 @@ from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Attempt, Fit, FitImages
 from comparisons.options import Options
 from comparisons.record import versions
+from comparisons.records import Pixels
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation

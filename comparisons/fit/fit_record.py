@@ -2,11 +2,9 @@
 
 from typing import Any, Literal
 
-from comparisons.amounts import Amount, Count, Resolution, Size
-from comparisons.circumstances import Pixels, Versions
 from comparisons.departure.spaces import Viewing
 from comparisons.fit.optimise import Start
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
 
 
 class Departure(Record):

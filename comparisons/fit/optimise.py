@@ -18,9 +18,8 @@ from math import inf, isfinite, log
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from comparisons.amounts import Amount, Count
 from comparisons.fit import parameters
-from comparisons.records import Record
+from comparisons.records import Amount, Count, Record
 
 STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
 """Exponents of the form ``phong`` to start from; of ``blinn`` they are four times as large."""

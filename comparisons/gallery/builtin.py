@@ -6,11 +6,10 @@ field of view and the up vector; one camera that frames the sphere serves them a
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from importlib import import_module
 
 import mitsuba as mi
 
-from comparisons.gallery import chapter_six, spectral
 from heuristic.errors import InputError, suggestion
 from reference.scene.source import Source
 
@@ -127,21 +126,30 @@ def _figures():
         yield _figure(f"fig-8-11-n{n}", title, THREE_LIGHTS, VIEWER_C, **whole, n=n)
 
 
+def _made_in(module, function, *arguments):
+    """Return what makes a scene by a function of another module of this folder, imported then."""
+
+    def make():
+        return getattr(import_module(f"comparisons.gallery.{module}"), function)(*arguments)
+
+    return make
+
+
 def _chapter_six():
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
-        yield Scene(f"fig-6-5-m{m:g}", title, partial(chapter_six.spot, m))
+        yield Scene(f"fig-6-5-m{m:g}", title, _made_in("chapter_six", "spot", m))
     yield Scene(
         "fig-6-10",
         "Figure 6.10: flat shading of a coarse sphere; see it with --interpolation gouraud, phong",
-        chapter_six.coarse_sphere,
+        _made_in("chapter_six", "coarse_sphere"),
         interpolation="flat",
         tessellation=4,
     )
     yield Scene(
         "fig-6-14",
         "Figure 6.14: a highlight inside a triangle, lost by Gouraud shading, kept by Phong's",
-        chapter_six.highlight_in_a_triangle,
+        _made_in("chapter_six", "highlight_in_a_triangle"),
         interpolation="gouraud",
         tessellation=1,
     )
@@ -215,12 +223,12 @@ def _physical():
         (
             "narrow-band-lamp",
             "Coloured spheres under a sodium lamp: RGB against spectra",
-            spectral.narrow_band_lamp,
+            _made_in("spectral", "narrow_band_lamp"),
         ),
         (
             "metameric-pair",
             "Two surfaces of one colour in daylight, under lamplight: RGB against spectra",
-            spectral.metameric_pair,
+            _made_in("spectral", "metameric_pair"),
         ),
     ):
         yield Scene(name, title, make, "llvm_ad_spectral", "llvm_ad_rgb")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
-from reference.effects.enumeration import EFFECTS
+from reference.effects import EFFECTS
 
 
 @dataclass(frozen=True)

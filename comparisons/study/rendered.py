@@ -11,9 +11,9 @@ from comparisons.study.editing import Kept, set_values
 from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError
-from reference.effects.enumeration import EFFECTS
+from reference.effects import EFFECTS
 from reference.pairing import halves
-from reference.planning.planner import plan, sampler
+from reference.planning.plan import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Renderer, physical_integrator

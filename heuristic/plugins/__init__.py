@@ -20,7 +20,7 @@ import mitsuba as mi
 
 from heuristic import backend
 from heuristic.errors import InputError
-from heuristic.plugins import emitters, glow, integrator, mapped, phong, tilted
+from heuristic.plugins import emitters, integrator, mapped, phong
 
 _registered = set()
 
@@ -45,6 +45,6 @@ def register():
         return
     if variant.startswith("llvm"):
         backend.check()
-    for module in (mapped, tilted, phong, glow, emitters, integrator):
+    for module in (mapped, phong, emitters, integrator):
         module.define()
     _registered.add(variant)

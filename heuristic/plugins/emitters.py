@@ -1,4 +1,4 @@
-"""The emitter plugins ``heuristic_point``, ``heuristic_spot`` and ``heuristic_directional``.
+"""The emitter plugins: the lights ``heuristic_point``, ``_spot`` and ``_directional``, and a glow.
 
 ========================  ==================  =====================================================
 Parameter                 Type (default)      Meaning
@@ -19,6 +19,21 @@ Position, direction, intensity and the coefficients are exposed to ``mitsuba.tra
 
 Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance ``pi I_p f_att``
 (:mod:`heuristic.convention`). :meth:`light` hands the same parameters to the kernel.
+
+``heuristic_glow`` is emission and ambient light of a shape (8.1, 8.2):
+
+==============  ===================  ===============================================================
+Parameter       Type (default)       Meaning
+==============  ===================  ===============================================================
+``k_i``         spectrum (0)         emission coefficient
+``k_a``         spectrum (0)         ambient coefficient
+``ambient``     spectrum (0)         ``I_a``
+``twosided``    boolean (false)      glow on both sides
+==============  ===================  ===============================================================
+
+Neither term is a matter of reflection, so no BSDF can hold them. Attached to a shape, this emitter
+shows ``k_i + I_a k_a`` where a camera ray meets the shape, and lights nothing: in the model,
+emission and ambient light do not travel.
 """
 
 from dataclasses import fields
@@ -30,7 +45,7 @@ from heuristic import numerics, terms, vectors
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.light import Light
 from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLight
-from heuristic.plugins.spectra import emitted
+from heuristic.plugins.spectra import coefficient, emitted
 
 FAR = 1e8
 """Where shadow rays of parallel light end: outside any scene. Mitsuba does not tell a plugin in
@@ -39,6 +54,7 @@ Python how large the scene is, and rays of this length still keep their directio
 
 def define() -> None:
     """Create the classes for the current variant and register them."""
+    _define_glow()
     parameters = {
         "scale": (mi.Float, 1.0),
         "position": (mi.Point3f, mi.ScalarPoint3f(0)),
@@ -192,3 +208,45 @@ def define() -> None:
 
         def bbox(self):
             return mi.ScalarBoundingBox3f()
+
+
+def _define_glow():
+    """Create the class of ``heuristic_glow`` for the current variant and register it."""
+
+    class HeuristicGlow(mi.Emitter):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.k_i = emitted(props, "k_i", 0.0)
+            self.k_a = coefficient(props, "k_a")
+            self.ambient = emitted(props, "ambient", 0.0)
+            self.twosided = props.get("twosided", False)
+            self.m_flags = +mi.EmitterFlags.Surface
+
+        def eval(self, si, active=True):
+            glow = terms.emission(self.k_i.eval(si, active)) + terms.ambient(
+                self.ambient.eval(si, active), self.k_a.eval(si, active)
+            )
+            return dr.select(active & (self.twosided | (si.wi.z > 0)), glow, 0)
+
+        def sample_direction(self, it, sample, active=True):
+            return dr.zeros(mi.DirectionSample3f), mi.Spectrum(0)
+
+        def pdf_direction(self, it, ds, active=True):
+            return mi.Float(0)
+
+        def eval_direction(self, it, ds, active=True):
+            return mi.Spectrum(0)
+
+        def bbox(self):
+            return self.get_shape().bbox()
+
+        def traverse(self, callback):
+            for name in ("k_i", "k_a", "ambient"):
+                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+        def to_string(self):
+            return f"HeuristicGlow[k_i = {self.k_i}, k_a = {self.k_a}, ambient = {self.ambient}]"
+
+    mi.register_emitter("heuristic_glow", HeuristicGlow)

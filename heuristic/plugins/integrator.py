@@ -26,6 +26,7 @@ equal seeds give equal rays. Python::
     {'type': 'heuristic', 'ambient': 1.0}
 """
 
+from functools import cache
 from operator import is_
 
 import drjit as dr
@@ -35,7 +36,6 @@ from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins.emitters import FAR
-from heuristic.plugins.interpolated import interpolating
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.points import Given
@@ -152,11 +152,15 @@ def define():
         def to_string(self):
             return f"HeuristicIntegrator[model = {self.model.name}, ambient = {self.ambient}]"
 
-    interpolating_class = interpolating(HeuristicIntegrator)
+    @cache
+    def interpolating_class():
+        from heuristic.plugins.interpolated import interpolating
+
+        return interpolating(HeuristicIntegrator)
 
     def make(props):
         is_phong = props.get("interpolation", "phong") == "phong"
-        return (HeuristicIntegrator if is_phong else interpolating_class)(props)
+        return (HeuristicIntegrator if is_phong else interpolating_class())(props)
 
     mi.register_integrator("heuristic", make)
 

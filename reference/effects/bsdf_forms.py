@@ -1,11 +1,9 @@
 """What surfaces have in another form in the two halves: reflection, and transmission."""
 
 from reference.effects.effect import Effect
-from reference.effects.grafting import graft
 from reference.pairing.nearest import WRAPPERS
-from reference.planning.facts import Facts
-from reference.planning.structure import BSDF, SHAPE
-from reference.scene.graph import Graph
+from reference.planning.facts import BSDF, SHAPE, Facts
+from reference.scene.graph import Graph, graft
 
 
 def _inexact(facts: Facts, opaque: bool) -> list[int]:

@@ -73,7 +73,7 @@ class Effect:
 
     def __reduce__(self):
         # A copy in another process is the same effect, as sets and `is` need it.
-        from reference.effects.enumeration import labelled
+        from reference.effects import labelled
 
         return labelled, (self.label,)
 

@@ -1,5 +1,8 @@
-"""The terms of the heuristic kernel, which both halves have in a form of their own."""
+"""What the heuristic kernel has: its terms, its interpolation of polygons, its wavelengths."""
 
+import mitsuba as mi
+
+from heuristic.interpolation import Interpolation
 from reference.effects.effect import Effect
 from reference.planning.facts import Facts
 
@@ -49,4 +52,32 @@ SPECULAR = Effect(
     reference="roughplastic's coat",
     cost="a vector and a power",
     rule=lambda facts: _coefficient(facts, "k_s"),
+)
+
+
+POLYGONS = Effect(
+    order=70,
+    label="polygon interpolation",
+    heuristic="flat, Gouraud (6.35-6.38)",
+    reference="none",
+    cost="less than Phong",
+    rule=lambda facts: (
+        facts.interpolation is not Interpolation.PHONG,
+        f"interpolation {facts.interpolation.value}",
+    ),
+    part="interpolation",
+    colour="#f0e442",
+)
+
+
+SPECTRAL = Effect(
+    order=140,
+    label="spectral",
+    heuristic="as many values as given (8.11)",
+    reference="wavelengths",
+    cost="samples, 4 values each",
+    rule=lambda facts: (mi.is_spectral, f"variant {mi.variant()}"),
+    part="spectral",
+    colour="#882255",
+    sampled=True,
 )

@@ -5,11 +5,9 @@ from collections.abc import Iterable
 import mitsuba as mi
 
 from reference.effects.effect import Effect
-from reference.effects.grafting import graft
 from reference.pairing import lights
-from reference.planning.facts import Facts
-from reference.planning.structure import EMITTER, SHAPE
-from reference.scene.graph import Graph
+from reference.planning.facts import EMITTER, SHAPE, Facts
+from reference.scene.graph import Graph, graft
 
 
 def _inexact(facts: Facts, with_cone: bool) -> list[str]:

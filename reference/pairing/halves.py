@@ -11,15 +11,13 @@ from functools import cache
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
-from heuristic.plugins.interpolated import viewpoint
-from reference.pairing import bsdfs, lights, meshing
+from reference.pairing import bsdfs, lights
 from reference.pairing.factors import Convention, Miss, specular_albedo
-from reference.pairing.lights import areas, constants
+from reference.pairing.lights import areas, environments
 from reference.rendering.gbuffer import gbuffer
 from reference.scene import preparation
 from reference.scene.graph import Graph, properties
@@ -121,17 +119,17 @@ def pair(
     emitters, radiance = lights.to_heuristic(half, geometry, settings.hide_emitters)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(half, ambient, settings, interpolation, prune, model)
-    if interpolation is not Interpolation.PHONG:
-        viewpoint(geometry().sensors()[0])  # refuses what has none before anything renders
     if interpolation is not Interpolation.PHONG or tessellation is not None:
-        meshing.replace_shapes(half, geometry(), tessellation or meshes.RESOLUTION, interpolation)
+        from reference.pairing import meshing
+
+        meshing.replace_shapes(half, geometry(), tessellation, interpolation)
 
     physical = graph.copy()
     emitters += areas.add_glowing_shapes(physical)
     given_heuristic = bsdfs.to_physical(physical, convention)
     emitters += lights.to_physical(physical, lambda: gbuffer(geometry()))
     if settings.ambient is not None:
-        emitters.append(constants.add_environment(physical, graph, settings.ambient, convention))
+        emitters.append(environments.add_environment(physical, graph, settings.ambient, convention))
 
     records = (*given_physical, *given_heuristic)
     return Pair(

@@ -10,6 +10,7 @@ import mitsuba as mi
 from heuristic import meshes
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
+from heuristic.plugins.interpolated import viewpoint
 from reference.scene.graph import Reference, properties
 
 SHAPE = mi.ObjectType.Shape
@@ -25,7 +26,7 @@ def replace_shapes(graph, scene, resolution, interpolation):
     scene : mitsuba.Scene
         The same shapes, instantiated; they are told by their ids.
     resolution
-        Of what is no mesh yet, as in :func:`heuristic.meshes.to_mesh`.
+        Of what is no mesh yet, as in :func:`heuristic.meshes.to_mesh`; None for its default.
     interpolation : Interpolation
         Gouraud shading needs one normal a vertex, hence faces that share none where the mesh has
         ``face_normals``.
@@ -33,8 +34,11 @@ def replace_shapes(graph, scene, resolution, interpolation):
     Raises
     ------
     InputError
-        Naming a shape that cannot be made into triangles.
+        Naming a shape that cannot be made into triangles, or a sensor without the one viewpoint
+        that flat and Gouraud shading need.
     """
+    if interpolation is not Interpolation.PHONG:
+        viewpoint(scene.sensors()[0])  # refuses what has none before anything renders
     folder = _Folder()
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(SHAPE):
@@ -44,7 +48,7 @@ def replace_shapes(graph, scene, resolution, interpolation):
                 f"{graph.name}: {graph.label(index)}: instances and their groups cannot be made"
                 " into meshes of their own. Use --interpolation phong."
             )
-        mesh = meshes.to_mesh(shapes[given.id()], resolution)
+        mesh = meshes.to_mesh(shapes[given.id()], resolution or meshes.RESOLUTION)
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:
                 mesh = meshes.split_faces(mesh)

@@ -15,10 +15,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
+from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
-from reference.rendering.environment import AlbedoTable
-from reference.rendering.finite import require_finite
+from reference.rendering.direct import AlbedoTable
 from reference.scene.preparation import PATHS
 
 
@@ -238,3 +237,22 @@ def _reason(error):
     while (cause := error.__cause__ or error.__context__) is not None:
         error = cause
     return str(error).strip()
+
+
+def require_finite(image, layer):
+    """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity.
+
+    The message names the layer, how many pixels are concerned and the first one as (x, y), counted
+    from the top left in reading order.
+    """
+    finite = np.isfinite(image)
+    if finite.all():
+        return
+    wrong = ~finite if finite.ndim == 2 else ~finite.all(axis=-1)
+    place = np.unravel_index(np.argmax(wrong), wrong.shape)
+    raise NonFiniteError(
+        f"{layer}: {np.count_nonzero(wrong)} of {wrong.size} pixels are NaN or infinite, the first"
+        f" at (x, y) = ({', '.join(str(index) for index in reversed(place))}):"
+        f" {np.asarray(image)[place]}. Look at the surface and the lights seen there: an infinite"
+        " light or a degenerate mesh is the usual cause."
+    )

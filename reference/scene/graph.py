@@ -212,3 +212,12 @@ def properties(plugin, **values):
     for key, value in values.items():
         props[key] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
     return props
+
+
+def graft(graph: Graph, other: Graph, index: int) -> int:
+    """Copy a node of another graph, and all that it refers to, and return its index here."""
+    props = mi.Properties(other.props(index))
+    for key, value in list(props.items()):
+        if isinstance(value, Reference):
+            props[key] = Reference(graft(graph, other, value.index()))
+    return graph.add(other.kind(index), props)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from reference.effects.enumeration import EFFECTS
+from reference.effects import EFFECTS
 
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
 """Of the effects that have a price: the seven of Okabe and Ito for what often comes together, and

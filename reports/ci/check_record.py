@@ -4,9 +4,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from comparisons.amounts import Amount, Count, Share
 from comparisons.check.moved import Move
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Amount, Count, Record, Share
 
 Status = Literal["passed", "failed", "error", "created", "updated", "unchanged"]
 

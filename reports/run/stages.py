@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta
 
-from comparisons.circumstances import Machine, Versions
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Machine, Record, Versions
 
 if TYPE_CHECKING:
     from comparisons.comparison import TimeSpent

@@ -8,7 +8,7 @@ from comparisons.check.baseline import Baseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
-from comparisons.layout import laid_out
+from comparisons.records import laid_out
 from reports.ci.check_record import Checks
 from reports.run.stages import RunRecord
 

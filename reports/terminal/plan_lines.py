@@ -1,9 +1,8 @@
 """Plans and their verification, as lines for a terminal."""
 
 from comparisons import record
-from comparisons.amounts import Amount
 from comparisons.comparison import Simulation
-from comparisons.records import VERSION, Record
+from comparisons.records import VERSION, Amount, Record
 from reports.terminal.tables import printed, ruled
 
 

@@ -1,7 +1,7 @@
 """From 1 to 10,000 lights: time for a light and a point, and what compiling costs.
 
 One million points in memory, point lights without attenuation, RGB, ``n = 9``. Up to
-`heuristic.lighting.BLOCK` lights are one kernel; more are summed in blocks, by one kernel that all
+`heuristic.shading.BLOCK` lights are one kernel; more are summed in blocks, by one kernel that all
 blocks share. Compile times are of kernels that Dr.Jit has not seen before.
 """
 

@@ -10,14 +10,13 @@ import pytest
 from msgspec import structs
 from playwright.sync_api import sync_playwright
 
-from comparisons.circumstances import Pixels
 from comparisons.cost.cost import Study
 from comparisons.departure import regions
 from comparisons.departure.histogram import histogram
 from comparisons.departure.metrics import drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
 from comparisons.record import Comparison
-from comparisons.records import plain
+from comparisons.records import Pixels, plain
 from reports.run import output
 from reports.run.stages import Failure, Run
 from tests import cost_records, records

@@ -1,7 +1,7 @@
-"""Lights: one module a kind, paired both ways (table in :mod:`reference.pairing.factors`).
+"""Lights: one declaration a kind, paired both ways (table in :mod:`reference.pairing.factors`).
 
-The kinds are the modules of this package that declare a ``KIND``; nothing else lists them. What the
-table has no row for gets the nearest light that there is:
+The kinds are the :class:`LightKind` at the top of this package's modules; nothing else lists them.
+What the table has no row for gets the nearest light that there is:
 
 ==================================  ===============================================================
 Physical                            Nearest
@@ -30,7 +30,9 @@ from reference.scene.graph import Graph
 EMITTER, SHAPE = mi.ObjectType.Emitter, mi.ObjectType.Shape
 
 _modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
-KINDS: tuple[LightKind, ...] = tuple(module.KIND for module in _modules if hasattr(module, "KIND"))
+KINDS: tuple[LightKind, ...] = tuple(
+    kind for module in _modules for kind in vars(module).values() if isinstance(kind, LightKind)
+)
 
 _by_plugin = {plugin: kind for kind in KINDS for plugin in kind.plugins}
 _by_plugin |= {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
@@ -41,7 +43,7 @@ def of(plugin: str) -> LightKind:
 
     An unknown one is taken for an environment, which is what premises may least rely on.
     """
-    return _by_plugin.get(plugin, environments.KIND)
+    return _by_plugin.get(plugin, environments.ENVIRONMENT)
 
 
 def is_heuristic(plugin: str) -> bool:
@@ -85,7 +87,7 @@ def to_heuristic(
         light = Given(graph, index, shape, geometry, hide_emitters=hide_emitters)
         kind = of(light.plugin)
         if kind.on_shapes != (shape is not None):
-            kind = environments.KIND
+            kind = environments.ENVIRONMENT
         found = kind.ambient(light) if kind.ambient is not None else None
         ambient = ambient if found is None else found
         records.append(kind.to_heuristic(light))

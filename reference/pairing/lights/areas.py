@@ -91,7 +91,7 @@ def add_glowing_shapes(graph: Graph) -> list[PairedEmitter]:
     return records
 
 
-KIND = LightKind(
+AREA = LightKind(
     plugins=("area",),
     to_heuristic=_to_heuristic,
     colour="radiance",

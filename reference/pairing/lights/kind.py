@@ -1,6 +1,6 @@
 """What a kind of light declares, and what its rules read.
 
-A kind is one module of :mod:`reference.pairing.lights` that declares ``KIND = LightKind(...)``.
+A kind is one :class:`LightKind` at the top of a module of :mod:`reference.pairing.lights`.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,7 @@
-"""Points: ``point`` and ``heuristic_point``."""
+"""Points and parallel light: ``point`` and ``directional``, in both models.
+
+Parallel light is an exact pair; a point is one where it falls off as Mitsuba's do.
+"""
 
 from collections.abc import Callable
 
@@ -6,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import INVERSE_SQUARE, PointLight
+from heuristic.lights import INVERSE_SQUARE, DirectionalLight, PointLight
 from reference.pairing.factors import INTENSITY_FACTOR
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 from reference.scene.graph import properties
@@ -51,7 +54,7 @@ def level(light: Given, cone: Callable[[np.ndarray], object]) -> tuple[float, bo
     return IRRADIANCE_PER_INTENSITY * ratio, False, note
 
 
-KIND = LightKind(
+POINT = LightKind(
     plugins=("point",),
     to_heuristic=_to_heuristic,
     to_physical=_to_physical,
@@ -63,4 +66,32 @@ KIND = LightKind(
         "point": {"intensity": "intensity.value"},
         "heuristic_point": {"position": "position", "scale": "scale"},
     },
+)
+
+
+def _directional_to_heuristic(light: Given) -> PairedEmitter:
+    direction, intensity = mi.ScalarVector3f(*_travel(light)), light.value("irradiance", 1.0)
+    props = heuristic("heuristic_directional", direction=direction, intensity=intensity)
+    return light.replace(props, INTENSITY_FACTOR)
+
+
+def _directional_to_physical(light: Given) -> PairedEmitter:
+    direction = light.value("direction", mi.ScalarVector3f(0, 0, 1))
+    irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
+    props = properties("directional", direction=direction, irradiance=irradiance)
+    return light.replace(props, IRRADIANCE_PER_INTENSITY)
+
+
+def _travel(light: Given) -> np.ndarray:
+    return light.vector("direction", (0, 0, 1), 2)
+
+
+DIRECTIONAL = LightKind(
+    plugins=("directional",),
+    to_heuristic=_directional_to_heuristic,
+    to_physical=_directional_to_physical,
+    model=DirectionalLight,
+    colour="irradiance",
+    place=lambda light: {"toward": -_travel(light)},
+    exact=True,
 )

@@ -1,11 +1,14 @@
-"""Spots: ``spot`` and ``heuristic_spot``, whose fall-offs are fitted to each other.
+"""Spots: ``spot`` and ``heuristic_spot``, whose fall-offs are fitted to each other; ``projector``.
 
 Mitsuba's ``spot`` is even up to its beam width and falls linearly in the angle to 0 at its cutoff;
 the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can be the other. The fit minimises
 ``int (cos^m(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle.
+
+The nearest form of a picture thrown by a point is the even cone of the same flux.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
@@ -13,9 +16,32 @@ from scipy.optimize import minimize_scalar
 
 from heuristic.lights import SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR
-from reference.pairing.lights import points, projectors
+from reference.pairing.lights import measured, points
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 from reference.scene.graph import properties
+
+
+def even_cone(light: Given) -> PairedEmitter:
+    """Replace a light by the even cone of the same solid angle and flux, as its sampling shows."""
+    label, origin, axis = light.label, light.column(3), light.column(2)
+    beam = measured.beam(light.graph, light.emitter, origin, axis)
+    if beam is None:
+        return light.leave_out()
+    props = heuristic(
+        "heuristic_spot",
+        position=mi.ScalarPoint3f(*origin),
+        direction=mi.ScalarVector3f(*axis),
+        cutoff=beam.cutoff,
+        exponent=0.0,
+        intensity=beam.intensity,
+    )
+    note = f"an even cone of {beam.cutoff:.4g} deg, of the same solid angle and flux"
+    record = light.replace(props, INTENSITY_FACTOR, exact=False, note=note)
+    return replace(record, name=label, lost="its picture")
+
+
+PROJECTOR = LightKind(plugins=("projector",), to_heuristic=even_cone)
+
 
 LARGEST_EXPONENT = 1e5
 STEPS = 2048
@@ -76,7 +102,7 @@ def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _to_heuristic(light: Given) -> PairedEmitter:
     if light.value("texture", None) is not None:
-        return projectors.even_cone(light)
+        return even_cone(light)
     cutoff = light.number("cutoff_angle", 20.0)
     beam_width = light.number("beam_width", 0.75 * cutoff)
     exponent = exponent_for(cutoff, beam_width)
@@ -115,7 +141,7 @@ def _to_physical(light: Given) -> PairedEmitter:
     return light.replace(props, factor, exact=False, note=f"{fitted}; {note}" if note else fitted)
 
 
-KIND = LightKind(
+SPOT = LightKind(
     plugins=("spot",),
     to_heuristic=_to_heuristic,
     model=SpotLight,

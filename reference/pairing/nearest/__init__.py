@@ -5,13 +5,13 @@ A rule is one function, declared by :func:`reference.pairing.nearest.material.ru
 ==================================================  ================================================
 BSDF                                                Rule
 ==================================================  ================================================
-``diffuse``, ``roughplastic``, ``plastic``,         :mod:`reference.pairing.nearest.opaque`
-``conductor``, ``roughconductor``, ``principled``
-``null``, ``dielectric``, ``roughdielectric``,      :mod:`reference.pairing.nearest.clear`
+``diffuse``, ``roughplastic``, ``plastic``,         :mod:`reference.pairing.nearest.simple`
+``conductor``, ``roughconductor``, ``principled``,
+``null``, ``dielectric``, ``roughdielectric``,
 ``thindielectric``
 ``twosided``, ``mask``, ``blendbsdf``, ``bumpmap``, :mod:`reference.pairing.nearest.wrapped`
 ``normalmap``
-any other, a user's own included                    :mod:`reference.pairing.nearest.probed`
+any other, a user's own included                    :func:`reference.pairing.nearest.probe.nearest`
 ==================================================  ================================================
 """
 
@@ -19,7 +19,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from reference.pairing.factors import Convention
-from reference.pairing.nearest import probed
+from reference.pairing.nearest import probe
 from reference.pairing.nearest.material import RULES, Context, Nearest, Rule
 from reference.scene.graph import Graph
 
@@ -31,7 +31,7 @@ WRAPPERS = tuple(plugin for plugin, rule in RULES.items() if rule.wraps)
 
 def rule_of(plugin: str) -> Rule:
     """Return the rule of a BSDF, by the name of its plugin."""
-    return RULES.get(plugin, Rule(probed.nearest))
+    return RULES.get(plugin, Rule(probe.nearest))
 
 
 def nearest_of(

@@ -1,4 +1,9 @@
-"""Rules for BSDFs that only reflect."""
+"""Rules for BSDFs that are not made of others: what only reflects, and what lets light through.
+
+The latter are seen through without refraction. What passes straight or refracted at normal
+incidence becomes the transmittance, what is reflected a lobe (`probe.lobe`). A closed body has two
+such surfaces on each path.
+"""
 
 from dataclasses import asdict
 from functools import lru_cache
@@ -6,7 +11,7 @@ from functools import lru_cache
 from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.factors import Convention, Phong, exponent_of
-from reference.pairing.nearest import operations, probed
+from reference.pairing.nearest import operations, probe
 from reference.pairing.nearest.material import Context, Nearest, rule
 from reference.scene import values
 from reference.scene.graph import Graph
@@ -80,7 +85,7 @@ def plastic(context: Context, index: int) -> Nearest:
     ]
     k_d = _of_base(graph, base, *(diffuse for diffuse, _ in levels))
     reflected = operations.product(graph, coat, levels[0][1])
-    return Nearest(k_a=k_d, k_d=k_d, **probed.lobe(context, reflected, 0.0), lost=(MIRROR,))
+    return Nearest(k_a=k_d, k_d=k_d, **probe.lobe(context, reflected, 0.0), lost=(MIRROR,))
 
 
 @rule("conductor", "roughconductor", reflectances={"specular_reflectance": 1.0})
@@ -91,7 +96,7 @@ def conductor(context: Context, index: int) -> Nearest:
     point; ``n`` is of the same width as ``alpha``, of the mean of ``alpha_u`` and ``alpha_v`` where
     they differ. A constant environment is returned by the lobe: ``k_a`` is that albedo.
     """
-    white = probed.with_values(context, index, specular_reflectance=1.0)
+    white = probe.with_values(context, index, specular_reflectance=1.0)
     reflected = operations.product(
         context.graph, white.reflected, context.value(index, "specular_reflectance", 1.0)
     )
@@ -100,7 +105,7 @@ def conductor(context: Context, index: int) -> Nearest:
     else:
         alpha, lost = context.value(index, "alpha", white.alpha), ()
     lost += (("Fresnel reflection", "the reflectance at normal incidence, at all angles"),)
-    return Nearest(k_a=reflected, **probed.lobe(context, reflected, alpha), lost=lost)
+    return Nearest(k_a=reflected, **probe.lobe(context, reflected, alpha), lost=lost)
 
 
 @rule("principled")
@@ -115,12 +120,12 @@ def principled(context: Context, index: int) -> Nearest:
     k_d = context.value(index, "base_color", 0.5)
     for key in ("metallic", "spec_trans"):
         k_d = operations.rest(graph, k_d, context.value(index, key, 0.0))
-    found = probed.with_values(context, index)
+    found = probe.with_values(context, index)
     roughness = context.value(index, "roughness", 0.5)
     return Nearest(
         k_a=found.reflected if operations.plain(k_d) is not None else k_d,
         k_d=k_d,
-        **probed.lobe(context, found.specular, operations.product(graph, roughness, roughness)),
+        **probe.lobe(context, found.specular, operations.product(graph, roughness, roughness)),
         transmittance=found.passed,
         lost=(("sheen, clearcoat, Fresnel reflection", "a diffuse part and one lobe"),),
     )
@@ -149,7 +154,7 @@ def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
 
 
 def _smooth_exponent() -> float:
-    return exponent_of(probed.SMOOTH_ALPHA)
+    return exponent_of(probe.SMOOTH_ALPHA)
 
 
 def _roughplastic(
@@ -171,3 +176,42 @@ def _roughplastic(
 @lru_cache(maxsize=256)
 def _phong_of(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list]:
     return factors.to_phong(plastic, convention)
+
+
+NEAREST = "seen through without refraction, by the transmittance at normal incidence"
+
+
+@rule("null")
+def null(context: Context, index: int) -> Nearest:
+    """``null``: transmittance 1 (exact)."""
+    return Nearest(transmittance=1.0, twosided=True)
+
+
+@rule("dielectric", "roughdielectric")
+def dielectric(context: Context, index: int) -> Nearest:
+    """``dielectric``, ``roughdielectric``: the interface is lit from outside alone."""
+    return _clear(context, index, "refraction", twosided=False)
+
+
+@rule("thindielectric")
+def sheet(context: Context, index: int) -> Nearest:
+    """``thindielectric``: both sides reflect, and nothing is refracted."""
+    return _clear(context, index, "mirror image", twosided=True)
+
+
+def _clear(context: Context, index: int, lost: str, twosided: bool) -> Nearest:
+    given = context.graph.props(index)
+    white = probe.with_values(context, index, specular_reflectance=1.0, specular_transmittance=1.0)
+    passed = operations.product(
+        context.graph, white.passed, given.get("specular_transmittance", 1.0)
+    )
+    reflected = operations.product(
+        context.graph, white.reflected, given.get("specular_reflectance", 1.0)
+    )
+    return Nearest(
+        k_a=reflected,
+        **probe.lobe(context, reflected, given.get("alpha", white.alpha)),
+        transmittance=passed,
+        twosided=twosided,
+        lost=((lost, NEAREST),),
+    )
