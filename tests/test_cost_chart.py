@@ -7,7 +7,7 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from comparisons.cost.timing import Measured
+from comparisons.cost.cost_record import Measured
 from reports.charts import error_over_time
 from tests import cost_records
 

@@ -6,7 +6,8 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from comparisons.cost.front import Point, equal_error, equal_time, pareto
+from comparisons.cost.cost_record import Point
+from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.timing import interval
 from comparisons.effects import shapley
 from tests.benchmarks import cost as repeats

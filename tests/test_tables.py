@@ -8,7 +8,7 @@ import pytest
 from markdown_it import MarkdownIt
 from msgspec import structs
 
-from comparisons.effects.prices import Price
+from comparisons.cost.cost_record import Price
 from comparisons.intervals import Estimated
 from comparisons.records import plain
 from reports.run import output

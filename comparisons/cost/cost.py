@@ -8,9 +8,9 @@ from msgspec import structs
 
 from comparisons import record
 from comparisons.compare import prepare
-from comparisons.cost.cost_record import Converged, Cost, Pictures, Rung, Split
+from comparisons.cost.cost_record import Converged, Cost, Pictures, Point, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
-from comparisons.cost.front import Point, equal_error, equal_time, pareto
+from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.methods import Methods
 from comparisons.cost.timing import Judge, measure
 from comparisons.effects.lattice import Lattice

@@ -4,12 +4,19 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from comparisons.cost.front import Reached, Within
-from comparisons.cost.timing import Measured
 from comparisons.departure.spaces import Viewing
-from comparisons.effects.prices import Prices
-from comparisons.effects.split import Part
-from comparisons.records import VERSION, Count, Machine, Pixels, Record, Resolution, Versions
+from comparisons.intervals import Estimated
+from comparisons.records import (
+    VERSION,
+    Amount,
+    Count,
+    Machine,
+    Pixels,
+    Positive,
+    Record,
+    Resolution,
+    Versions,
+)
 from heuristic.interpolation import Interpolation
 
 Family = Literal["kernel", "phong BSDF", "physical"]
@@ -35,6 +42,158 @@ class Rung(Record):
     names: Annotated[tuple[str, ...], Meta(description="All that it has in this scene.")]
     monte_carlo: Annotated[bool, Meta(description="Random beyond the pixel filter.")]
     family: Family
+
+
+class Interval(Record):
+    """The median of repeats, their quartiles, and an interval for the median.
+
+    ``low`` and ``high`` are order statistics; ``level`` is the chance that they hold the true
+    median, whatever the distribution. With fewer than six repeats not even the extremes reach 95 %,
+    and ``level`` says what they do reach.
+    """
+
+    median: Positive
+    p25: Positive
+    p75: Positive
+    low: Positive
+    high: Positive
+    level: Annotated[float, Meta(ge=0, le=1)]
+    repeats: int
+
+
+class Measured(Record):
+    """A rung at one sample count.
+
+    Attributes
+    ----------
+    rung, spp
+        Name of the rung, and samples per pixel as rendered.
+    first_s, compile_s
+        Time of the first run, and what LLVM took of it.
+    seconds
+        Of the rounds.
+    error, error_stderr
+        Mean ΔE2000 of one rendering, mean over rounds, and its standard error.
+    mse, mse_stderr
+        Linear mean squared error, the reference's variance subtracted.
+    pareto
+        Whether it is on the front of time and error (:func:`comparisons.cost.front.pareto`).
+    """
+
+    rung: str
+    spp: int
+    first_s: Positive
+    compile_s: Amount
+    seconds: Interval
+    error: Amount
+    error_stderr: Amount
+    mse: float
+    mse_stderr: Amount
+    pareto: bool = False
+
+
+class Point(Record):
+    """A method at one sample count: median time in seconds, and mean ΔE2000."""
+
+    method: str
+    spp: int
+    seconds: Positive
+    error: Amount
+
+
+class Within(Record):
+    """The best point within a time, None where none is as fast."""
+
+    seconds: Positive
+    best: Point | None
+
+
+class Reached(Record):
+    """When a method reaches an error.
+
+    ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
+    ``at_most``, where the fewest samples measured reach it already.
+    """
+
+    method: str
+    error: Positive
+    seconds: float | None
+    at_most: bool = False
+
+
+class Price(Record):
+    """What one effect buys and costs.
+
+    Attributes
+    ----------
+    effect
+        Its label.
+    removes
+        Mean ΔE2000 that it removes; negative where it takes the image further away.
+    alone, last
+        The same where it is the first effect to be added, and the last.
+    adds_s
+        Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
+    sampling_error
+        Standard error of ``removes`` from drawing orders, 0 where all subsets were rendered.
+    """
+
+    effect: str
+    removes: Estimated
+    alone: float
+    last: float
+    adds_s: Estimated
+    sampling_error: Amount
+
+
+class Prices(Record):
+    """The prices of all effects.
+
+    Attributes
+    ----------
+    effects
+        One :class:`Price` each.
+    departure
+        Mean ΔE2000 of the heuristic half, which the prices add up to.
+    floor
+        Mean ΔE2000 of the reference rendered with as many samples: of noise alone. The effect that
+        is added last is charged with it.
+    kernel_s, reference_s
+        Seconds that none of the effects and all of them take.
+    spp, replicates, orders
+        Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
+    """
+
+    effects: tuple[Price, ...]
+    departure: Amount
+    floor: Amount
+    kernel_s: Positive
+    reference_s: Positive
+    spp: int
+    replicates: int
+    orders: int
+
+
+class Part(Record):
+    """One cause of the departure.
+
+    Attributes
+    ----------
+    name
+        As in the table.
+    mean, mean_stderr
+        Signed mean over the counted pixels and channels, linear, and its standard error.
+    rms
+        Root mean square.
+    dE2000
+        Mean ΔE2000 between the two images; those of the parts do not add up.
+    """
+
+    name: str
+    mean: float
+    mean_stderr: Amount
+    rms: Amount
+    dE2000: Amount
 
 
 class Split(Record):

@@ -9,39 +9,10 @@ the measured counts nothing is said.
 from itertools import pairwise
 from math import exp, log
 
-from comparisons.records import Amount, Positive, Record
+from comparisons.cost.cost_record import Reached, Within
 
 TIMES_S = (0.01, 0.1, 1.0, 10.0)
 ERRORS = (5.0, 2.0, 1.0, 0.5)
-
-
-class Point(Record):
-    """A method at one sample count: median time in seconds, and mean ΔE2000."""
-
-    method: str
-    spp: int
-    seconds: Positive
-    error: Amount
-
-
-class Within(Record):
-    """The best point within a time, None where none is as fast."""
-
-    seconds: Positive
-    best: Point | None
-
-
-class Reached(Record):
-    """When a method reaches an error.
-
-    ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
-    ``at_most``, where the fewest samples measured reach it already.
-    """
-
-    method: str
-    error: Positive
-    seconds: float | None
-    at_most: bool = False
 
 
 def pareto(points):

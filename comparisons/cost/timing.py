@@ -5,32 +5,12 @@ rung traces and compiles, and stands apart; a second one warms caches; the round
 a seed of its own, so that their errors are independent as well.
 """
 
-from typing import Annotated
-
 import numpy as np
-from msgspec import Meta
 
 from comparisons import intervals
+from comparisons.cost.cost_record import Interval, Measured
 from comparisons.departure.metrics import LEADING
-from comparisons.records import Amount, Positive, Record
 from reference.rendering.passes import passes
-
-
-class Interval(Record):
-    """The median of repeats, their quartiles, and an interval for the median.
-
-    ``low`` and ``high`` are order statistics; ``level`` is the chance that they hold the true
-    median, whatever the distribution. With fewer than six repeats not even the extremes reach 95 %,
-    and ``level`` says what they do reach.
-    """
-
-    median: Positive
-    p25: Positive
-    p75: Positive
-    low: Positive
-    high: Positive
-    level: Annotated[float, Meta(ge=0, le=1)]
-    repeats: int
 
 
 def interval(values):
@@ -89,37 +69,6 @@ class Judge:
     def _distance(self, pixels):
         here = self.metric.coordinates(pixels, self.viewing)
         return np.mean(self.metric.difference(self.coordinates, here))
-
-
-class Measured(Record):
-    """A rung at one sample count.
-
-    Attributes
-    ----------
-    rung, spp
-        Name of the rung, and samples per pixel as rendered.
-    first_s, compile_s
-        Time of the first run, and what LLVM took of it.
-    seconds
-        Of the rounds.
-    error, error_stderr
-        Mean ΔE2000 of one rendering, mean over rounds, and its standard error.
-    mse, mse_stderr
-        Linear mean squared error, the reference's variance subtracted.
-    pareto
-        Whether it is on the front of time and error (:func:`comparisons.cost.front.pareto`).
-    """
-
-    rung: str
-    spp: int
-    first_s: Positive
-    compile_s: Amount
-    seconds: Interval
-    error: Amount
-    error_stderr: Amount
-    mse: float
-    mse_stderr: Amount
-    pareto: bool = False
 
 
 def measure(renderers, judge, rounds, seed, progress):

@@ -12,62 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons import intervals
+from comparisons.cost.cost_record import Price, Prices
 from comparisons.effects import shapley
-from comparisons.intervals import Estimated
-from comparisons.records import Amount, Positive, Record
-
-
-class Price(Record):
-    """What one effect buys and costs.
-
-    Attributes
-    ----------
-    effect
-        Its label.
-    removes
-        Mean ΔE2000 that it removes; negative where it takes the image further away.
-    alone, last
-        The same where it is the first effect to be added, and the last.
-    adds_s
-        Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
-    sampling_error
-        Standard error of ``removes`` from drawing orders, 0 where all subsets were rendered.
-    """
-
-    effect: str
-    removes: Estimated
-    alone: float
-    last: float
-    adds_s: Estimated
-    sampling_error: Amount
-
-
-class Prices(Record):
-    """The prices of all effects.
-
-    Attributes
-    ----------
-    effects
-        One :class:`Price` each.
-    departure
-        Mean ΔE2000 of the heuristic half, which the prices add up to.
-    floor
-        Mean ΔE2000 of the reference rendered with as many samples: of noise alone. The effect that
-        is added last is charged with it.
-    kernel_s, reference_s
-        Seconds that none of the effects and all of them take.
-    spp, replicates, orders
-        Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
-    """
-
-    effects: tuple[Price, ...]
-    departure: Amount
-    floor: Amount
-    kernel_s: Positive
-    reference_s: Positive
-    spp: int
-    replicates: int
-    orders: int
 
 
 @dataclass(frozen=True)

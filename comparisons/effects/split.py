@@ -19,35 +19,13 @@ form and transport are always there.
 
 import numpy as np
 
+from comparisons.cost.cost_record import Part
 from comparisons.departure.metrics import delta_e_2000
 from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
-from comparisons.records import Amount, Record
 from reference.effects.effect import PARTS
 from reference.effects.kernel_terms import POLYGONS
 
 ALWAYS = ("implementation", "BSDF form", "transport")
-
-
-class Part(Record):
-    """One cause of the departure.
-
-    Attributes
-    ----------
-    name
-        As in the table.
-    mean, mean_stderr
-        Signed mean over the counted pixels and channels, linear, and its standard error.
-    rms
-        Root mean square.
-    dE2000
-        Mean ΔE2000 between the two images; those of the parts do not add up.
-    """
-
-    name: str
-    mean: float
-    mean_stderr: Amount
-    rms: Amount
-    dE2000: Amount
 
 
 def split(lattice, counted, viewing):

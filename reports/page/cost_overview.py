@@ -3,9 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from comparisons.cost.cost_record import Cost
-from comparisons.cost.timing import Measured
-from comparisons.effects.prices import Price
+from comparisons.cost.cost_record import Cost, Measured, Price
 
 
 @dataclass(frozen=True)

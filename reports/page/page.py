@@ -16,7 +16,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
@@ -29,17 +29,19 @@ from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import luminance
 from comparisons.records import plain
-from comparisons.verification import Verification
-from heuristic.equations import Entry
 from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import cost_overview, overview
-from reports.page.hard_cases import HardCasesView
 from reports.page.legends import legends
 from reports.page.scene_view import SceneView
 from reports.run.cost_files import CostView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
+
+if TYPE_CHECKING:  # for what few pages show
+    from comparisons.verification import Verification
+    from heuristic.equations import Entry
+    from reports.page.hard_cases import HardCasesView
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
