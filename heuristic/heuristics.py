@@ -9,14 +9,13 @@ heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interp
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
-from importlib.metadata import entry_points
 from numbers import Real
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.materials import check_form
 from heuristic.points import INPUTS, Array, Given, Point
@@ -133,20 +132,11 @@ class Heuristic:
         return self.shade(Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared))
 
 
-_declared: dict[str, Heuristic] = {}
+HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP)
+"""All heuristics by name."""
 
-
-def declare(heuristic: Heuristic) -> Heuristic:
-    """Make a heuristic known by its name, in this process, and return it.
-
-    Raises
-    ------
-    InputError
-        When another one has the name.
-    """
-    if _declared.setdefault(heuristic.name, heuristic) != heuristic:
-        raise InputError(f"heuristic {heuristic.name} is declared already: choose another name.")
-    return heuristic
+declare = HEURISTICS.declare
+"""Make a heuristic known by its name, in this process, and return it."""
 
 
 def named(name: str) -> Heuristic:
@@ -157,29 +147,15 @@ def named(name: str) -> Heuristic:
     InputError
         When none has the name, or an entry point cannot be loaded.
     """
-    if name not in _declared:
-        _load()
-    if name not in _declared:
+    if name not in HEURISTICS:
         raise InputError(
-            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(_declared))}. A"
+            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}. A"
             f" package declares its own by an entry point of the group {GROUP}, a program by"
             " heuristic.heuristics.declare."
         )
-    return _declared[name]
-
-
-@cache
-def _load() -> None:
-    """Declare what installed packages bring."""
-    for entry in entry_points(group=GROUP):
-        try:
-            declare(entry.load())
-        except Exception as error:
-            raise InputError(
-                f"heuristic {entry.name}: the entry point {entry.value} cannot be loaded: {error}"
-            ) from error
+    return HEURISTICS[name]
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}
-PHONG = declare(Heuristic("phong", Point.textbook, "Phong", _READ))
-BLINN = declare(Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn"))
+PHONG = HEURISTICS.own(Heuristic("phong", Point.textbook, "Phong", _READ))
+BLINN = HEURISTICS.own(Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn"))

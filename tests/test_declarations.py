@@ -17,8 +17,7 @@ from scipy.ndimage import uniform_filter
 
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences
-from comparisons.departure import metric as declarations
-from comparisons.departure.metric import GROUP, Metric, declare
+from comparisons.departure.metric import Metric, declare
 from comparisons.departure.metrics import BUILT_IN, METRICS
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from comparisons.fit.summary import departure
@@ -52,7 +51,7 @@ BLURRED = Metric(
 def metric():
     """The toy, declared."""
     yield declare(BLURRED)
-    declarations._DECLARED.pop(BLURRED.name)
+    METRICS._others.pop(BLURRED.name)
 
 
 @pytest.fixture
@@ -167,6 +166,10 @@ def test_metrics_of_installed_packages_are_declared(monkeypatch):
         def load(self):
             return BLURRED
 
-    monkeypatch.setattr(declarations, "entry_points", lambda group: [Point()] * (group == GROUP))
-    declarations.declare_from_outside()
-    assert declarations._DECLARED.pop("blurred") is BLURRED
+    monkeypatch.setattr(
+        "heuristic.declared.entry_points", lambda group: [Point()] * (group == METRICS.group)
+    )
+    monkeypatch.setattr(METRICS, "_others", {})
+    monkeypatch.setattr(METRICS, "_loaded", False)
+    assert METRICS["blurred"] is BLURRED
+    assert list(METRICS) == [*BUILT_IN, "blurred"]

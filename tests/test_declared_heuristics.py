@@ -15,7 +15,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic import Material, heuristics, meshes, shading
 from heuristic.errors import InputError
-from heuristic.heuristics import BLINN, PHONG, Heuristic, Parameter, declare, named
+from heuristic.heuristics import BLINN, HEURISTICS, PHONG, Heuristic, Parameter, declare, named
 from heuristic.interpolation import Interpolation
 from heuristic.mesh_shading import shading_points
 from heuristic.points import Point
@@ -81,7 +81,7 @@ DECLARED = {
 @pytest.fixture
 def declared(monkeypatch):
     """The toys are known while a test runs."""
-    monkeypatch.setattr(heuristics, "_declared", dict(heuristics._declared))
+    monkeypatch.setattr(HEURISTICS, "_others", {})
     for heuristic in DECLARED.values():
         declare(heuristic)
 
@@ -365,7 +365,7 @@ def test_an_unknown_name_lists_what_there_is(name):
         (lambda: Parameter("ambient", 0, 0, 1), "'ambient' is not allowed"),
         (lambda: Parameter("two words", 0, 0, 1), "'two words' is not allowed"),
         (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give one from 0 to 1"),
-        (lambda: declare(Heuristic("phong", toon)), "phong is declared already"),
+        (lambda: declare(Heuristic("phong", toon)), "'phong' is declared already"),
     ],
 )
 def test_a_wrong_declaration_is_refused(make, message):
@@ -383,11 +383,11 @@ def test_a_package_declares_its_own_by_an_entry_point(declared, monkeypatch):
     here = __name__.rpartition(".")[2]
     entries = [SimpleNamespace(name="late", value=f"{here}:LATE", load=lambda: late)]
     late = Heuristic("late", toon)
-    monkeypatch.setattr(heuristics, "entry_points", lambda group: entries)
-    heuristics._load.cache_clear()
+    monkeypatch.setattr("heuristic.declared.entry_points", lambda group: entries)
+    monkeypatch.setattr(HEURISTICS, "_loaded", False)
     assert named("late") is late
     entries[0].load = lambda: 1 / 0
-    heuristics._load.cache_clear()
+    monkeypatch.setattr(HEURISTICS, "_loaded", False)
     with pytest.raises(InputError, match=r"late: the entry point .*division by zero"):
         named("other")
 

@@ -8,9 +8,10 @@ from comparisons.compare import prepare
 from comparisons.cost import rungs
 from comparisons.cost.cost import cost
 from comparisons.cost.methods import Methods
-from comparisons.cost.rungs import Kernel, Physical, Rung, declare
+from comparisons.cost.rungs import RUNGS, Kernel, Physical, Rung, declare
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
+from heuristic import declared
 from heuristic.errors import InputError
 from reference.effects.light_forms import EXTENDED
 from reference.effects.obstacles import OCCLUSION
@@ -23,10 +24,8 @@ TOY = Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION})
 @pytest.fixture(autouse=True)
 def only_here(monkeypatch):
     """Forget afterwards what a test declares."""
-    monkeypatch.setattr(rungs, "_declared", {})
-    rungs._load.cache_clear()
-    yield
-    rungs._load.cache_clear()
+    monkeypatch.setattr(RUNGS, "_others", {})
+    monkeypatch.setattr(RUNGS, "_loaded", False)
 
 
 def named(name):
@@ -67,7 +66,7 @@ def test_declaring_a_name_again_replaces_the_rung():
 
 
 def test_the_packages_own_names_are_refused():
-    with pytest.raises(InputError, match=r"'direct' is taken .* give another"):
+    with pytest.raises(InputError, match=r"'direct' is declared already, .* give another"):
         declare(Rung("direct", "physical", Physical()))
 
 
@@ -77,15 +76,17 @@ def test_what_no_integrator_leaves_out_is_refused():
 
 
 def test_an_installed_package_can_name_a_rung(monkeypatch):
-    entry = EntryPoint("toy", "tests.test_declared_rungs:TOY", rungs.GROUP)
+    entry = EntryPoint("toy", "tests.test_declared_rungs:TOY", RUNGS.group)
     monkeypatch.setattr(
-        rungs, "entry_points", lambda group: [entry] if group == entry.group else []
+        declared, "entry_points", lambda group: [entry] if group == entry.group else []
     )
     assert rungs.rungs()[-2] == TOY
 
 
 def test_an_entry_point_that_cannot_be_loaded_says_which(monkeypatch):
-    entry = EntryPoint("toy", "tests.test_declared_rungs:MISSING", rungs.GROUP)
-    monkeypatch.setattr(rungs, "entry_points", lambda group: [entry])
-    with pytest.raises(InputError, match=r"MISSING, an entry point of fotismos\.rungs, cannot be"):
+    entry = EntryPoint("toy", "tests.test_declared_rungs:MISSING", RUNGS.group)
+    monkeypatch.setattr(declared, "entry_points", lambda group: [entry])
+    with pytest.raises(
+        InputError, match=r"rung toy: .*MISSING of fotismos\.rungs cannot"
+    ):
         rungs.rungs()

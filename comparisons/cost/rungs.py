@@ -12,17 +12,14 @@ or is named by an installed package as an entry point of the group ``fotismos.ru
 """
 
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import entry_points
 from typing import Literal
 
+from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.effect import Effect
 from reference.effects.obstacles import INTERREFLECTION
-
-GROUP = "fotismos.rungs"
 
 DEPTHS = (3, 4, 5)
 """Depths of ``path`` that are rungs, as Mitsuba counts: 2 is direct light."""
@@ -108,20 +105,11 @@ PHONG_BSDF = Rung("phong BSDF, full transport", "phong BSDF", Physical(BSDF_FORM
 DIRECT = Rung("direct", "physical", Physical(frozenset({INTERREFLECTION})))
 FULL_PLAN = Rung("full plan", "physical", Physical())
 
-_declared: dict[str, Rung] = {}
+RUNGS: Declared[Rung] = Declared("rung", "fotismos.rungs")
+"""Those of the package, with paths of :data:`DEPTHS`, and those from outside."""
 
-
-def declare(rung: Rung) -> None:
-    """Add a rung to the ladder of every scene, in place of one of its name that was declared.
-
-    Raises
-    ------
-    InputError
-        When a rung of the package has the name.
-    """
-    if any(rung.name == own.name for own in _own(DEPTHS)):
-        raise InputError(f"the name {rung.name!r} is taken by a rung of fotismos: give another.")
-    _declared[rung.name] = rung
+declare = RUNGS.declare
+"""Add a rung to the ladder of every scene, in place of one of its name from outside; return it."""
 
 
 def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:
@@ -137,9 +125,8 @@ def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:
     InputError
         When an entry point cannot be loaded, or its rung not declared.
     """
-    _load()
     *cheaper, full = _own(depths)
-    return (*cheaper, *_declared.values(), full)
+    return (*cheaper, *RUNGS.others(), full)
 
 
 def _own(depths: tuple[int, ...]) -> tuple[Rung, ...]:
@@ -147,14 +134,5 @@ def _own(depths: tuple[int, ...]) -> tuple[Rung, ...]:
     return (*KERNELS, PHONG_BSDF, DIRECT, *paths, FULL_PLAN)
 
 
-@cache
-def _load() -> None:
-    for entry in entry_points(group=GROUP):
-        try:
-            found = entry.load()
-        except Exception as error:  # whatever the code of another package raises
-            raise InputError(
-                f"{entry.value}, an entry point of {GROUP}, cannot be loaded: {error}. Mend or"
-                " uninstall the package that names it."
-            ) from error
-        declare(found)
+for _rung in _own(DEPTHS):
+    RUNGS.own(_rung)

@@ -27,20 +27,16 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
+from heuristic.declared import Declared
 from heuristic.errors import InputError
 from reference.rendering.renderer import require_finite
-
-#: Of the entry points of other packages that declare metrics.
-GROUP = "fotismos.metrics"
 
 #: Names of the layers and columns that stand beside the metrics.
 RESERVED = frozenset(
@@ -93,6 +89,11 @@ class Metric:
     linear: bool = False
 
     def __post_init__(self) -> None:
+        if not self.name.isidentifier() or self.name in RESERVED:
+            raise InputError(
+                f"metric {self.name!r}: a name has letters, digits and _ alone, and is none of"
+                f" {', '.join(sorted(RESERVED))}. Give it another one."
+            )
         if not self.heading:
             object.__setattr__(self, "heading", f"{self.label}, mean")
 
@@ -153,32 +154,11 @@ class Pixelwise(Metric):
         return distances
 
 
-_DECLARED: dict[str, Metric] = {}
-
 #: All metrics by name, in the order of reports: first that by which scenes are judged.
-METRICS: Mapping[str, Metric] = MappingProxyType(_DECLARED)
+METRICS: Declared[Metric] = Declared("metric", "fotismos.metrics")
 
-
-def declare(metric: Metric) -> Metric:
-    """Declare a metric, so that everything lists it.
-
-    Raises `InputError` for a name that is taken or that is not an identifier.
-    """
-    if not metric.name.isidentifier() or metric.name in RESERVED:
-        raise InputError(
-            f"metric {metric.name!r}: a name has letters, digits and _ alone, and is none of"
-            f" {', '.join(sorted(RESERVED))}. Give it another one."
-        )
-    if metric.name in _DECLARED:
-        raise InputError(f"metric {metric.name!r} is declared already. Give it another name.")
-    _DECLARED[metric.name] = metric
-    return metric
-
-
-def declare_from_outside() -> None:
-    """Declare what the entry points of other packages name."""
-    for point in entry_points(group=GROUP):
-        declare(point.load())
+#: Declare a metric, so that everything lists it, and return it.
+declare = METRICS.declare
 
 
 def drawn() -> dict[str, Metric]:

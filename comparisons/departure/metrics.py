@@ -23,7 +23,6 @@ from comparisons.departure.metric import (
     Pixelwise,
     checked_pair,
     declare,
-    declare_from_outside,
     drawn,
 )
 from comparisons.departure.spaces import (
@@ -53,7 +52,7 @@ def _root_mean_square(a: Array, b: Array) -> Array:
 
 
 #: The metric by which scenes are judged: regions, targets of noise and prices are in it.
-LEADING = declare(
+LEADING = METRICS.own(
     Pixelwise(
         name="dE2000",
         label="ΔE2000",
@@ -68,7 +67,7 @@ LEADING = declare(
         difference=ciede2000,
     )
 )
-declare(
+METRICS.own(
     Pixelwise(
         name="dE_ITP",
         label="ΔE ITP",
@@ -83,7 +82,7 @@ declare(
         difference=euclidean,
     )
 )
-declare(
+METRICS.own(
     Pixelwise(
         name="dE_CAM16UCS",
         label="CAM16-UCS",
@@ -98,7 +97,7 @@ declare(
         difference=euclidean,
     )
 )
-RMSE = declare(
+RMSE = METRICS.own(
     Pixelwise(
         name="rmse",
         label="RMSE",
@@ -116,8 +115,7 @@ RMSE = declare(
 )
 
 #: Names of the metrics above.
-BUILT_IN = tuple(METRICS)
-declare_from_outside()
+BUILT_IN = METRICS.built_in
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,93 @@
+"""Declarations by name: the package's own, a program's, and those of installed packages."""
+
+from collections.abc import Iterator, Mapping
+from importlib.metadata import entry_points
+from typing import Generic, Protocol, TypeVar
+
+from heuristic.errors import InputError
+
+
+class Named(Protocol):
+    """What can be declared."""
+
+    name: str
+
+
+Declaration = TypeVar("Declaration", bound=Named)
+
+
+class Declared(Mapping[str, Declaration], Generic[Declaration]):
+    """All declarations of one kind by name, the package's own first.
+
+    Parameters
+    ----------
+    kind
+        The word for one, in messages.
+    group
+        Of the entry points by which installed packages declare theirs. They are loaded once, when
+        the declarations are listed or a name is not known.
+    """
+
+    def __init__(self, kind: str, group: str) -> None:
+        self.kind, self.group = kind, group
+        self._own: dict[str, Declaration] = {}
+        self._others: dict[str, Declaration] = {}
+        self._loaded = False
+
+    def own(self, declaration: Declaration) -> Declaration:
+        """Declare what belongs to the package, and return it."""
+        self._own[declaration.name] = declaration
+        return declaration
+
+    def declare(self, declaration: Declaration) -> Declaration:
+        """Declare something from outside, in place of what was so declared by its name; return it.
+
+        Raises
+        ------
+        InputError
+            When the name is one of the package's own.
+        """
+        if declaration.name in self._own:
+            raise InputError(
+                f"{self.kind} {declaration.name!r} is declared already, by fotismos itself: give"
+                " another name."
+            )
+        self._others[declaration.name] = declaration
+        return declaration
+
+    @property
+    def built_in(self) -> tuple[str, ...]:
+        """The names of the package's own."""
+        return tuple(self._own)
+
+    def others(self) -> tuple[Declaration, ...]:
+        """Return what was declared from outside.
+
+        Raises
+        ------
+        InputError
+            When an entry point cannot be loaded, or its object not declared.
+        """
+        if not self._loaded:
+            for entry in entry_points(group=self.group):
+                try:
+                    self.declare(entry.load())
+                except Exception as error:  # whatever the code of another package raises
+                    raise InputError(
+                        f"{self.kind} {entry.name}: the entry point {entry.value} of {self.group}"
+                        f" cannot be loaded: {error}. Mend or uninstall the package that names it."
+                    ) from error
+            self._loaded = True
+        return tuple(self._others.values())
+
+    def __getitem__(self, name: str) -> Declaration:
+        if name not in self._own and name not in self._others:
+            self.others()
+        return self._own[name] if name in self._own else self._others[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self.others()
+        return iter((*self._own, *self._others))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
