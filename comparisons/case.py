@@ -213,13 +213,7 @@ def file_of(scene: str | Path) -> Path | None:
 
 
 def name_of(scene: str | Path) -> str:
-    """Return the name that a scene goes by, without reading it.
-
-    Raises
-    ------
-    InputError
-        When there is no such scene.
-    """
+    """Return the name that a scene goes by, without reading it."""
     path = file_of(scene)
     return builtin(str(scene)).name if path is None else path.stem
 

@@ -11,14 +11,13 @@ import numpy as np
 from comparisons import record, render
 from comparisons.comparison import (
     ComparisonRecord,
-    NoiseTarget,
     Significant,
     TimeSpent,
 )
 from comparisons.departure import limits, regions, statistics
-from comparisons.departure.histogram import histogram
 from comparisons.departure.marks import significance
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
+from comparisons.departure.statistics import histogram
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.records import Pixels
@@ -55,15 +54,9 @@ class Prepared:
 
 
 def prepare(source, options=None):
-    """Pair and plan a scene in the current variant, and make both halves ready to render.
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or paired.
-    """
+    """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
-    pair = _pair(source, options)
+    pair = options.pair(source)
     physical = halves.with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
     if width * height > LARGEST:
@@ -126,7 +119,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     width, height = image_size(ready.scene)
     surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
-    estimates = render.render(ready, options, surface.hit, progress or _silent, kept)
+    estimates = render.render(ready, options, surface.hit, progress, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
@@ -165,30 +158,17 @@ def compare(source, options=None, progress=None, command="", kept=None):
         warnings=tuple(ready.pair.warnings),
         versions=record.versions(),
         command=command,
-        noise_target=estimates.stop and record.copied(NoiseTarget, estimates.stop),
+        noise_target=estimates.stop,
         **numbers,
     )
     return Comparison(made, images)
-
-
-def _pair(source, options):
-    return halves.pair(
-        source,
-        options.convention,
-        options.resolution,
-        options.interpolation,
-        options.tessellation,
-        prune=not options.everything,
-        sensor=options.sensor,
-        heuristic=options.heuristic,
-    )
 
 
 def _heuristic_renderer(source, pair, chosen, spp, options):
     """Make the heuristic half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
-            pair = _pair(source, options)
+            pair = options.pair(source)
         scene = halves.with_sampler(pair.heuristic, chosen.sampler).instantiate()
         return Renderer(scene, None, spp, "heuristic image")
 
@@ -257,7 +237,3 @@ class _Stages:
         now = perf_counter()
         self.seconds[name] = now - self._begin - rendering
         self._begin = now
-
-
-def _silent(stage, done, total):
-    """Report no progress."""

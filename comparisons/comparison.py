@@ -4,11 +4,10 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from comparisons.departure.histogram import Histogram
 from comparisons.departure.limits import LimitCounts
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import Viewing
-from comparisons.departure.statistics import RatioSummary, Summary
+from comparisons.departure.statistics import Histogram, RatioSummary, Summary
 from comparisons.records import (
     VERSION,
     Amount,

@@ -5,17 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.records import Record
+from comparisons.records import Estimated
 
 LEVEL = 0.95
-
-
-class Estimated(Record):
-    """A number with a 95 % interval of Student's t over the replicates."""
-
-    value: float
-    low: float
-    high: float
 
 
 def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:

@@ -7,6 +7,8 @@ from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
+from reference.pairing.halves import Pair, pair
+from reference.scene.source import Source
 
 
 @dataclass(frozen=True)
@@ -79,3 +81,16 @@ class Options:
             raise InputError(
                 f"resolution {width}x{height} is not allowed: width and height are at least 1."
             )
+
+    def pair(self, source: Source) -> Pair:
+        """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""
+        return pair(
+            source,
+            self.convention,
+            self.resolution,
+            self.interpolation,
+            self.tessellation,
+            prune=not self.everything,
+            sensor=self.sensor,
+            heuristic=self.heuristic,
+        )

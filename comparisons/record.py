@@ -1,6 +1,5 @@
 """What a comparison returns, and how its record is made of a pair, a plan and times."""
 
-import os
 import platform
 from dataclasses import dataclass
 from importlib import metadata
@@ -22,6 +21,7 @@ from comparisons.comparison import (
     Times,
     Unrepresentable,
 )
+from comparisons.pool import cores
 from heuristic import __version__
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
@@ -64,9 +64,7 @@ def machine():
     """Return what times depend on: processor, cores that may be used, system."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1,
+        "cores": cores(),
         "system": f"{platform.system()} {platform.machine()}",
     }
 

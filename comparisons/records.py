@@ -22,8 +22,40 @@ VERSION = 2
 Kind = TypeVar("Kind")
 
 
+Amount = Annotated[float, Meta(ge=0)]
+Positive = Annotated[float, Meta(gt=0)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+Count = Annotated[int, Meta(ge=0)]
+Size = Annotated[int, Meta(ge=1)]
+Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in pixels.")]
+Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
+
+
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Something that is written as a JSON object."""
+
+
+class Pixels(Record):
+    """Pixels whose centre sees a surface, and all."""
+
+    counted: Count
+    total: Size
+
+
+class Machine(Record):
+    """What times depend on: model of the processor, cores that may be used, system."""
+
+    processor: str
+    cores: Size
+    system: str
+
+
+class Estimated(Record):
+    """A number with a 95 % interval of Student's t over the replicates."""
+
+    value: float
+    low: float
+    high: float
 
 
 def plain(record: Any) -> Any:
@@ -93,32 +125,6 @@ def _numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise NotImplementedError(f"{type(value).__name__} has no place in a record")
-
-
-Amount = Annotated[float, Meta(ge=0)]
-Positive = Annotated[float, Meta(gt=0)]
-Share = Annotated[float, Meta(ge=0, le=1)]
-Count = Annotated[int, Meta(ge=0)]
-Size = Annotated[int, Meta(ge=1)]
-Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in pixels.")]
-
-
-Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
-
-
-class Pixels(Record):
-    """Pixels whose centre sees a surface, and all."""
-
-    counted: Count
-    total: Size
-
-
-class Machine(Record):
-    """What times depend on: model of the processor, cores that may be used, system."""
-
-    processor: str
-    cores: Size
-    system: str
 
 
 WIDTH = 110

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
+from comparisons.comparison import NoiseTarget
 from comparisons.departure.metrics import LEADING
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Estimate, Mean, add_difference
@@ -64,27 +65,6 @@ def schedule(plan, pixels, spp=None, noise=None):
 
 
 @dataclass(frozen=True)
-class Stop:
-    """Where a run with a noise target ended.
-
-    Attributes
-    ----------
-    target, reached
-        95th percentile over the counted pixels of the noise in ΔE2000: asked for, and predicted
-        from the spread of the passes.
-    stopped_by
-        ``target``, or ``samples`` where the limit came first.
-    limit_spp
-        The limit, in samples a pixel.
-    """
-
-    target: float
-    reached: float
-    stopped_by: str
-    limit_spp: int
-
-
-@dataclass(frozen=True)
 class Rendered:
     """The passes of both halves and of their difference, and where they stopped (or None).
 
@@ -97,7 +77,7 @@ class Rendered:
     difference: Estimate
     passes: int
     new: int
-    stop: Stop | None
+    stop: NoiseTarget | None
 
 
 def render(ready, options, counted, progress, kept=None):
@@ -111,7 +91,7 @@ def render(ready, options, counted, progress, kept=None):
         Seed, noise target and viewing.
     counted
         (H, W): the pixels whose noise counts.
-    progress : callable
+    progress : callable, optional
         ``progress(stage, done, total)``; of a run with a target, ``total`` is the limit.
     kept : optional
         What holds the state of an interrupted run: ``load()`` returns a dictionary of arrays or
@@ -141,7 +121,12 @@ def render(ready, options, counted, progress, kept=None):
         if reached is None:
             reached = noise_percentile(sums, counted, options.viewing)
         by = "target" if reached <= options.noise else "samples"
-        stop = Stop(options.noise, reached, by, ready.passes * ready.reference.spp)
+        stop = NoiseTarget(
+            target=options.noise,
+            reached=reached,
+            stopped_by=by,
+            limit_spp=ready.passes * ready.reference.spp,
+        )
     # The sums of a large image go one by one as their estimates come.
     difference, reference = (sums.pop().estimate() for _ in range(2))
     heuristic = sums.pop().mean()

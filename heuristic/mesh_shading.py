@@ -103,11 +103,6 @@ def shade_mesh(
     -------
     int
         The number of components stored, which :func:`stored_shade` needs: 3 for single numbers.
-
-    Raises
-    ------
-    InputError
-        As :func:`shading_points` and :func:`heuristic.shade`.
     """
     si = shading_points(mesh, interpolation)
     position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)

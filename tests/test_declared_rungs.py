@@ -86,7 +86,5 @@ def test_an_installed_package_can_name_a_rung(monkeypatch):
 def test_an_entry_point_that_cannot_be_loaded_says_which(monkeypatch):
     entry = EntryPoint("toy", "tests.test_declared_rungs:MISSING", RUNGS.group)
     monkeypatch.setattr(declared, "entry_points", lambda group: [entry])
-    with pytest.raises(
-        InputError, match=r"rung toy: .*MISSING of fotismos\.rungs cannot"
-    ):
+    with pytest.raises(InputError, match=r"rung toy: .*MISSING of fotismos\.rungs cannot"):
         rungs.rungs()

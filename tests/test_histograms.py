@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.departure.histogram import BINS_A_DECADE, DECADES, histogram
+from comparisons.departure.statistics import BINS_A_DECADE, DECADES, histogram
 from comparisons.records import Pixels
 from reports.charts import histograms
 from tests import records

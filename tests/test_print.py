@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.departure.histogram import histogram
 from comparisons.departure.metrics import METRICS, drawn
+from comparisons.departure.statistics import histogram
 from reports.charts import figures
 from reports.files import images, ownership
 from tests import records

@@ -9,8 +9,7 @@ from markdown_it import MarkdownIt
 from msgspec import structs
 
 from comparisons.cost.cost_record import Price
-from comparisons.intervals import Estimated
-from comparisons.records import plain
+from comparisons.records import Estimated, plain
 from reports.run import output
 from reports.terminal import tables
 from tests import cost_records, records

@@ -85,13 +85,6 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     Returns
     -------
     Measured
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or paired.
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
     """
     ready = prepare(source, options)
     spp = options.spp or ready.reference.spp * ready.passes

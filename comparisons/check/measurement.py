@@ -135,11 +135,6 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
         How linear values are looked at.
     progress
         As of :func:`comparisons.compare.compare`.
-
-    Raises
-    ------
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
     """
     loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)

@@ -80,7 +80,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         When a rendering holds a NaN or an infinity.
     """
     options, effort = options or Options(), effort or Effort()
-    progress = progress or _silent
+    progress = progress or (lambda *_: None)
     if options.resolution is None:
         options = replace(options, resolution=reduced(source, options, WIDTH))
     if options.spp is not None:
@@ -190,7 +190,3 @@ def _limits(parts, effects):
     limits = [abs(signed.mean(axis=2)).max() for signed in parts]
     removed = [abs(values).max() for values in effects]
     return Pictures(float(max(1e-3, *limits)), float(max(1.0, *removed, 0.0)))
-
-
-def _silent(stage, done, total):
-    """Report no progress."""

@@ -5,11 +5,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from comparisons.departure.spaces import Viewing
-from comparisons.intervals import Estimated
 from comparisons.records import (
     VERSION,
     Amount,
     Count,
+    Estimated,
     Machine,
     Pixels,
     Positive,

@@ -79,13 +79,7 @@ QUICK_WIDTH = 48
 
 
 def reduced(source, options, width):
-    """Return the resolution asked for, else the film's own, reduced to a width.
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or has no sensor.
-    """
+    """Return the resolution asked for, else the film's own, reduced to a width."""
     given = options.resolution or film_size(source.parse(), options.sensor)
     if given[0] <= width:
         return given

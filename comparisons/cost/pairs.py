@@ -1,9 +1,10 @@
 """The pairs of one scene, each derived once: in several variants, and with several kernels."""
 
+from dataclasses import replace
+
 import mitsuba as mi
 
 from heuristic.interpolation import Interpolation
-from reference.pairing import halves
 
 
 class Pairs:
@@ -39,14 +40,6 @@ class Pairs:
     def _of(self, interpolation, tessellation):
         key = mi.variant(), interpolation, tessellation
         if key not in self._known:
-            self._known[key] = halves.pair(
-                self._source,
-                self._options.convention,
-                self._options.resolution,
-                interpolation,
-                tessellation,
-                prune=not self._options.everything,
-                sensor=self._options.sensor,
-                heuristic=self._options.heuristic,
-            )
+            changed = {"interpolation": interpolation, "tessellation": tessellation}
+            self._known[key] = replace(self._options, **changed).pair(self._source)
         return self._known[key]

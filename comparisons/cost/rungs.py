@@ -119,11 +119,6 @@ def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:
     ----------
     depths
         Depths of ``path`` that are rungs.
-
-    Raises
-    ------
-    InputError
-        When an entry point cannot be loaded, or its rung not declared.
     """
     *cheaper, full = _own(depths)
     return (*cheaper, *RUNGS.others(), full)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from comparisons.departure.metric import Distances, Metric, Pixelwise, checked_pair
 from comparisons.departure.metrics import log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
-from comparisons.records import Amount, Positive, Record, Share
+from comparisons.records import Amount, Count, Positive, Record, Share
 
 #: Pixels measured at a time: temporaries stay small whatever the image's size.
 _BLOCK_PIXELS = 2**20
@@ -222,3 +222,36 @@ def least_squares_factor(test: Array, reference: Array) -> float:
     """``Σ test·reference / Σ test²``, 1 where that is not positive."""
     energy, overlap = float(np.vdot(test, test)), float(np.vdot(test, reference))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
+
+
+#: The bins' range in decades, log10 of the metric's unit, and the bins in each decade.
+DECADES, BINS_A_DECADE = (-2, 3), 12
+
+
+class Histogram(Record):
+    """Counts of pixels in bins of equal ratio.
+
+    Bin i of n holds ``low·(high/low)^(i/n) <= value < low·…^((i+1)/n)``.
+    """
+
+    low: Positive
+    high: Positive
+    counts: tuple[Count, ...]
+    below: Annotated[Count, Meta(description="Pixels under `low`, zeros included.")]
+    above: Annotated[Count, Meta(description="Pixels at `high` or more.")]
+
+
+def histogram(values: ArrayLike) -> Histogram:
+    """The histogram of values ≥ 0, of any shape."""
+    values = np.asarray(values, np.float64).ravel()
+    first, last = DECADES
+    edges = np.logspace(first, last, (last - first) * BINS_A_DECADE + 1)
+    place = np.searchsorted(edges, values, side="right")
+    counts = np.bincount(place, minlength=len(edges) + 1)
+    return Histogram(
+        low=float(edges[0]),
+        high=float(edges[-1]),
+        counts=tuple(int(count) for count in counts[1:-1]),
+        below=int(counts[0]),
+        above=int(counts[-1]),
+    )

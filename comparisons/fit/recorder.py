@@ -49,13 +49,7 @@ class Recorder:
         self._samples_a_pixel = 0
 
     def render(self, seed):
-        """Keep the samples of the pass with this seed.
-
-        Raises
-        ------
-        NonFiniteError
-            For an emission or a background that is NaN or infinite.
-        """
+        """Keep the samples of the pass with this seed."""
         image = self._renderer.render(seed)
         self._fixed.add(image)
         seen, self._eye.seen = self._eye.seen, None

@@ -41,15 +41,7 @@ class Rendered:
 
 
 def render(ready, options, progress):
-    """Render the passes of both halves in turn, and keep the heuristic half's surface.
-
-    Raises
-    ------
-    InputError
-        When the heuristic half is not in RGB.
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
-    """
+    """Render the passes of both halves in turn, and keep the heuristic half's surface."""
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"

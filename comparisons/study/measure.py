@@ -13,11 +13,6 @@ def measure(heuristic, reference, counted, noise=None):
 
     heuristic, reference, noise
         Linear images (H, W, 3); the noise is that of their difference.
-
-    Raises
-    ------
-    NonFiniteError
-        For a NaN or an infinity.
     """
     summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
@@ -48,11 +43,6 @@ def measure_each(heuristic, reference):
     """Return the columns of single values (N,) of grey, one array each.
 
     There is no shape to a single value; what a best exposure would leave is nothing.
-
-    Raises
-    ------
-    NonFiniteError
-        For a NaN or an infinity.
     """
     test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
     pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}

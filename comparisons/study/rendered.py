@@ -29,13 +29,6 @@ def row(part, point):
 
     Under the names of :data:`comparisons.study.columns.STEPS` are the root mean square changes of
     the image as each of them is simulated too; ``dominant`` names the largest.
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or paired.
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
     """
     pair = halves.pair(source(part, point), part.convention, part.resolution)
     kept = _kept(part.scene)

@@ -69,11 +69,6 @@ def passes(
         What the passes are for.
     progress, stage
         Told before each pass, and once more when all are done or the caller has seen enough.
-
-    Raises
-    ------
-    NonFiniteError
-        When an image holds a NaN or an infinity.
     """
     done = first
     try:

@@ -80,13 +80,7 @@ def _open_merged(graph):
 
 
 def film_size(graph, sensor=0):
-    """Return the width and height that the film of a sensor is given.
-
-    Raises
-    ------
-    InputError
-        When there is no such sensor.
-    """
+    """Return the width and height that the film of a sensor is given."""
     films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
     return _size(graph.props(films[0][1]) if films else {})
 

@@ -69,11 +69,6 @@ class Source:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
 
         These are the scene's own file, what it includes, and every file that an element names.
-
-        Raises
-        ------
-        InputError
-            See :meth:`parse`.
         """
         graph = self.parse()
         found = set()

@@ -129,13 +129,16 @@ def check_installation():
 
 def expand(names: Iterable[str]) -> list[str]:
     """Return the names of scenes, with the scenes in it in place of each folder."""
+    return [scene for name in names for scene in _within(Path(name)) or [name]]
+
+
+def _within(folder: Path) -> list[str]:
+    """Return the scenes in a folder; none for what is not one."""
+    if not folder.is_dir():
+        return []
     from reference.scene.script import scenes_in
 
-    return [
-        scene
-        for name in names
-        for scene in (map(str, scenes_in(Path(name))) if Path(name).is_dir() else [name])
-    ]
+    return list(map(str, scenes_in(folder)))
 
 
 def request(words: Mapping[str, Any]) -> Request:

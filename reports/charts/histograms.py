@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from comparisons.comparison import ComparisonRecord
-from comparisons.departure.histogram import Histogram
 from comparisons.departure.metrics import METRICS
-from comparisons.departure.statistics import Summary
+from comparisons.departure.statistics import Histogram, Summary
 from reports.charts import vega
 from reports.terminal.printing import number, percent
 

@@ -12,9 +12,9 @@ from playwright.sync_api import sync_playwright
 
 from comparisons.cost.cost import Study
 from comparisons.departure import regions
-from comparisons.departure.histogram import histogram
 from comparisons.departure.metrics import drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
+from comparisons.departure.statistics import histogram
 from comparisons.record import Comparison
 from comparisons.records import Pixels, plain
 from reports.run import output
