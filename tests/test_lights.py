@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import heuristic
-from heuristic import lighting
+from heuristic import shading
 from tests import checks, oracle
 
 COLOUR = {"type": "rgb", "value": (1.0, 0.8, 0.6)}
@@ -104,7 +104,7 @@ def many(count, seed=1):
     return made
 
 
-@pytest.mark.parametrize("count", [lighting.BLOCK, lighting.BLOCK + 1, 150])
+@pytest.mark.parametrize("count", [shading.BLOCK, shading.BLOCK + 1, 150])
 def test_any_number_of_lights_adds_up(count):
     points, lights = checks.random_points(4000), many(count)
     arrays = (points.position, points.normal, points.view)
@@ -138,7 +138,7 @@ def test_blocks_of_lights_share_their_kernels(kernel_history):
         history = kernel_history(lambda: heuristic.shade(*arrays, material, lights))
         return {kernel["hash"] for kernel in history}
 
-    few, more = kernels(4 * lighting.BLOCK), kernels(16 * lighting.BLOCK)
+    few, more = kernels(4 * shading.BLOCK), kernels(16 * shading.BLOCK)
     assert few == more
     assert len(few) <= 4, "the first block, the second, those after them, and the total"
 

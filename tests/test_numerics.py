@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import heuristic
-from heuristic import lighting, lobes, numerics, terms, vectors
+from heuristic import lobes, numerics, shading, terms, vectors
 from tests import checks, oracle
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
@@ -108,7 +108,7 @@ def test_a_sum_beyond_the_range_is_infinite_and_no_nan():
     assert numerics.summed(total, lost)[0] == np.inf
 
 
-@pytest.mark.parametrize("count", [3 * lighting.BLOCK + 5, 3000])
+@pytest.mark.parametrize("count", [3 * shading.BLOCK + 5, 3000])
 @pytest.mark.parametrize("spread", [0, 4, 30])
 def test_many_lights_of_mixed_magnitude_add_up_to_a_millionth(count, spread):
     """Terms of up to 60 decades, in blocks as they are summed."""

@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from heuristic import Material, PointLight, lighting, shade  # isort: skip  it finds LLVM first
+from heuristic import Material, PointLight, shading, shade  # isort: skip  it finds LLVM first
 
 import drjit as dr
 from drjit.llvm import Array3f
@@ -90,7 +90,7 @@ def _compilation(points, lights):
 
 
 def _print(rows):
-    table = Table(title=f"{POINTS:,} points; blocks of {lighting.BLOCK} lights")
+    table = Table(title=f"{POINTS:,} points; blocks of {shading.BLOCK} lights")
     for heading in ("lights", "median", "a light and point", "unrolled", "compiling", "kernels"):
         table.add_column(heading, justify="right")
     for row in rows:
