@@ -1,9 +1,13 @@
 """The cost of accuracy over all scenes: what each method takes, and the error that it leaves."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from comparisons.cost.cost_record import Cost, Measured, Price
+if TYPE_CHECKING:
+    from comparisons.cost.cost_record import Cost, Measured, Price
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded
-from reports.run.cost_files import CostView
+
+if TYPE_CHECKING:  # few scenes have a study of cost
+    from reports.run.cost_files import CostView
 
 
 class SceneView(Record):
