@@ -13,7 +13,7 @@ from enum import Enum
 
 import drjit as dr
 
-from heuristic import normals, vectors
+from heuristic import vectors
 
 
 class Interpolation(Enum):
@@ -64,6 +64,8 @@ def barycentric_coordinates(point, p0, p1, p2):
     Of a point outside the triangle's plane they are those of its foot. A triangle without area has
     none; the weights are then ``1, 0, 0``.
     """
+    from heuristic import normals  # which flat and Gouraud shading alone need
+
     # Over the largest component: the fourth power of a length would leave the type's range.
     (edge_1, _, back), largest = normals.scaled_edges(p0, p1, p2)
     edge_2 = -back

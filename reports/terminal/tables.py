@@ -6,17 +6,19 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
 from comparisons.comparison import ComparisonRecord
-from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import METRICS
 from comparisons.records import plain
 from reports.files import ownership
 from reports.terminal.printing import number, percent
+
+if TYPE_CHECKING:
+    from comparisons.cost.cost_record import Cost
 
 #: Characters to a line of a printed table; longer cells are folded.
 WIDTH = 120
