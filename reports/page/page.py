@@ -33,7 +33,7 @@ from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import cost_overview, overview
 from reports.page.legends import legends
-from reports.page.scene_view import SceneView
+from reports.page.scene_view import CostView, SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
 
@@ -41,7 +41,6 @@ if TYPE_CHECKING:  # for what few pages show
     from comparisons.verification import Verification
     from heuristic.equations import Entry
     from reports.page.hard_cases import HardCasesView
-    from reports.run.cost_files import CostView
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"

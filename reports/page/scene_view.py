@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded
 
-if TYPE_CHECKING:  # few scenes have a study of cost
-    from reports.run.cost_files import CostView
+
+class EffectMap(Record):
+    """The dominating effect of each pixel: a letter per pixel, row after row."""
+
+    width: int
+    height: int
+    names: tuple[str, ...]
+    colours: tuple[str, ...]
+    map: str
+
+
+class CostView(Record):
+    """What a page shows of a study; ``images`` are PNG by file name without its ending."""
+
+    record: Cost
+    images: dict[str, bytes]
+    noise: str
+    effects: EffectMap
+
+    def picture(self, kind: str, name: str) -> bytes:
+        """Return the picture of a rung, a part or an effect."""
+        return self.images[picture_name(kind, name)]
 
 
 class SceneView(Record):
@@ -39,3 +58,12 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
+
+
+def picture_name(kind, name):
+    """Return the name of a picture's file, without its ending, such as cost-part-transport."""
+    return f"cost-{kind}-{_plain(name)}"
+
+
+def _plain(name):
+    return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")

@@ -1,14 +1,12 @@
 """The files of a study of cost, and what a page shows of it."""
 
 from functools import partial
-from typing import Any
 
 from comparisons import records
-from comparisons.cost.cost_record import Cost
 from comparisons.effects.dominance import dominating
-from comparisons.records import Record
 from reports.charts import theme, vega
 from reports.files import images, ownership
+from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.terminal.cost_tables import noise
 
 DIGITS = "0123456789"
@@ -17,29 +15,6 @@ DIGITS = "0123456789"
 NO_EFFECT, UNCOUNTED = ".", "-"
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
-
-
-class EffectMap(Record):
-    """The dominating effect of each pixel: a letter per pixel, row after row."""
-
-    width: int
-    height: int
-    names: tuple[str, ...]
-    colours: tuple[str, ...]
-    map: str
-
-
-class CostView(Record):
-    """What a page shows of a study; ``images`` are PNG by file name without its ending."""
-
-    record: Cost
-    images: dict[str, bytes]
-    noise: str
-    effects: EffectMap
-
-    def picture(self, kind: str, name: str) -> Any:
-        """Return the picture of a rung, a part or an effect."""
-        return self.images[picture_name(kind, name)]
 
 
 def documents(study):
@@ -117,12 +92,3 @@ def _effect_map(study):
         colours=tuple(theme.EFFECT_COLOURS[name] for name in study.effects),
         map="".join(letters[int(place)] for place in places.ravel()),
     )
-
-
-def picture_name(kind, name):
-    """Return the name of a picture's file, without its ending, such as cost-part-transport."""
-    return f"cost-{kind}-{_plain(name)}"
-
-
-def _plain(name):
-    return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")
