@@ -22,17 +22,18 @@ from reports.terminal.printing import number, percent
 WIDTH = 120
 
 
-def ruled(*headings: str, right: int | None = None) -> Table:
-    """Return an empty table with these headings, without lines; set to the right from a column."""
+def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator[str]:
+    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen.
+
+    The first row has the headings. Cells are set to the right from column ``right`` on.
+    """
+    headings, *others = rows
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for place, heading in enumerate(headings):
         justify = "left" if right is None or place < right else "right"
         table.add_column(heading, overflow="fold", justify=justify)
-    return table
-
-
-def printed(table: Table) -> Iterator[str]:
-    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen."""
+    for row in others:
+        table.add_row(*row)
     console = Console(width=WIDTH, color_system=None)
     with console.capture() as capture:
         console.print(table)
