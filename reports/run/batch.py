@@ -48,10 +48,9 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
         raise
     if with_hard_cases:
         from comparisons.hard import collection
-        from reports.page import hard_cases
 
         with run.timing("hard cases"):
-            shown["hard_cases"] = hard_cases.view(collection.collect())
+            shown["hard_cases"] = collection.collect()
     _write(run, folder, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)

@@ -1,7 +1,6 @@
 """The files of a study of cost, and what a page shows of it."""
 
 from functools import partial
-from typing import Any
 
 from comparisons import records
 from comparisons.cost.cost_record import Cost
@@ -37,7 +36,7 @@ class CostView(Record):
     noise: str
     effects: EffectMap
 
-    def picture(self, kind: str, name: str) -> Any:
+    def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""
         return self.images[picture_name(kind, name)]
 
