@@ -17,7 +17,7 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -27,8 +27,6 @@ from msgspec import structs
 from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import luminance
-from comparisons.hard.collection import HardCases
-from comparisons.hard.furnace import ANGLES
 from comparisons.records import plain
 from comparisons.verification import Verification
 from heuristic.equations import Entry
@@ -40,6 +38,9 @@ from reports.page.legends import legends
 from reports.page.scene_view import SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
+
+if TYPE_CHECKING:
+    from comparisons.hard.collection import HardCases
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
@@ -222,6 +223,5 @@ def _environment() -> Environment:
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
         hard_groups=GROUPS,
-        furnace_angles=ANGLES,
     )
     return environment
