@@ -34,7 +34,7 @@ from reports.terminal import verbosity
     type=click.FloatRange(0, 1, min_open=True, max_open=True),
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@jobs.json_option
 @click.option(
     "--junit",
     type=click.Path(path_type=Path, dir_okay=False),

@@ -82,15 +82,16 @@ def _compare(run, places, folder, wanted, views, failures):
         )
         for task, outcome in pool.each(tasks):
             try:
-                done = outcome.result()
+                view, spent = outcome.result()
             except FotismosError as error:
                 if alone:
                     raise
                 failures[task.name] = error
                 continue
-            views[task.name] = done.view
-            run.did(done)
-            verbosity.remark(progress.details(done.view.record))
+            views[task.name] = view
+            for stage, seconds in spent.seconds.items():
+                run.add(stage, seconds)
+            verbosity.remark(progress.details(view.record))
 
 
 def _write(run, folder, views, failures, with_figures, shown):
@@ -100,13 +101,7 @@ def _write(run, folder, views, failures, with_figures, shown):
 
     run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]
     run.begin_page()
-    output.write_page(
-        folder,
-        list(views.values()),
-        failures=run.failures,
-        run=run,
-        **shown,
-    )
+    output.write_page(folder, list(views.values()), failures=run.failures, run=run, **shown)
     output.write_run(folder, run.record())
     if views:
         records = [view.record for view in views.values()]
