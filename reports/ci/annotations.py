@@ -73,9 +73,9 @@ def annotate(results, folder, level, environment=None):
 def table(results, level):
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    rows = ([_cell(cell) for cell in _cells(result)] for result in results)
+    rows = [headings, *([_cell(cell) for cell in _cells(result)] for result in results)]
     head = ["### fotismos check", "", lines.verdict(results, level), ""]
-    return "\n".join([*head, *markdown(headings, rows, right=3)]) + "\n\n"
+    return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 
 
 def _cells(result):

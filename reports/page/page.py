@@ -51,6 +51,9 @@ PIXELATED_BELOW = 400
 #: A region that is opened from its link gets about so many screen pixels.
 REGION_SIZE = 420
 
+#: How a value is printed, by the name of its form.
+FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent": percent}
+
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
@@ -204,10 +207,7 @@ def _environment() -> Environment:
         undefined=StrictUndefined,
     )
     environment.filters.update(
-        number=number,
-        parameter=parameter,
-        seconds=seconds,
-        percent=percent,
+        FORMS,
         code_spans=code_spans,
         zoom_to=_zoom_to,
         plain=plain,
@@ -216,6 +216,7 @@ def _environment() -> Environment:
     )
     environment.tests.update(about_noise=about_noise, finite=math.isfinite)
     environment.globals.update(
+        forms=FORMS,
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),

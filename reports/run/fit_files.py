@@ -81,29 +81,30 @@ def markdown(records, scenes):
         " give (*floor*). *Parameter error* is before less after, *model error* is after."
     )
     yield ""
-    labels = [metric.label for metric in drawn().values()]
-    heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
-    heading += ["parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"]
-    yield from tables.markdown(heading, map(_scene_cells, records), right=2)
+    yield from tables.markdown(_scene_rows(records), right=2)
     yield ""
     yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
     yield ""
-    heading = ("scene", "form", "k_a", "k_d", "k_s", "n", "reference")
-    rows = (
-        [record.scene, fit.form, *_material_cells(material)]
-        for record in records
-        for fit in record.fits
-        if not fit.normalised
-        for material in fit.materials
-    )
-    yield from tables.markdown(heading, rows, right=len(heading))
+    yield from tables.markdown(_material_rows(records), right=7)
 
 
-def _scene_cells(record):
-    departures = [record.nearest.departure[name] for name in drawn()]
-    cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
-    parts = [_three(departures[0].parameter_error), _three(departures[0].model_error)]
-    return [record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"]
+def _scene_rows(records):
+    labels = (f"{metric.label}: before → after (floor)" for metric in drawn().values())
+    errors = ("parameter error (ΔE2000)", "model error (ΔE2000)")
+    yield "scene", "best form", *labels, *errors, "seconds"
+    for record in records:
+        departures = [record.nearest.departure[name] for name in drawn()]
+        cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
+        parts = _three(departures[0].parameter_error), _three(departures[0].model_error)
+        yield record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"
+
+
+def _material_rows(records):
+    yield "scene", "form", "k_a", "k_d", "k_s", "n", "reference"
+    for record in records:
+        for fit in record.fits:
+            for material in () if fit.normalised else fit.materials:
+                yield record.scene, fit.form, *_material_cells(material)
 
 
 def _material_cells(material):
