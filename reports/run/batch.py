@@ -29,7 +29,7 @@ def start():
     return Run(shlex.join(["fotismos", *sys.argv[1:]]))
 
 
-def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
+def finish(run, names, folder, wanted: Wanted, **shown):
     """Compare the scenes of a run, and write the results of each, then page and tables of all.
 
     ``shown`` is what else the page shows.
@@ -46,11 +46,6 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
         if views or failures:
             _write(run, folder, views, failures, wanted.figures, shown)
         raise
-    if with_hard_cases:
-        from comparisons.hard import collection
-
-        with run.timing("hard cases"):
-            shown["hard_cases"] = collection.collect()
     _write(run, folder, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
