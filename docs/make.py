@@ -82,7 +82,7 @@ def equation_table():
     for (home, meaning), entries in groupby(equations.index(), lambda e: (e.home, e.meaning)):
         numbers = [entry.number for entry in entries]
         rows.append((_span(numbers), _link(home), re.sub(r"``(.*?)``", r"`\1`", meaning)))
-    return tables.markdown(("Equation", "Home", "What it says"), rows, right=False)
+    return tables.markdown([("Equation", "Home", "What it says"), *rows], right=0)
 
 
 def _span(numbers):

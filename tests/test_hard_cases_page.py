@@ -33,7 +33,7 @@ def test_a_page_without_hard_cases_has_no_such_section():
 
 
 def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
-    text = page.render([], hard_cases=section.view(record))
+    text = page.render([], hard_cases=record)
     assert 'id="hard-cases"' in text
     for outcome in record.outcomes:
         assert outcome.case.hard in text
@@ -49,7 +49,7 @@ def test_all_groups_of_the_catalogue_are_shown():
 
 
 def test_the_page_is_written_with_its_hard_cases(record, tmp_path):
-    output.write_page(tmp_path, [], hard_cases=section.view(record))
+    output.write_page(tmp_path, [], hard_cases=record)
     assert 'id="hard-cases"' in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 

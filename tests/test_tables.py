@@ -73,9 +73,7 @@ def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
 @pytest.mark.parametrize("colour", ["", "1"])
 def test_printed_tables_hold_no_codes_and_fold_long_cells(monkeypatch, colour):
     monkeypatch.setenv("FORCE_COLOR", colour)
-    table = tables.ruled("scene", "rule")
-    table.add_row("x", "word " * 60)
-    lines = list(tables.printed(table))
+    lines = list(tables.printed([("scene", "rule"), ("x", "word " * 60)]))
     assert len(lines) > 2
     assert max(map(len, lines)) <= tables.WIDTH
     assert "\x1b" not in json.dumps(lines)

@@ -36,13 +36,15 @@ class Picture:
 class HardCases:
     """All cases with their errors, what is laid down, pictures of some, and the models' energy.
 
-    ``conventions`` are pairs of a :class:`Convention` and whether it holds.
+    ``conventions`` are pairs of a :class:`Convention` and whether it holds; ``furnaces`` have the
+    models' albedo under light from each of ``angles``, in degrees, and their asymmetry.
     """
 
     outcomes: tuple[Outcome, ...]
     conventions: tuple[tuple[Convention, bool], ...]
     pictures: tuple[Picture, ...]
     furnaces: tuple[Furnace, ...]
+    angles: tuple[float, ...] = furnace.ANGLES
 
     def of_group(self, name):
         """Return the outcomes of the cases of a group."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from heuristic.backend import VARIANTS
 
@@ -14,19 +15,36 @@ if TYPE_CHECKING:
     from comparisons.case import Request
 
 
-class Resolution(click.ParamType):
-    """``WIDTHxHEIGHT``, as two positive integers."""
+def _resolution(text):
+    """Parse ``WIDTHxHEIGHT``, two positive integers."""
+    width, separator, height = text.lower().partition("x")
+    if not (separator and width.isdecimal() and height.isdecimal()):
+        raise click.BadParameter(f"{text!r} is no resolution; write it like 512x512.")
+    return int(width), int(height)
 
-    name = "WxH"
 
-    def convert(self, value, param, ctx):
-        """Parse the text, or fail with what is allowed."""
-        if isinstance(value, tuple):
-            return value
-        width, separator, height = value.lower().partition("x")
-        if not (separator and width.isdecimal() and height.isdecimal()):
-            self.fail(f"{value!r} is no resolution; write it like 512x512.", param, ctx)
-        return int(width), int(height)
+def _definition(text):
+    """Parse ``NAME=VALUE`` for a placeholder ``$NAME`` of a scene file."""
+    name, separator, value = text.partition("=")
+    if not (separator and name):
+        raise click.BadParameter(f"{text!r} is no parameter; write it like name=value.")
+    return name, value
+
+
+def complete_scene(context, parameter, beginning):
+    """Complete a SCENE: the built-in ones that begin so, or else files."""
+    from comparisons.gallery.builtin import SCENES
+
+    named = [name for name in SCENES if name.startswith(beginning)]
+    found = [CompletionItem(name, help=SCENES[name].title) for name in named]
+    return found or [CompletionItem(beginning, type="file")]
+
+
+scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
+scenes_argument = click.argument(
+    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
 def output_option(default):
@@ -53,7 +71,8 @@ fresh_option = click.option(
 
 def rendering_options(command):
     """Add the options that all commands which render have in common."""
-    options = (
+    return _with(
+        command,
         click.option("--variant", type=click.Choice(VARIANTS),
                      help="Mitsuba variant. [default: llvm_ad_rgb, or llvm_ad_spectral for a scene"
                      " with tabulated spectra]"),
@@ -64,7 +83,7 @@ def rendering_options(command):
                      help="Seed of the run; each pass hashes its own from it."),
         click.option("--spp", type=click.IntRange(min=2),
                      help="Samples a pixel, over all passes. [default: the plan's]"),
-        click.option("--resolution", type=Resolution(),
+        click.option("--resolution", type=_resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
         click.option("--heuristic", metavar="NAME",
                      help="Which heuristic shades: phong, blinn, or one that a package declares."
@@ -81,34 +100,20 @@ def rendering_options(command):
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
     )  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-class Parameter(click.ParamType):
-    """``NAME=VALUE`` for a placeholder ``$NAME`` of a scene file."""
-
-    name = "NAME=VALUE"
-
-    def convert(self, value, param, ctx):
-        """Split the text, or fail with what is allowed."""
-        if isinstance(value, tuple):
-            return value
-        key, separator, text = value.partition("=")
-        if not (separator and key):
-            self.fail(f"{value!r} is no parameter; write it like name=value.", param, ctx)
-        return key, text
 
 
 def scene_options(command):
     """Add the options that say what is taken from a scene file."""
-    options = (
-        click.option("-D", "define", type=Parameter(), multiple=True,
+    return _with(
+        command,
+        click.option("-D", "define", type=_definition, multiple=True, metavar="NAME=VALUE",
                      help="Value for a placeholder $NAME of a scene file; may be repeated."),
         click.option("--sensor", type=click.IntRange(min=0), metavar="N",
                      help="Which sensor of the scene, from 0. [default: the first]"),
     )  # fmt: skip
+
+
+def _with(command, *options):
     for option in reversed(options):
         command = option(command)
     return command

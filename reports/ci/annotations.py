@@ -24,6 +24,13 @@ from reports.ci import junit, lines
 from reports.files import ownership
 from reports.terminal.tables import markdown
 
+GITHUB = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+GITHUB_PROPERTY = GITHUB | str.maketrans({":": "%3A", ",": "%2C"})
+AZURE = str.maketrans({"%": "%AZP25", "\r": "%0D", "\n": "%0A"})
+AZURE_PROPERTY = str.maketrans({"%": "%AZP25", ";": "%3B", "]": "%5D"})
+TEAMCITY = str.maketrans({c: f"|{c}" for c in "'|[]"} | {"\n": "|n", "\r": "|r"})
+"""What each service wants in place of characters that its lines are made of."""
+
 
 def annotate(results, folder, level, environment=None):
     """Write the files that the CI service reads, and return the lines that it looks for.
@@ -66,9 +73,9 @@ def annotate(results, folder, level, environment=None):
 def table(results, level):
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    rows = ([_cell(cell) for cell in _cells(result)] for result in results)
+    rows = [headings, *([_cell(cell) for cell in _cells(result)] for result in results)]
     head = ["### fotismos check", "", lines.verdict(results, level), ""]
-    return "\n".join([*head, *markdown(headings, rows, right=3)]) + "\n\n"
+    return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 
 
 def _cells(result):
@@ -87,30 +94,19 @@ def _cell(text):
 
 def _github(result, variables):
     place = os.path.relpath(result.path, variables.get("GITHUB_WORKSPACE") or ".")
-    escaped = {"file": Path(place).as_posix(), "title": f"fotismos check: {result.name}"}
-    properties = ",".join(f"{key}={_github_property(text)}" for key, text in escaped.items())
-    return f"::error {properties}::{_github_text(junit.headline(result))}"
-
-
-def _github_text(text):
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-
-
-def _github_property(text):
-    return _github_text(text).replace(":", "%3A").replace(",", "%2C")
+    file = Path(place).as_posix().translate(GITHUB_PROPERTY)
+    title = f"fotismos check: {result.name}".translate(GITHUB_PROPERTY)
+    return f"::error file={file},title={title}::{junit.headline(result).translate(GITHUB)}"
 
 
 def _azure(result):
-    place = os.path.relpath(result.path).replace("%", "%AZP25").replace(";", "%3B")
-    place = place.replace("]", "%5D")
-    text = junit.headline(result).replace("%", "%AZP25")
-    text = text.replace("\r", "%0D").replace("\n", "%0A")
+    place = os.path.relpath(result.path).translate(AZURE_PROPERTY)
+    text = junit.headline(result).translate(AZURE)
     return f"##vso[task.logissue type=error;sourcepath={place}]{result.name}: {text}"
 
 
 def _teamcity(result):
-    text = f"fotismos check: {result.name}: {junit.headline(result)}"
-    text = re.sub(r"(['|\[\]])", r"|\1", text).replace("\n", "|n").replace("\r", "|r")
+    text = f"fotismos check: {result.name}: {junit.headline(result)}".translate(TEAMCITY)
     text = "".join(c if ord(c) < 128 else f"|0x{ord(c):04X}" for c in text)
     return f"##teamcity[buildProblem description='{text}']"
 

@@ -1,6 +1,6 @@
 """Checking scenes against baselines, and writing baselines and the pictures of what failed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -60,11 +60,6 @@ class Result:
         return self.path.stem
 
 
-def failed_to(path, error, scene=""):
-    """Return the result of a baseline that could not be checked."""
-    return Result(path, scene, "error", message=str(error), exit_code=error.exit_code)
-
-
 def examine(file, case, level=LEVEL, folder=None, progress=None):
     """Check a scene against its baseline, and write pictures of what failed.
 
@@ -89,18 +84,18 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
     """
     begin = perf_counter()
     found = _checked(file, case, level, progress)
+    if folder is not None:
+        ownership.clear(folder, FILES)
     result = Result(
         file.path,
         file.baseline.scene,
         "passed" if found.passed else "failed",
+        seconds=perf_counter() - begin,
         check=found,
         exit_code=0 if found.passed else 1,
         folder=None if found.passed else folder,
         versions=_changed_versions(file.baseline),
     )
-    if folder is not None:
-        ownership.clear(folder, FILES)
-    result = replace(result, seconds=perf_counter() - begin)
     if result.folder is not None:
         _write_failure(file, result)
     return result
@@ -110,18 +105,16 @@ def update(file, case, level=LEVEL, images=False, progress=None):
     """Measure again, and write the baseline if anything moved; else its file stays as it is."""
     begin = perf_counter()
     found = _checked(file, case, level, progress)
-    status = "unchanged" if found.passed else "updated"
-    old = file.baseline
-    pictures = check_pictures.reduced(found.pictures) if images or old.images else None
+    old, new, message = file.baseline, None, ""
     if not found.passed:
         new = baseline.of(old.scene, old.options, found.after)
-        baselines.write(file.path, new, pictures)
-    images_missing = found.passed and images and not old.images
-    if images_missing:
-        baselines.write(file.path, old, pictures)
-    message = "the pictures were added" if images_missing else ""
-    seconds = perf_counter() - begin
-    return Result(file.path, file.baseline.scene, status, seconds, found, message)
+    elif images and not old.images:
+        new, message = old, "the pictures were added"
+    if new is not None:
+        kept = check_pictures.reduced(found.pictures) if images or old.images else None
+        baselines.write(file.path, new, kept)
+    status = "unchanged" if found.passed else "updated"
+    return Result(file.path, old.scene, status, perf_counter() - begin, found, message)
 
 
 def create(path, scene, case, images=False, progress=None):
@@ -150,12 +143,12 @@ def create(path, scene, case, images=False, progress=None):
     return Result(path, scene, status, perf_counter() - begin)
 
 
-def guarded(path, run, scene=""):
-    """Run one of the above; an error that fotismos raises on purpose becomes its result."""
+def guarded(run, path, *more):
+    """Call ``run(path, *more)``; an error that fotismos raises on purpose becomes its result."""
     try:
-        return run()
+        return run(path, *more)
     except FotismosError as error:
-        return failed_to(path, error, scene)
+        return Result(path, "", "error", message=str(error), exit_code=error.exit_code)
 
 
 def _checked(file: BaselineFile, case, level, progress):

@@ -1,6 +1,6 @@
 """The results of checks as lines for a terminal."""
 
-from reports.terminal.tables import printed, ruled
+from reports.terminal.tables import printed
 
 SHOWN = 12
 """Quantities of a scene that are listed; all are in the record."""
@@ -11,7 +11,7 @@ def lines(results, level):
     for result in results:
         yield from _details(result)
     if len(results) > 1:
-        yield from printed(_summary(results))
+        yield from printed(_summary(results), right=2)
         yield ""
     yield verdict(results, level)
 
@@ -33,16 +33,19 @@ def verdict(results, level):
 
 def moved_lines(check):
     """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
-    table = ruled("what moved", "baseline", "now", "change", "standard errors", "p", right=2)
+    yield from printed(_moves(check), right=2)
+    more = len(check.moved) - SHOWN
+    if more > 0:
+        yield f"and {more} more; {len(check.moves)} quantities were tested"
+
+
+def _moves(check):
+    yield "what moved", "baseline", "now", "change", "standard errors", "p"
     for move in check.moved[:SHOWN]:
         old, new = move.before, move.after
         change = f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}"
         name, before, now, *certainty = moved_cells(move)
-        table.add_row(name, before, now, change, *certainty)
-    yield from printed(table)
-    more = len(check.moved) - SHOWN
-    if more > 0:
-        yield f"and {more} more; {len(check.moves)} quantities were tested"
+        yield name, before, now, change, *certainty
 
 
 def moved_cells(move):
@@ -81,17 +84,13 @@ def _details(result):
 
 
 def _summary(results):
-    headings = ("baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time")
-    table = ruled(*headings, right=2)
+    yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time"
     for result in results:
-        row = [result.name, result.status]
+        cells = [""] * 5
         if result.check is not None:
             check = result.check
             old, new = (m.metrics["dE2000"].value for m in (check.before, check.after))
             least = min(move.p_corrected for move in check.moves)
-            row += [str(len(check.moved)), str(len(check.moves)), f"{old:.3f}", f"{new:.3f}"]
-            row += [f"{least:.2g}"]
-        else:
-            row += [""] * 5
-        table.add_row(*row, f"{result.seconds:.1f} s")
-    return table
+            moved = f"{len(check.moved)}", f"{len(check.moves)}"
+            cells = [*moved, f"{old:.3f}", f"{new:.3f}", f"{least:.2g}"]
+        yield result.name, result.status, *cells, f"{result.seconds:.1f} s"

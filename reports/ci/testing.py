@@ -108,7 +108,7 @@ class Fotismos:
         -------
         Departure
         """
-        case = check.made_small(self._open(self._found(scene), options, "scene"))
+        case = check.made_small(_open(self._found(scene), self._given({}) | options, "scene"))
         found = check.measure_scene(case.source, case.options).measurement
         if metric not in found.metrics:
             raise unknown("metric", metric, found.metrics)
@@ -143,18 +143,21 @@ class Fotismos:
             With the table of what moved, or for a baseline that is missing.
         """
         scene = self._found(scene)
-        given = options | ({"variant": self.variant} if self.variant else {})
+        given = self._given(options)
         path = self._path(scene, name)
         if not path.exists():
             if not self.update:
                 raise AssertionError(
                     f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
                 )
-            case = self._open(scene, given, name)
-            checks.create(path, self._scene_name(scene, path, name), case)
+            case = _open(scene, given, name)
+            named = case.word if _in_python(scene) else baselines.scene_for(str(scene), path)
+            checks.create(path, named, case)
             return True
         file = baselines.read(path)
-        case = self._open(scene, dict(file.baseline.options) | given, name, path)
+        if not _in_python(scene):
+            scene = baselines.scene_from(file.baseline.scene, path)
+        case = _open(scene, dict(file.baseline.options) | given, name)
         others = _other_options(file.baseline.options, given)
         if others:
             if not self.update:
@@ -182,19 +185,13 @@ class Fotismos:
         suffix = f"-{self.variant}" if self.variant else ""
         return self.folder / f"{name or _name(scene)}{suffix}.json"
 
-    def _scene_name(self, scene, path, name):
-        return (
-            (name or _name(scene)) if _in_python(scene) else baselines.scene_for(str(scene), path)
-        )
+    def _given(self, options):
+        return options | ({"variant": self.variant} if self.variant else {})
 
-    def _open(self, scene, options, name=None, baseline=None):
-        """Open a scene with some options; one that a baseline names, from the baseline's folder."""
-        request = Request.of(({"variant": self.variant} if self.variant else {}) | options)
-        if _in_python(scene):
-            return open_case(scene, request, name or _name(scene))
-        if baseline is not None:
-            scene = baselines.scene_from(baselines.read(baseline).baseline.scene, baseline)
-        return open_case(scene, request)
+
+def _open(scene, options, name=None):
+    own = (name or _name(scene)) if _in_python(scene) else None
+    return open_case(scene, Request.of(options), own)
 
 
 def _in_python(scene):

@@ -34,7 +34,7 @@ from reports.terminal import verbosity
     type=click.FloatRange(0, 1, min_open=True, max_open=True),
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@jobs.json_option
 @click.option(
     "--junit",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -68,14 +68,17 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     _require_consistent(update, scenes, images, given)
     jobs.check_installation()
     from comparisons.records import to_json
-    from reports.ci import annotations, check_record, lines
+    from reports.ci import annotations, check_record, lines, suite
     from reports.ci.junit import document
+    from reports.run.output import prepare
 
     if update:
-        results = _update(baseline, scenes, images, significance, given)
+        results = suite.update(baseline, scenes, images, significance, given)
     else:
-        results = _examine(baseline, significance, given.get("seed"), output)
-    _report_errors(results)
+        results = suite.examine(baseline, significance, given.get("seed"), prepare(output))
+    for result in results:
+        if result.status == "error":
+            click.echo(f"fotismos: error: {result.message}", err=True)
     notes = annotations.annotate(results, output, significance)
     if junit is not None:
         _write(junit, document(results))
@@ -100,111 +103,6 @@ def _require_consistent(update, scenes, images, given):
             f"{', '.join(wanting)}: a check renders its baseline's own scene and options. Add"
             " --update to write another baseline."
         )
-
-
-def _examine(path, significance, seed, output):
-    """Check one baseline or a folder of them; the significance is shared."""
-    from comparisons.check.moved import level_of_each
-    from reports.ci import baselines, checks
-    from reports.terminal import progress
-
-    paths = baselines.find(path)
-    level = level_of_each(significance, len(paths))
-    output = _folder(output)
-    results = []
-    with progress.shown() as bar:
-        for one in paths:
-
-            def run(path=one):
-                file = baselines.read(path)
-                return checks.examine(
-                    file, file.open(seed), level, output / path.stem, bar.of(path.stem)
-                )
-
-            results.append(checks.guarded(one, run))
-    return results
-
-
-def _update(path, scenes, images, significance, given):
-    from reports.terminal import progress
-
-    with progress.shown() as bar:
-        results = []
-        for one, scene in _targets(path, scenes):
-            results.append(_update_one(one, scene, images, significance, given, bar))
-    return results
-
-
-def _update_one(path, scene, images, significance, given, bar):
-    """Write one baseline, unless it is there with the same options and nothing moved."""
-    from comparisons.case import Request, open_case
-    from reports.ci import baselines, checks
-
-    def run():
-        file, options, named, pictures = _readable(path, scene), dict(given), scene, images
-        if file is not None:
-            pictures = images or bool(file.baseline.images)
-            if scene is None or baselines.scene_for(scene, path) == file.baseline.scene:
-                named = baselines.scene_from(file.baseline.scene, path)
-                options = dict(file.baseline.options) | options
-                if Request.of(options).stated() == file.baseline.options:
-                    return checks.update(file, file.open(), significance, images, bar.of(path.stem))
-        case = open_case(named, Request.of(options))
-        scene_name = baselines.scene_for(named, path)
-        return checks.create(path, scene_name, case, pictures, bar.of(path.stem))
-
-    return checks.guarded(path, run)
-
-
-def _readable(path, scene):
-    """Read a baseline; one that is missing, or broken where its scene is given, is none."""
-    from reports.ci import baselines
-
-    if not path.exists():
-        return None
-    try:
-        return baselines.read(path)
-    except InputError:
-        if scene is None:
-            raise
-        return None
-
-
-def _targets(path, scenes):
-    """Return ``(file, scene)`` of the baselines to write; without a scene, the file knows it."""
-    from comparisons.gallery.builtin import SCENES
-    from reports.ci import baselines
-
-    if path.suffix == ".json":
-        if len(scenes) > 1:
-            raise InputError(f"{path}: one baseline is of one --scene; name a folder for several.")
-        if not scenes and not path.exists():
-            if path.stem not in SCENES:
-                raise InputError(f"{path}: there is no such baseline. Name its --scene.")
-            scenes = (path.stem,)
-        return [(path, scenes[0] if scenes else None)]
-    if scenes:
-        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
-        if len(named) < len(scenes):
-            raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
-        return list(named.items())
-    return [(one, None) for one in baselines.find(path)]
-
-
-def _stem(scene):
-    return Path(scene).stem if Path(scene).suffix == ".xml" else scene
-
-
-def _folder(path):
-    from reports.run import output
-
-    return output.prepare(path)
-
-
-def _report_errors(results):
-    for result in results:
-        if result.status == "error":
-            click.echo(f"fotismos: error: {result.message}", err=True)
 
 
 def _write(path, content):

@@ -3,15 +3,12 @@
 import click
 
 from reports.asked import jobs
-from reports.commands import completion
 from reports.run import batch
 from reports.terminal import verbosity
 
 
 @click.command()
-@click.argument(
-    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=completion.scene
-)
+@jobs.scenes_argument
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option

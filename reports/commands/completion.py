@@ -1,7 +1,7 @@
 """``fotismos completion``: what makes a shell complete commands, options and scenes."""
 
 import click
-from click.shell_completion import CompletionItem, get_completion_class
+from click.shell_completion import get_completion_class
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -25,12 +25,3 @@ def completion(context, shell):
     )
     # Not .source(), which starts a bash to look at its version.
     click.echo(program.source_template % program.source_vars())
-
-
-def scene(context, parameter, beginning):
-    """Complete a SCENE: the built-in ones that begin so, or else files."""
-    from comparisons.gallery.builtin import SCENES
-
-    named = [name for name in SCENES if name.startswith(beginning)]
-    found = [CompletionItem(name, help=SCENES[name].title) for name in named]
-    return found or [CompletionItem(beginning, type="file")]

@@ -3,19 +3,18 @@
 import click
 
 from reports.asked import jobs
-from reports.commands import completion
 from reports.terminal import verbosity
 
 
 @click.command()
-@click.argument("scene", metavar="SCENE", shell_complete=completion.scene)
+@jobs.scene_argument
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON in place of tables.")
+@jobs.json_option
 def cost(scene, output, figures, rounds, as_json, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 

@@ -6,14 +6,11 @@ from pathlib import Path
 import click
 
 from reports.asked import jobs
-from reports.commands import completion
 from reports.terminal import verbosity
 
 
 @click.command()
-@click.argument(
-    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=completion.scene
-)
+@jobs.scenes_argument
 @jobs.output_option("out/fit")
 @click.option(
     "--loss",
@@ -36,7 +33,7 @@ from reports.terminal import verbosity
     help="Fit the lights' intensities too, against that of the first; and ambient light,"
     " where the scene has none.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the records as JSON.")
+@jobs.json_option
 @click.option(
     "--markdown",
     type=click.Path(dir_okay=False, path_type=Path),

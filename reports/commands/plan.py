@@ -3,12 +3,11 @@
 import click
 
 from reports.asked import jobs
-from reports.commands import completion
 
 
 @click.command()
-@click.argument("scene", metavar="SCENE", shell_complete=completion.scene)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@jobs.scene_argument
+@jobs.json_option
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
 @jobs.rendering_options
 @jobs.scene_options

@@ -38,16 +38,23 @@ def report(output, figures, fresh, **rendering):
     request = jobs.request(rendering)
     import mitsuba as mi
 
+    from comparisons.case import RGB
+    from comparisons.hard import collection
+    from reference.scene.graph import set_variant
+
     # Of these scenes its warnings are known: RGB cannot hold a spectral lamp, said at each loading.
     mi.set_log_level(mi.LogLevel.Error)
     with run.timing("verification"):
         verifications = [] if request.everything else _verify(names, request)
+    with run.timing("hard cases"):
+        set_variant(RGB)
+        hard_cases = collection.collect()
     batch.finish(
         run,
         names,
         output,
         batch.Wanted(request, figures, with_cost=True, fresh=fresh),
-        with_hard_cases=True,
+        hard_cases=hard_cases,
         equations=equations.index(),
         verifications=verifications,
     )

@@ -31,8 +31,7 @@ def require_free(path: Path) -> None:
     InputError
         Naming it, or what is there in its place.
     """
-    if path.is_symlink() or (path.exists() and not _is_own_file(path)):
-        raise _not_ours(path)
+    _require(path, path.is_file() and path.name in made(path.parent))
 
 
 def require_free_folder(path: Path) -> None:
@@ -43,28 +42,21 @@ def require_free_folder(path: Path) -> None:
     InputError
         Naming it, or what is there in its place.
     """
-    if path.is_symlink() or (path.exists() and not (_is_own_folder(path) or _is_empty(path))):
-        raise _not_ours(path)
-
-
-def _is_own_file(path: Path) -> bool:
-    return path.is_file() and path.name in made(path.parent)
-
-
-def _is_own_folder(path: Path) -> bool:
-    return path.name in made(path.parent) and (path / MARK).is_file()
+    is_own = path.name in made(path.parent) and (path / MARK).is_file()
+    _require(path, is_own or _is_empty(path))
 
 
 def _is_empty(path: Path) -> bool:
     return path.is_dir() and not any(path.iterdir())
 
 
-def _not_ours(path: Path) -> InputError:
-    kind = "folder" if path.is_dir() else "file"
-    return InputError(
-        f"{path}: this {kind} was not made by fotismos, and is left as it is. Choose another output"
-        " folder with -o, or move it away."
-    )
+def _require(path: Path, is_free: bool) -> None:
+    if path.is_symlink() or (path.exists() and not is_free):
+        kind = "folder" if path.is_dir() else "file"
+        raise InputError(
+            f"{path}: this {kind} was not made by fotismos, and is left as it is. Choose another"
+            " output folder with -o, or move it away."
+        )
 
 
 def claim(folder: Path, *names: str) -> None:

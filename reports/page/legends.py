@@ -26,29 +26,15 @@ class Legend:
 
 def legends() -> tuple[Legend, ...]:
     """The maps in the order of the page."""
-    limit = RATIO.limit
+    bar, signed = map(images.colour_bar, (images.ERROR_COLOURS, images.SIGNED_COLOURS))
+    stops = f"≤ −{RATIO.limit:g}", "0", f"≥ +{RATIO.limit:g} {RATIO.unit}"
+    errors = (
+        Legend(m.name, m.label, "error", m.map_range[1], bar, _labels(*m.map_range), m.unit)
+        for m in drawn().values()
+    )
     return (
-        *(
-            Legend(
-                metric.name,
-                metric.label,
-                "error",
-                metric.map_range[1],
-                images.colour_bar(images.ERROR_COLOURS),
-                _labels(*metric.map_range),
-                metric.unit,
-            )
-            for metric in drawn().values()
-        ),
-        Legend(
-            RATIO.name,
-            RATIO.label,
-            "ratio",
-            limit,
-            images.colour_bar(images.SIGNED_COLOURS),
-            (f"≤ −{limit:g}", "0", f"≥ +{limit:g} {RATIO.unit}"),
-            RATIO.definition,
-        ),
+        *errors,
+        Legend(RATIO.name, RATIO.label, "ratio", RATIO.limit, signed, stops, RATIO.definition),
         Legend(
             "significant", "Significant difference", "mask", note="more than the reference's noise"
         ),

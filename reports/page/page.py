@@ -13,18 +13,17 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from msgspec import structs
 
-from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import luminance
@@ -32,15 +31,16 @@ from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import cost_overview, overview
+from reports.page.hard_cases import GROUPS, grey
 from reports.page.legends import legends
-from reports.page.scene_view import CostView, SceneView
+from reports.page.scene_view import SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
 
 if TYPE_CHECKING:  # for what few pages show
+    from comparisons.hard.collection import HardCases
     from comparisons.verification import Verification
     from heuristic.equations import Entry
-    from reports.page.hard_cases import HardCasesView
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
@@ -50,6 +50,9 @@ PIXELATED_BELOW = 400
 
 #: A region that is opened from its link gets about so many screen pixels.
 REGION_SIZE = 420
+
+#: How a value is printed, by the name of its form.
+FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent": percent}
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -65,12 +68,25 @@ SCRIPTS = (
 EARLY = 'document.documentElement.className = "js";'
 
 
+class Scene(SceneView, kw_only=True):
+    """A scene in the page: what is shown of it, and its name in the page's address."""
+
+    id: str
+    histograms: tuple[vega.Figure, ...]
+
+
+class FailedScene(Failure, kw_only=True):
+    """A scene that could not be compared, and its name in the page's address."""
+
+    id: str
+
+
 def render(
     views: Sequence[SceneView],
     title: str = TITLE,
     equations: Sequence[Entry] = (),
     verifications: Sequence[Verification] = (),
-    hard_cases: HardCasesView | None = None,
+    hard_cases: HardCases | None = None,
     failures: Sequence[Failure] = (),
     run: Run | None = None,
 ) -> str:
@@ -83,11 +99,11 @@ def render(
     taken: set[str] = set()
     scenes = [_scene(view, taken) for view in views]
     failed = [
-        {"id": overview.identifier(failure.scene, taken), "failure": failure}
+        FailedScene(failure.scene, failure.error, id=overview.identifier(failure.scene, taken))
         for failure in failures
     ]
-    costs = [scene["cost"].record for scene in scenes if scene["cost"]]
-    charted = any(scene["histograms"] or scene["charts"] for scene in scenes)
+    costs = [scene.cost.record for scene in scenes if scene.cost]
+    charted = any(scene.histograms or scene.charts for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
     scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
     return (
@@ -114,27 +130,15 @@ def render(
     )
 
 
-def _scene(view: SceneView, taken: set[str]) -> dict[str, Any]:
-    """What the templates show of a scene: its view with addresses, and what follows from it."""
-    return structs.asdict(view) | {
-        "id": overview.identifier(view.record.scene, taken),
-        "images": {name: _data_uri(png) for name, png in view.images.items()},
-        "thumbnails": {name: _data_uri(png) for name, png in view.thumbnails.items()},
-        "histograms": histograms.figures(view.record),
-        "cost": _cost(view.cost),
-        "files": {label: "./" + quote(path) for label, path in view.files.items()},
-    }
+def _scene(view: SceneView, taken: set[str]) -> Scene:
+    return Scene(
+        **structs.asdict(view),
+        id=overview.identifier(view.record.scene, taken),
+        histograms=histograms.figures(view.record),
+    )
 
 
-def _cost(view: CostView | None) -> CostView | None:
-    """Turn the pictures into addresses."""
-    if view is None:
-        return None
-    uris = {name: _data_uri(png) for name, png in view.images.items()}
-    return structs.replace(view, images=uris)
-
-
-def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str, Any]:
+def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[str, Any]:
     """What the page's script needs: the scenes, and how maps are drawn."""
     maps = [
         {"name": item.name, "title": item.title, "kind": item.kind, "top": item.top}
@@ -142,7 +146,10 @@ def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str
     ]
     effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}
     return {
-        "scenes": [*(_scene_data(scene) for scene in scenes), *map(_failed_data, failed)],
+        "scenes": [
+            *map(_scene_data, scenes),
+            *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
+        ],
         "maps": [*maps, effects],
         "noEffect": theme.NO_EFFECT,
         "colours": {
@@ -156,27 +163,20 @@ def _page_data(scenes: Sequence[Mapping], failed: Sequence[Mapping]) -> dict[str
     }
 
 
-def _scene_data(scene: Mapping[str, Any]) -> dict[str, Any]:
-    record: ComparisonRecord = scene["record"]
-    embedded, cost = scene["embedded"], scene["cost"]
+def _scene_data(scene: Scene) -> dict[str, Any]:
+    record = scene.record
     return {
-        "id": scene["id"],
+        "id": scene.id,
         "name": record.scene,
         "width": record.resolution[0],
         "height": record.resolution[1],
         "exposure": record.viewing.exposure,
         "regions": plain(record.regions),
-        "images": embedded.manifest() if embedded else None,
-        "effects": plain(cost.effects) if cost else None,
+        "images": scene.embedded.manifest() if scene.embedded else None,
+        "effects": plain(scene.cost.effects) if scene.cost else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
-        "failed": False,
     }
-
-
-def _failed_data(failed: Mapping[str, Any]) -> dict[str, Any]:
-    name = failed["failure"].scene
-    return {"id": failed["id"], "name": name, "significant": False, "failed": True}
 
 
 def _zoom_to(region: Region) -> float:
@@ -207,21 +207,22 @@ def _environment() -> Environment:
         undefined=StrictUndefined,
     )
     environment.filters.update(
-        number=number,
-        parameter=parameter,
-        seconds=seconds,
-        percent=percent,
+        FORMS,
         code_spans=code_spans,
         zoom_to=_zoom_to,
         plain=plain,
+        uri=_data_uri,
+        grey=grey,
     )
-    environment.tests["about_noise"] = about_noise
+    environment.tests.update(about_noise=about_noise, finite=math.isfinite)
     environment.globals.update(
+        forms=FORMS,
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),
         effects_title=theme.EFFECTS_TITLE,
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
+        hard_groups=GROUPS,
     )
     return environment

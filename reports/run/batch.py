@@ -29,7 +29,7 @@ def start():
     return Run(shlex.join(["fotismos", *sys.argv[1:]]))
 
 
-def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
+def finish(run, names, folder, wanted: Wanted, **shown):
     """Compare the scenes of a run, and write the results of each, then page and tables of all.
 
     ``shown`` is what else the page shows.
@@ -46,12 +46,6 @@ def finish(run, names, folder, wanted: Wanted, with_hard_cases=False, **shown):
         if views or failures:
             _write(run, folder, views, failures, wanted.figures, shown)
         raise
-    if with_hard_cases:
-        from comparisons.hard import collection
-        from reports.page import hard_cases
-
-        with run.timing("hard cases"):
-            shown["hard_cases"] = hard_cases.view(collection.collect())
     _write(run, folder, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
@@ -83,15 +77,16 @@ def _compare(run, places, folder, wanted, views, failures):
         )
         for task, outcome in pool.each(tasks):
             try:
-                done = outcome.result()
+                view, spent = outcome.result()
             except FotismosError as error:
                 if alone:
                     raise
                 failures[task.name] = error
                 continue
-            views[task.name] = done.view
-            run.did(done)
-            verbosity.remark(progress.details(done.view.record))
+            views[task.name] = view
+            for stage, seconds in spent.seconds.items():
+                run.add(stage, seconds)
+            verbosity.remark(progress.details(view.record))
 
 
 def _write(run, folder, views, failures, with_figures, shown):
@@ -101,13 +96,7 @@ def _write(run, folder, views, failures, with_figures, shown):
 
     run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]
     run.begin_page()
-    output.write_page(
-        folder,
-        list(views.values()),
-        failures=run.failures,
-        run=run,
-        **shown,
-    )
+    output.write_page(folder, list(views.values()), failures=run.failures, run=run, **shown)
     output.write_run(folder, run.record())
     if views:
         records = [view.record for view in views.values()]

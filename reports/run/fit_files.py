@@ -10,7 +10,6 @@ from comparisons.departure.metrics import LEADING, drawn
 from comparisons.records import to_json
 from reports.files import images, ownership
 from reports.terminal import tables
-from reports.terminal.tables import printed, ruled
 
 SMALLEST_TILE = 256
 """Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
@@ -60,9 +59,9 @@ def lines(record):
     best = record.nearest
     yield f"{record.scene}: {record.loss.name} loss, {_form(best)} comes nearest"
     yield ""
-    yield from printed(_departures(record))
+    yield from tables.printed(_departures(record))
     yield ""
-    yield from printed(_parameters(best))
+    yield from tables.printed(_parameters(best))
     for material in best.materials:
         if material.reference:
             yield f"reference of {material.name}: {_described(material.reference)}"
@@ -82,29 +81,30 @@ def markdown(records, scenes):
         " give (*floor*). *Parameter error* is before less after, *model error* is after."
     )
     yield ""
-    labels = [metric.label for metric in drawn().values()]
-    heading = ["scene", "best form", *(f"{label}: before → after (floor)" for label in labels)]
-    heading += ["parameter error (ΔE2000)", "model error (ΔE2000)", "seconds"]
-    yield from tables.markdown(heading, map(_scene_cells, records), right=2)
+    yield from tables.markdown(_scene_rows(records), right=2)
     yield ""
     yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
     yield ""
-    heading = ("scene", "form", "k_a", "k_d", "k_s", "n", "reference")
-    rows = (
-        [record.scene, fit.form, *_material_cells(material)]
-        for record in records
-        for fit in record.fits
-        if not fit.normalised
-        for material in fit.materials
-    )
-    yield from tables.markdown(heading, rows, right=len(heading))
+    yield from tables.markdown(_material_rows(records), right=7)
 
 
-def _scene_cells(record):
-    departures = [record.nearest.departure[name] for name in drawn()]
-    cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
-    parts = [_three(departures[0].parameter_error), _three(departures[0].model_error)]
-    return [record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"]
+def _scene_rows(records):
+    labels = (f"{metric.label}: before → after (floor)" for metric in drawn().values())
+    errors = ("parameter error (ΔE2000)", "model error (ΔE2000)")
+    yield "scene", "best form", *labels, *errors, "seconds"
+    for record in records:
+        departures = [record.nearest.departure[name] for name in drawn()]
+        cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
+        parts = _three(departures[0].parameter_error), _three(departures[0].model_error)
+        yield record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"
+
+
+def _material_rows(records):
+    yield "scene", "form", "k_a", "k_d", "k_s", "n", "reference"
+    for record in records:
+        for fit in record.fits:
+            for material in () if fit.normalised else fit.materials:
+                yield record.scene, fit.form, *_material_cells(material)
 
 
 def _material_cells(material):
@@ -118,32 +118,29 @@ def _form(fit):
 
 
 def _departures(record):
-    table = ruled("mean of", *(metric.label for metric in drawn().values()), "loss")
-
-    def add(name, form, field, loss=""):
+    def row(name, form, field, loss=""):
         means = (getattr(form.departure[metric], field) for metric in drawn())
-        table.add_row(name, *map(_three, means), loss)
+        return name, *map(_three, means), loss
 
-    add("paired", record.fits[0], "before")
+    yield "mean of", *(metric.label for metric in drawn().values()), "loss"
+    yield row("paired", record.fits[0], "before")
     for fit in record.fits:
-        add(_form(fit), fit, "after", f"{fit.loss:.4g}")
-    add("noise floor", record.fits[0], "noise_floor")
-    add("parameter error", record.nearest, "parameter_error")
-    add("model error", record.nearest, "model_error")
-    return table
+        yield row(_form(fit), fit, "after", f"{fit.loss:.4g}")
+    yield row("noise floor", record.fits[0], "noise_floor")
+    yield row("parameter error", record.nearest, "parameter_error")
+    yield row("model error", record.nearest, "model_error")
 
 
 def _parameters(fit):
-    table = ruled("material or light", "parameter", "paired", "fitted", "95 %, by noise", "")
+    yield "material or light", "parameter", "paired", "fitted", "95 %, by noise", ""
     for owner in fit.materials:
         for parameter in owner.parameters:
-            _add_parameter(table, owner.name, parameter)
+            yield owner.name, *_parameter_cells(parameter)
     for light in fit.lights:
-        _add_parameter(table, light.light, light)
-    return table
+        yield light.light, *_parameter_cells(light)
 
 
-def _add_parameter(table, owner, parameter):
+def _parameter_cells(parameter):
     interval = parameter.interval
     note = parameter.reason and f"not identifiable: {parameter.reason}"
     if parameter.partners:
@@ -151,8 +148,7 @@ def _add_parameter(table, owner, parameter):
     if parameter.at_bound and not note:
         note = "at its bound"
     factor = " (factor)" if parameter.is_factor else ""
-    table.add_row(
-        owner,
+    return (
         f"{parameter.name} {parameter.channel}".strip() + factor,
         f"{parameter.paired:.4g}",
         _value(parameter),

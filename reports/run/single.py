@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 from reports.asked import jobs
-from reports.run.stages import Done
+from reports.run.stages import Stages
 
 if TYPE_CHECKING:
     from comparisons.case import Request
+    from reports.page.scene_view import SceneView
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,9 @@ def load():
     import comparisons.compare  # noqa: F401  part of start-up
 
 
-def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Done:
+def compare(
+    name: str, folder: Path, place: str, wanted: Wanted, progress
+) -> tuple[SceneView, Stages]:
     """Compare a scene and write its files to ``folder/place``, unless they are there already.
 
     Parameters
@@ -50,35 +53,38 @@ def compare(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Do
         Of a built-in scene or a file.
     progress : callable
         ``progress(stage, done, total)``, called after each pass.
+
+    Returns
+    -------
+        What the page needs of the scene, and where the time went.
     """
     from comparisons.case import open_case
     from comparisons.compare import compare
     from reports.run import finished, kept, output
 
-    done = Done()
+    spent = Stages()
     case = open_case(name, wanted.request)
-    with done.timing("finished scenes"):
+    with spent.timing("finished scenes"):
         passes = kept.of_scene(folder, place, case)
         key = finished.key_of(passes.key, case.options, wanted.with_cost, wanted.figures)
         found = None if wanted.fresh else finished.load(folder / place, key)
     if found is not None:
-        done.view = found
-        return done
+        return found, spent
     begin = perf_counter()
     result = compare(case.source, case.options, progress, case.command(), passes)
-    done.compared = perf_counter() - begin
+    spent.compared(result.record.time, perf_counter() - begin)
     study = None
     if wanted.with_cost:
-        with done.timing("cost"):
+        with spent.timing("cost"):
             result, study = _priced(case, progress, result)
-    with done.timing("files"):
+    with spent.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
             from reports.charts import figures
 
             figures.write_scene(folder / output.FIGURES, place, result)
-        done.view = output.write_scene(folder, place, result, study, key)
+        view = output.write_scene(folder, place, result, study, key)
     passes.remove()
-    return done
+    return view, spent
 
 
 def _priced(case, progress, comparison):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +13,6 @@ from comparisons.records import VERSION, Machine, Record, Versions
 
 if TYPE_CHECKING:
     from comparisons.comparison import TimeSpent
-    from reports.page.scene_view import SceneView
 
 START = perf_counter()
 
@@ -39,39 +37,15 @@ class RunRecord(Record, kw_only=True):
     record_version: int = VERSION
 
 
-@dataclass
-class Done:
-    """What the page needs of a scene, and where the time went.
+class Stages:
+    """Wall time by stage, in seconds."""
 
-    ``compared`` is None where the scene was found finished.
-    """
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
 
-    view: SceneView | None = None
-    compared: float | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def timing(self, stage: str) -> Iterator[None]:
-        """Keep the time of a block."""
-        begin = perf_counter()
-        yield
-        self.seconds[stage] = perf_counter() - begin
-
-
-class Run:
-    """Wall time of one run by stage, in seconds, from the start of the program.
-
-    To be made when start-up is over. `failures` are the scenes that could not be compared.
-    """
-
-    def __init__(self, command: str) -> None:
-        from comparisons import record
-
-        self.command = command
-        self.machine, self.versions = record.machine(), record.versions()
-        self._seconds = {"start-up": perf_counter() - START}
-        self.failures: list[Failure] = []
-        self._page: float | None = None
+    def add(self, stage: str, seconds: float) -> None:
+        """Count seconds towards a stage."""
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + seconds
 
     @contextmanager
     def timing(self, stage: str) -> Iterator[None]:
@@ -95,12 +69,22 @@ class Run:
         self.add("rendering", rendering)
         self.add("metrics", seconds - preparing - rendering)
 
-    def did(self, done: Done) -> None:
-        """Count what a scene took."""
-        for stage, seconds in done.seconds.items():
-            self.add(stage, seconds)
-        if done.compared is not None:
-            self.compared(done.view.record.time, done.compared)
+
+class Run(Stages):
+    """The stages of one run, from the start of the program.
+
+    To be made when start-up is over. `failures` are the scenes that could not be compared.
+    """
+
+    def __init__(self, command: str) -> None:
+        from comparisons import record
+
+        super().__init__()
+        self.add("start-up", perf_counter() - START)
+        self.command = command
+        self.machine, self.versions = record.machine(), record.versions()
+        self.failures: list[Failure] = []
+        self._page: float | None = None
 
     def begin_page(self) -> None:
         """Say that from now on the page is written, which ends the run."""
@@ -112,8 +96,8 @@ class Run:
             now = perf_counter()
             self.add("page", now - self._page)
             self._page = None
-            self.add("other", max(0.0, now - START - sum(self._seconds.values())))
-        return dict(self._seconds)
+            self.add("other", max(0.0, now - START - sum(self.seconds.values())))
+        return dict(self.seconds)
 
     def record(self) -> RunRecord:
         """The record of the run."""
@@ -124,7 +108,3 @@ class Run:
             machine=self.machine,
             versions=self.versions,
         )
-
-    def add(self, stage: str, seconds: float) -> None:
-        """Count seconds towards a stage."""
-        self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds

@@ -1,6 +1,6 @@
 """The tables of ``fotismos cost`` on a terminal."""
 
-from reports.terminal.tables import printed, ruled
+from reports.terminal.tables import printed
 
 
 def lines(record):
@@ -36,82 +36,59 @@ def noise(record):
 
 
 def _rungs(record):
-    table = ruled("method", "samples", "median", "interval", "first run", "mean ΔE2000", "RMSE", "")
+    yield "method", "samples", "median", "interval", "first run", "mean ΔE2000", "RMSE", ""
     for point in record.points:
-        seconds = point.seconds
-        error = f"{point.error:.3f} ± {point.error_stderr:.3f}"
-        table.add_row(
+        yield (
             _all_names(record, point.rung),
             f"{point.spp}",
-            _time(seconds.median),
-            f"{_time(seconds.low)} to {_time(seconds.high)}",
+            *_timed(point.seconds.median, point.seconds),
             _time(point.first_s),
-            error,
+            f"{point.error:.3f} ± {point.error_stderr:.3f}",
             f"{max(point.mse, 0) ** 0.5:.2g}",
             "front" if point.pareto else "",
         )
-    return table
 
 
 def _equal_time(record):
-    table = ruled("within", "method", "samples", "mean ΔE2000", "takes")
+    yield "within", "method", "samples", "mean ΔE2000", "takes"
     for row in record.equal_time:
         best = row.best
-        if best is None:
-            table.add_row(_time(row.seconds), "none is as fast", "", "", "")
-        else:
-            table.add_row(
-                _time(row.seconds),
-                best.method,
-                f"{best.spp}",
-                f"{best.error:.3f}",
-                _time(best.seconds),
-            )
-    return table
+        shown = best and (best.method, f"{best.spp}", f"{best.error:.3f}", _time(best.seconds))
+        yield _time(row.seconds), *(shown or ("none is as fast", "", "", ""))
 
 
 def _equal_error(record):
-    errors = list(dict.fromkeys(row.error for row in record.equal_error))
-    table = ruled("method", *(f"{error:g}" for error in errors))
+    aims = record.reached_by(record.equal_error[0].method) if record.equal_error else ()
+    yield "method", *(f"{aim.error:g}" for aim in aims)
     for method in dict.fromkeys(row.method for row in record.equal_error):
-        cells = [
-            "not reached"
-            if row.seconds is None
-            else f"{'at most ' if row.at_most else ''}{_time(row.seconds)}"
-            for row in record.equal_error
-            if row.method == method
-        ]
-        table.add_row(method, *cells)
-    return table
+        yield method, *map(_reached, record.reached_by(method))
+
+
+def _reached(row):
+    if row.seconds is None:
+        return "not reached"
+    return f"{'at most ' if row.at_most else ''}{_time(row.seconds)}"
 
 
 def _prices(record):
-    table = ruled("effect", "removed", "95 % interval", "alone", "last", "adds", "95 % interval")
+    yield "effect", "removed", "95 % interval", "alone", "last", "adds", "95 % interval"
     for price in record.prices.effects:
-        removes, adds = price.removes, price.adds_s
-        table.add_row(
+        removes = price.removes
+        yield (
             price.effect,
             f"{removes.value:.3f}",
             f"{removes.low:.3f} to {removes.high:.3f}",
             f"{price.alone:.3f}",
             f"{price.last:.3f}",
-            _time(adds.value),
-            f"{_time(adds.low)} to {_time(adds.high)}",
+            *_timed(price.adds_s.value, price.adds_s),
         )
-    return table
 
 
 def _parts(record):
-    table = ruled("part", "mean", "standard error", "RMS", "mean ΔE2000")
+    yield "part", "mean", "standard error", "RMS", "mean ΔE2000"
     for part in (*record.split.parts, record.split.departure):
-        table.add_row(
-            part.name,
-            f"{part.mean:+.3g}",
-            f"{part.mean_stderr:.1g}",
-            f"{part.rms:.3g}",
-            f"{part.dE2000:.3g}",
-        )
-    return table
+        numbers = f"{part.mean:+.3g}", f"{part.mean_stderr:.1g}", f"{part.rms:.3g}"
+        yield part.name, *numbers, f"{part.dE2000:.3g}"
 
 
 def _all_names(record, name):
@@ -125,7 +102,11 @@ def _time(seconds):
     return f"{seconds:.3g} s" if abs(seconds) >= 1 else f"{seconds * 1e3:.3g} ms"
 
 
-def _section(title, table):
+def _timed(seconds, interval):
+    return _time(seconds), f"{_time(interval.low)} to {_time(interval.high)}"
+
+
+def _section(title, rows):
     yield ""
     yield title
-    yield from printed(table)
+    yield from printed(rows)

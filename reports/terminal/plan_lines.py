@@ -3,7 +3,7 @@
 from comparisons import record
 from comparisons.comparison import Simulation
 from comparisons.records import VERSION, Amount, Record
-from reports.terminal.tables import printed, ruled
+from reports.terminal.tables import printed
 
 
 class PlannedEffect(Record):
@@ -53,11 +53,7 @@ def report(scene, ready, variant):
 
 def lines(plan):
     """Yield the lines of a plan: the table of effects, then what will be simulated."""
-    table = ruled("effect", "called for", "rule", "evidence", "what it costs")
-    for effect in plan.effects:
-        called = "yes" if effect.called_for else "no"
-        table.add_row(effect.name, called, effect.rule, effect.evidence, effect.cost)
-    yield from printed(table)
+    yield from printed(_effects(plan))
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     rays = "" if plan.shadows else ", no shadow rays"
     rays += ", environment from a table" if plan.tabulated_environment else ""
@@ -71,9 +67,23 @@ def lines(plan):
 
 def verification_lines(results):
     """Yield a table of verifications: differences, noise, and time at equal noise."""
-    table = ruled("scene", "planned", "significant", "of pixels", "kernel", "faster", "planning")
+    yield from printed(_verifications(results))
+    yield "significant: pixels that differ by more than both sides' noise"
+    yield "kernel: largest difference that the terms left out of the kernel make"
+    yield "faster: how many times sooner the plan reaches the same noise"
+
+
+def _effects(plan):
+    yield "effect", "called for", "rule", "evidence", "what it costs"
+    for effect in plan.effects:
+        called = "yes" if effect.called_for else "no"
+        yield effect.name, called, effect.rule, effect.evidence, effect.cost
+
+
+def _verifications(results):
+    yield "scene", "planned", "significant", "of pixels", "kernel", "faster", "planning"
     for result in results:
-        table.add_row(
+        yield (
             result.scene,
             result.planned,
             f"{result.significant}",
@@ -82,7 +92,3 @@ def verification_lines(results):
             f"{result.gain:.3g} x",
             f"{result.planning_s * 1e3:.0f} ms of {result.saved_s:.3g} s saved",
         )
-    yield from printed(table)
-    yield "significant: pixels that differ by more than both sides' noise"
-    yield "kernel: largest difference that the terms left out of the kernel make"
-    yield "faster: how many times sooner the plan reaches the same noise"

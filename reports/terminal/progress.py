@@ -9,7 +9,7 @@ from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
 from reports.terminal import verbosity
 from reports.terminal.printing import seconds
-from reports.terminal.tables import printed, ruled
+from reports.terminal.tables import printed
 
 
 class Bar:
@@ -32,15 +32,12 @@ class Bar:
 def shown(unit="passes"):
     """Show progress on standard error while the block runs, if that is a terminal."""
     console = Console(stderr=True)
-    columns = (
+    with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn(unit),
         TimeRemainingColumn(),
-    )
-    with Progress(
-        *columns,
         console=console,
         transient=True,
         disable=not console.is_terminal or verbosity.level() < 0,
@@ -51,27 +48,30 @@ def shown(unit="passes"):
 def summary(records):
     """Yield a line for each scene: departure, noise, shape, and times."""
     records = list(records)
-    headings = (f"mean {LEADING.label}", "noise", "shape", "significant", "heuristic", "reference")
-    table = ruled("scene", *headings)
-    for column in table.columns[1:]:
-        column.justify = "right"
-    for record in records:
-        metric, time = record.metrics[LEADING.name], record.time
-        table.add_row(
-            record.scene,
-            f"{metric.mean:.3f}",
-            f"{metric.noise_floor:.3f}",
-            f"{metric.after_exposure.mean:.3f}",
-            f"{record.significant.fraction:.1%}",
-            f"{time.heuristic.total_s:.2f} s",
-            f"{time.reference.total_s:.2f} s",
-        )
-    yield from printed(table)
+    yield from printed(_table(records), right=1)
     for record in records:
         if record.heuristic != PHONG.name:
             yield f"{record.scene}: heuristic {record.heuristic}"
         if record.noise_target:
             yield _noise(record)
+
+
+def _table(records):
+    yield (
+        "scene",
+        f"mean {LEADING.label}",
+        "noise",
+        "shape",
+        "significant",
+        "heuristic",
+        "reference",
+    )
+    for record in records:
+        metric = record.metrics[LEADING.name]
+        means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
+        times = (f"{half.total_s:.2f} s" for half in (record.time.heuristic, record.time.reference))
+        significant = f"{record.significant.fraction:.1%}"
+        yield record.scene, *(f"{mean:.3f}" for mean in means), significant, *times
 
 
 def details(record):

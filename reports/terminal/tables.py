@@ -24,30 +24,33 @@ if TYPE_CHECKING:
 WIDTH = 120
 
 
-def ruled(*headings: str, right: int | None = None) -> Table:
-    """Return an empty table with these headings, without lines; set to the right from a column."""
+def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator[str]:
+    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen.
+
+    The first row has the headings. Cells are set to the right from column ``right`` on.
+    """
+    headings, *others = rows
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for place, heading in enumerate(headings):
         justify = "left" if right is None or place < right else "right"
         table.add_column(heading, overflow="fold", justify=justify)
-    return table
-
-
-def printed(table: Table) -> Iterator[str]:
-    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen."""
+    for row in others:
+        table.add_row(*row)
     console = Console(width=WIDTH, color_system=None)
     with console.capture() as capture:
         console.print(table)
     return (line.rstrip() for line in capture.get().splitlines())
 
 
-def markdown(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], right: int = 1
-) -> Iterator[str]:
-    """Yield the lines of a table in Markdown, set to the right from a column on."""
+def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
+    """Yield the lines of a table in Markdown, set to the right from a column on.
+
+    The first row has the headings.
+    """
+    headings, *others = rows
     yield _row(headings)
     yield _row(["---"] * right + ["---:"] * (len(headings) - right))
-    for row in rows:
+    for row in others:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
 
@@ -62,43 +65,28 @@ def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
 def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
     ownership.folder(folder)
-    for part, (headings, rows) in {"cost": methods(record), "prices": prices(record)}.items():
-        ownership.write(folder / f"{name}-{part}.csv", comma_separated(headings, rows))
-        shown = [[_shown(cell) for cell in row] for row in rows]
-        ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(headings, shown)) + "\n")
+    for part, rows in {"cost": [*methods(record)], "prices": [*prices(record)]}.items():
+        ownership.write(folder / f"{name}-{part}.csv", comma_separated(rows))
+        shown = ([_shown(cell) for cell in row] for row in rows)
+        ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
 
 
-def methods(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
-    """Return headings and rows of a study's methods: seconds for one image, and mean ΔE2000."""
-    headings = ("method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front")
-    rows = [
-        [
-            point.rung,
-            point.spp,
-            *(point.seconds.median, point.seconds.low, point.seconds.high),
-            point.error,
-            point.error_stderr,
-            "yes" if point.pareto else "no",
-        ]
-        for point in record.points
-    ]
-    return headings, rows
+def methods(record: Cost) -> Iterator[Sequence[Any]]:
+    """Yield the rows of a study's methods: seconds for one image, and mean ΔE2000."""
+    yield "method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front"
+    for point in record.points:
+        seconds = point.seconds
+        times = seconds.median, seconds.low, seconds.high
+        front = "yes" if point.pareto else "no"
+        yield point.rung, point.spp, *times, point.error, point.error_stderr, front
 
 
-def prices(record: Cost) -> tuple[Sequence[str], list[list[Any]]]:
-    """Return headings and rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
-    headings = ("effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s")
-    rows = [
-        [
-            price.effect,
-            *(price.removes.value, price.removes.low, price.removes.high),
-            price.alone,
-            price.last,
-            price.adds_s.value,
-        ]
-        for price in record.prices.effects
-    ]
-    return headings, rows
+def prices(record: Cost) -> Iterator[Sequence[Any]]:
+    """Yield the rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
+    yield "effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s"
+    for price in record.prices.effects:
+        removes = price.removes.value, price.removes.low, price.removes.high
+        yield price.effect, *removes, price.alone, price.last, price.adds_s.value
 
 
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
@@ -114,7 +102,7 @@ def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
         for name, summary in record.metrics.items()
     ]
     headings = list(dict.fromkeys(key for row in rows for key in row))
-    return comma_separated(headings, [[row.get(key, "") for key in headings] for row in rows])
+    return comma_separated([headings, *([row.get(key, "") for key in headings] for row in rows)])
 
 
 def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -125,34 +113,31 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield prefix + key, value
 
 
-def comma_separated(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def comma_separated(rows: Iterable[Sequence[Any]]) -> str:
     """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full."""
     text = StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(headings)
-    table.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
 def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
     """Yield the lines of a table of a run: each metric's mean, its shape and its noise floor."""
-    rows = [
-        [
-            record.scene,
-            *(
-                f"{number(m.mean)} ({number(m.after_exposure.mean)}; {number(m.noise_floor)})"
-                for m in (record.metrics[name] for name in METRICS)
-            ),
-            percent(record.significant.fraction),
-            f"{record.plan.spp}",
-        ]
-        for record in records
-    ]
-    labels = [metric.label for metric in METRICS.values()]
-    yield from markdown(["scene", *labels, "significant", "samples per pixel"], rows)
+    yield from markdown(_metrics(records))
     yield ""
     yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
     yield "that makes it smallest, and what the reference's noise alone would give."
+
+
+def _metrics(records):
+    labels = [metric.label for metric in METRICS.values()]
+    yield "scene", *labels, "significant", "samples per pixel"
+    for record in records:
+        means = (
+            f"{number(m.mean)} ({number(m.after_exposure.mean)}; {number(m.noise_floor)})"
+            for m in (record.metrics[name] for name in METRICS)
+        )
+        significant = percent(record.significant.fraction)
+        yield record.scene, *means, significant, f"{record.plan.spp}"
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -11,21 +11,17 @@ def _remember(context, parameter, given):
         context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
 
 
-quiet_option = click.option(
-    "-q",
-    "--quiet",
-    is_flag=True,
-    expose_value=False,
-    callback=_remember,
-    help="No progress and no tables: only where the results are.",
-)
-verbose_option = click.option(
+def _option(letter, name, help):
+    return click.option(
+        letter, name, is_flag=True, expose_value=False, callback=_remember, help=help
+    )
+
+
+quiet_option = _option("-q", "--quiet", "No progress and no tables: only where the results are.")
+verbose_option = _option(
     "-v",
     "--verbose",
-    is_flag=True,
-    expose_value=False,
-    callback=_remember,
-    help="Say more: what is simulated, how lights are paired, what is missed, where time goes.",
+    "Say more: what is simulated, how lights are paired, what is missed, where time goes.",
 )
 
 

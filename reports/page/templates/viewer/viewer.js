@@ -135,9 +135,8 @@ class Viewer {
   zoomBy(factor) {
     const pane = this.viewport.panes[0];
     const [x, y] = this.view.pixel ?? this.viewport.centre(this.view);
-    const [left, top] = this.viewport.toScreen(this.view, pane, x + 0.5, y + 0.5);
-    const seen = left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
-    const about = this.view.pixel && seen ? [left, top] : [pane.width / 2, pane.height / 2];
+    const at = this.viewport.toScreen(this.view, pane, x + 0.5, y + 0.5);
+    const about = this.view.pixel && this.viewport.sees(at) ? at : [pane.width / 2, pane.height / 2];
     this.change(this.viewport.zoomed(this.view, factor, about));
   }
 
@@ -154,10 +153,8 @@ class Viewer {
   /** @param {number[]} pixel */
   following([x, y]) {
     if (this.view.zoom === null) return {};
-    const pane = this.viewport.panes[0];
-    const [left, top] = this.viewport.toScreen(this.view, { ...pane, left: 0, top: 0 }, x + 0.5, y + 0.5);
-    const seen = left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
-    return seen ? {} : { x: x + 0.5, y: y + 0.5 };
+    const at = this.viewport.toScreen(this.view, this.viewport.panes[0], x + 0.5, y + 0.5);
+    return this.viewport.sees(at) ? {} : { x: x + 0.5, y: y + 0.5 };
   }
 
   /** The controls tell the page what they are set to; `showControls` does the reverse. */

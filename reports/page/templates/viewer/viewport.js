@@ -59,6 +59,12 @@ class Viewport {
     return [pane.left + pane.width / 2 + (x - cx) * zoom, pane.top + pane.height / 2 + (y - cy) * zoom];
   }
 
+  /** Whether a point of the first pane is seen in it. @param {number[]} place */
+  sees([left, top]) {
+    const pane = this.panes[0];
+    return left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
+  }
+
   /** From the canvas to the image. @param {View} view @param {number} left @param {number} top */
   toImage(view, left, top) {
     const pane = this.paneAt(left, top);

@@ -1,0 +1,103 @@
+"""All baselines of one command: checked, or written."""
+
+from pathlib import Path
+
+from comparisons.case import Request, open_case
+from comparisons.check.moved import level_of_each
+from comparisons.gallery.builtin import SCENES
+from heuristic.errors import InputError
+from reports.ci import baselines, checks
+from reports.terminal import progress
+
+
+def examine(path, significance, seed, folder):
+    """Check one baseline or a folder of them; the significance is shared.
+
+    ``seed`` replaces the baselines' own unless it is None; ``folder`` is for pictures of failures.
+
+    Raises
+    ------
+    InputError
+        When there is no baseline.
+    """
+    paths = baselines.find(path)
+    level = level_of_each(significance, len(paths))
+
+    def examine_one(path):
+        file = baselines.read(path)
+        return checks.examine(file, file.open(seed), level, folder / path.stem, bar.of(path.stem))
+
+    with progress.shown() as bar:
+        return [checks.guarded(examine_one, one) for one in paths]
+
+
+def update(path, scenes, images, significance, given):
+    """Write one baseline or several, unless they are there with the same options and nothing moved.
+
+    Parameters
+    ----------
+    scenes
+        Those that the baselines are to be of; where there are none, the files say it.
+    images
+        Keep small pictures beside the baselines.
+    given
+        Options by name, which replace those of the baselines.
+
+    Raises
+    ------
+    InputError
+        When a baseline cannot be told from another, or has no scene.
+    """
+    with progress.shown() as bar:
+        return [
+            checks.guarded(_update_one, one, scene, images, significance, given, bar)
+            for one, scene in _targets(path, scenes)
+        ]
+
+
+def _update_one(path, scene, images, significance, given, bar):
+    file = _readable(path, scene)
+    if file is not None:
+        old = file.baseline
+        if scene is None or baselines.scene_for(scene, path) == old.scene:
+            scene, given = baselines.scene_from(old.scene, path), dict(old.options) | given
+            if Request.of(given).stated() == old.options:
+                return checks.update(file, file.open(), significance, images, bar.of(path.stem))
+        images = images or bool(old.images)
+    case = open_case(scene, Request.of(given))
+    named = baselines.scene_for(scene, path)
+    return checks.create(path, named, case, images, bar.of(path.stem))
+
+
+def _readable(path, scene):
+    """Read a baseline; None where it is missing, or broken while its scene is given."""
+    if not path.exists():
+        return None
+    try:
+        return baselines.read(path)
+    except InputError:
+        if scene is None:
+            raise
+        return None
+
+
+def _targets(path, scenes):
+    """Return ``(file, scene)`` of the baselines to write; without a scene, the file knows it."""
+    if path.suffix == ".json":
+        if len(scenes) > 1:
+            raise InputError(f"{path}: one baseline is of one --scene; name a folder for several.")
+        if not scenes and not path.exists():
+            if path.stem not in SCENES:
+                raise InputError(f"{path}: there is no such baseline. Name its --scene.")
+            scenes = (path.stem,)
+        return [(path, scenes[0] if scenes else None)]
+    if scenes:
+        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
+        if len(named) < len(scenes):
+            raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
+        return list(named.items())
+    return [(one, None) for one in baselines.find(path)]
+
+
+def _stem(scene):
+    return Path(scene).stem if Path(scene).suffix == ".xml" else scene
