@@ -9,6 +9,7 @@ import re
 from dataclasses import replace
 from io import StringIO
 
+import drjit as dr
 import jsonschema
 import numpy as np
 import OpenEXR
@@ -17,12 +18,15 @@ from scipy.ndimage import uniform_filter
 
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences
+from comparisons.cost.rungs import RUNGS, Physical, Rung
 from comparisons.departure.metric import Metric, declare
 from comparisons.departure.metrics import BUILT_IN, METRICS
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from comparisons.fit.summary import departure
 from comparisons.study import columns
 from heuristic.errors import InputError
+from heuristic.heuristics import HEURISTICS, Heuristic
+from reference.effects.obstacles import OCCLUSION
 from tests.schemas import schema
 
 # -- A metric ------------------------------------------------------------------------------------
@@ -173,3 +177,56 @@ def test_metrics_of_installed_packages_are_declared(monkeypatch):
     monkeypatch.setattr(METRICS, "_loaded", False)
     assert METRICS["blurred"] is BLURRED
     assert list(METRICS) == [*BUILT_IN, "blurred"]
+
+
+# -- A metric, a rung and a heuristic in one run ------------------------------------------------
+
+
+def flat_tone(point):
+    """The diffuse colour wherever a light is seen above the horizon."""
+    colour = point.ambient * point.material.k_a
+    for light in point.lights:
+        lit = dr.dot(point.normal, light.toward) > 0
+        colour += dr.select(lit, point.material.k_d * light.intensity, 0)
+    return colour
+
+
+TONE = Heuristic("flat-tone", flat_tone, "Flat <tone>")
+NO_SHADOWS = Rung("no <shadows>", "physical", Physical(frozenset({OCCLUSION}), max_depth=2))
+
+
+@pytest.fixture
+def all_three(metric, monkeypatch):
+    """A metric, a rung and a heuristic, declared and taken back."""
+    for registry, toy in ((RUNGS, NO_SHADOWS), (HEURISTICS, TONE)):
+        monkeypatch.setitem(registry._others, toy.name, toy)
+
+
+def test_all_three_are_in_json_tables_page_and_chart(all_three, run, scene_file, tmp_path):
+    """Nothing but their declarations names them in the product."""
+    out = tmp_path / "out"
+    words = ("--heuristic", "flat-tone", "--cost", "--figures", "--resolution", "12x12")
+    assert run("compare", scene_file, "-o", out, "--spp", 4, *words)[0] == 0
+    place = out / "my-scene"
+    compared, priced = (
+        json.loads((place / f"{name}.json").read_text(encoding="utf-8"))
+        for name in ("comparison", "cost")
+    )
+    for record, name in ((compared, "comparison"), (priced, "cost")):
+        jsonschema.validate(record, schema(name))
+        assert record["heuristic"] == "flat-tone"
+    assert compared["metrics"]["blurred"]["mean"] > 0
+    rungs = {rung["name"]: rung for rung in priced["rungs"]}
+    assert rungs["no <shadows>"]["family"] == "physical"
+    assert "Phong kernel: Flat <tone>" in rungs
+    assert {point["rung"] for point in priced["points"]} == set(rungs)
+    chart = (place / "cost.svg").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text(encoding="utf-8")
+    for text in (chart, page):
+        assert "no &lt;shadows&gt;" in text
+        assert "Phong kernel: Flat &lt;tone&gt;" in text
+    assert "Blurred &lt;difference&gt;" in page
+    assert run("cost", scene_file, "-o", out, "--rounds", 2, *words[:2], *words[4:])[0] == 0
+    table = (out / "tables/my-scene-cost.csv").read_text(encoding="utf-8")
+    assert "no <shadows>" in table
+    assert "Phong kernel: Flat <tone>" in table
