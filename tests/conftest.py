@@ -1,7 +1,6 @@
 """What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
 
 import gc
-import os
 import sys
 from importlib.metadata import entry_points
 
@@ -14,9 +13,6 @@ import pytest
 from heuristic import plugins
 from reference.rendering import direct
 from tests.small_scene import SCENE
-
-if "PYTEST_XDIST_WORKER" in os.environ:
-    dr.set_thread_count(1)  # processes share the cores already
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:
