@@ -9,10 +9,11 @@ from drjit.llvm import Array3f, Float
 
 import heuristic
 from comparisons.departure.metrics import delta_e_2000
-from comparisons.hard.cases import Convention
+from comparisons.hard import cases
 from heuristic import vectors
-from reference.pairing.factors import SMALLEST_IOR, Phong, to_roughplastic
-from reference.pairing.factors import Convention as Pairing
+from reference.pairing.factors import SMALLEST_IOR, Convention, Phong, to_roughplastic
+
+FAINT = Phong(k_d=(0.5,) * 3, k_s=(1e-12,) * 3, n=9.0)
 
 
 def _behind_an_even_spot(exponent):
@@ -24,28 +25,30 @@ def _behind_an_even_spot(exponent):
 
 
 CONVENTIONS = (
-    Convention(
+    cases.Convention(
         "m = 0 of a spot",
         "An even cone, lit up to its cutoff beyond 90° too, though cos^m is dark there for every"
         " m > 0; the same for an m compiled in and one that is not.",
         [1.0, 1.0],
         lambda: np.ravel([_behind_an_even_spot(m) for m in (0, dr.opaque(Float, 0))]),
     ),
-    Convention(
+    cases.Convention(
         "normals of length 1e-40",
         "Below the smallest normal float a length counts as 0 or as less than 1, as the processor's"
         " threads treat such numbers: the surface may be too dark, and never NaN or too bright.",
         True,
         lambda: float(dr.norm(vectors.normalise(dr.opaque(Array3f, (6e-41, 0, 8e-41))))[0]) <= 1,
     ),
-    Convention(
+    cases.Convention(
         "IOR 1",
         "Mitsuba refuses it, since it makes no surface. A lobe too faint for any IOR above"
         " 1.0001 gets that, and reflects 2.5e-9.",
         SMALLEST_IOR,
-        lambda: to_roughplastic(Phong((0.5,) * 3, (1e-12,) * 3, 9.0), Pairing.MATCHED)[0].int_ior,
+        lambda: (
+            to_roughplastic(Phong((0.5,) * 3, (1e-12,) * 3, 9.0), Convention.MATCHED)[0].int_ior
+        ),
     ),
-    Convention(
+    cases.Convention(
         "colours above display white",
         "ΔE2000 and CAM16-UCS see what a display shows: twice and three times white are equal."
         " ΔE ITP tells them apart, up to 10,000 cd/m².",

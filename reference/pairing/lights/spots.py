@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from heuristic.lights import SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR
-from reference.pairing.lights import measured, points
+from reference.pairing.lights import measured, point_lights
 from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
 from reference.scene.graph import properties
 
@@ -128,7 +128,7 @@ def _to_physical(light: Given) -> PairedEmitter:
         theta = np.degrees(np.arccos(np.clip(travel @ axis, -1, 1)))
         return power_falloff(theta, exponent) * (theta <= cutoff)
 
-    factor, _, note = points.level(light, cone)
+    factor, _, note = point_lights.level(light, cone)
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
     ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
     props = properties(
