@@ -161,10 +161,11 @@ def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
                 with ownership.replacing_folder(place) as new:
                     if random.random() < 0.3:
                         raise KeyboardInterrupt
-                    for chosen in random.sample(names, 2):
-                        if (place / chosen) not in mine:
-                            (new / chosen).write_text("ours")
-                            ours.add(place / chosen)
+                    written = random.sample(names, 2)
+                    for chosen in written:
+                        (new / chosen).write_text("ours")
+                assert not {place / chosen for chosen in written} & mine.keys()
+                ours |= {place / chosen for chosen in written}
             except (InputError, KeyboardInterrupt):
                 continue
         assert all(path.read_text() == text for path, text in mine.items())

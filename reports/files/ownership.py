@@ -4,6 +4,7 @@ A folder that fotismos writes to holds a file `MARK`, which lists what was made 
 line. What is not in the list is not touched, and neither is a folder without such a file in it.
 """
 
+import os
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -61,7 +62,8 @@ def _require(path: Path, is_free: bool) -> None:
 
 def claim(folder: Path, *names: str) -> None:
     """Add to the list of what fotismos made in a folder."""
-    new = [name for name in names if name not in made(folder)]
+    listed = made(folder)
+    new = [name for name in names if name not in listed]
     if new or not (folder / MARK).exists():
         with (folder / MARK).open("a", encoding="utf-8") as file:
             file.write("".join(f"{name}\n" for name in new))
@@ -119,7 +121,8 @@ def replacing_folder(place: Path, keep: str | None = None) -> Iterator[Path]:
     Raises
     ------
     InputError
-        Where the place holds something that fotismos did not make.
+        Where the place holds something that fotismos did not make, or would have to replace
+        something that others put into an earlier result.
     """
     require_free_folder(place)
     new, old = atomic.beside(place), atomic.beside(place, "old")
@@ -156,7 +159,10 @@ def _keep(place: Path, new: Path, pattern: str | None) -> None:
     ours = made(place) | {MARK}
     for path in place.iterdir():
         is_result = path.name in ours or atomic.LEFT.fullmatch(path.name)
-        if (new / path.name).exists() or (is_result and not (pattern and path.match(pattern))):
+        is_replaced = os.path.lexists(new / path.name)
+        if is_replaced:
+            _require(path, is_free=bool(is_result))
+        if is_replaced or (is_result and not (pattern and path.match(pattern))):
             continue
         if path.is_dir() and not path.is_symlink():
             shutil.copytree(path, new / path.name, symlinks=True)
