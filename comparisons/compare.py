@@ -22,11 +22,11 @@ from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.records import Pixels
 from heuristic.errors import InputError
-from reference.pairing import halves
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.scene.sampler import with_sampler
 
 LEVEL = 0.01
 """Chance that an image without any difference has one pixel marked as significant."""
@@ -57,7 +57,7 @@ def prepare(source, options=None):
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
     pair = options.pair(source)
-    physical = halves.with_sampler(pair.physical, sampler(options.everything)).instantiate()
+    physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
     if width * height > LARGEST:
         raise InputError(
@@ -169,7 +169,7 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = options.pair(source)
-        scene = halves.with_sampler(pair.heuristic, chosen.sampler).instantiate()
+        scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
         return Renderer(scene, None, spp, "heuristic image")
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from comparisons.compare import LEVEL, Options, prepare
 from comparisons.departure.marks import significance
 from comparisons.records import VERSION, Record
-from reference.pairing import halves
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import Stream, pass_seed, passes
 from reference.rendering.renderer import Accumulator, Renderer
+from reference.scene.sampler import with_sampler
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
@@ -112,7 +112,7 @@ def _kernel_difference(sides, seed):
     sampler, spp = sides[0].plan.sampler, sides[0].heuristic.spp
     images = []
     for side in sides:
-        scene = halves.with_sampler(side.pair.heuristic, sampler).instantiate()
+        scene = with_sampler(side.pair.heuristic, sampler).instantiate()
         images.append(
             np.array(Renderer(scene, None, spp, "heuristic image").render(pass_seed(seed, 0)))
         )

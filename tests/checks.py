@@ -119,7 +119,7 @@ def as_rows(value):
 
 
 def with_film(scene, resolution, spp):
-    """Give a scene dictionary a square film and the sampler that pairs are rendered with."""
+    """Give a scene dictionary a square film and a stratified sampler."""
     sensor = dict(scene["sensor"])
     sensor["film"] = {**sensor["film"], "width": resolution, "height": resolution}
     sensor["sampler"] = {"type": "multijitter", "sample_count": spp}

@@ -15,6 +15,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.render import LIMIT_SPP, WAVEFRONT, is_checked, schedule
 from heuristic.errors import InputError
+from reference.planning.plan import PASSES
 from reports.run.kept import KeptPasses, key_of
 
 ROOT = Path(__file__).parents[1]
@@ -65,7 +66,7 @@ def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
     whole = compare(source, options)
     assert all(map(np.array_equal, arrays(resumed), arrays(whole)))
     assert resumed.record.metrics == whole.record.metrics
-    assert resumed.record.time.reference.passes == 16
+    assert resumed.record.time.reference.passes == PASSES
 
 
 def test_kept_passes_of_something_else_are_not_used(tmp_path):

@@ -14,8 +14,9 @@ from heuristic.errors import InputError
 from heuristic.heuristics import named
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
-from reference.pairing.halves import INTEGRATOR, with_sampler
+from reference.pairing.halves import INTEGRATOR
 from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.scene.sampler import with_sampler
 from reference.scene.source import Source
 
 

@@ -16,11 +16,12 @@ from reference.effects import EFFECTS
 from reference.effects.effect import Effect
 from reference.effects.light_forms import ENVIRONMENT
 from reference.pairing import lights
-from reference.pairing.halves import Pair, with_sampler
+from reference.pairing.halves import Pair
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts, examine
 from reference.planning.plan import Plan
 from reference.rendering.renderer import Renderer, physical_integrator
 from reference.scene.graph import Graph, properties
+from reference.scene.sampler import with_sampler
 
 GRAFTED = frozenset(effect for effect in EFFECTS if effect.graft)
 GLOWING = tuple(effect for effect in EFFECTS if effect.glow)

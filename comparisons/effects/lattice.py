@@ -14,9 +14,9 @@ from comparisons.effects.between import Between
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.kernel_terms import POLYGONS, SPECTRAL
-from reference.pairing.halves import with_sampler
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Renderer, variant
+from reference.scene.sampler import with_sampler
 
 KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
 

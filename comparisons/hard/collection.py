@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.hard import colour_values, furnace, kernel, orientation, physical, surfaces
+from comparisons.hard import (
+    colour_values,
+    furnace,
+    kernel,
+    orientation,
+    physical,
+    samplers,
+    surfaces,
+)
 from comparisons.hard.cases import Convention, Outcome, evaluate
 from comparisons.hard.conventions import CONVENTIONS
 from comparisons.hard.furnace import Furnace
@@ -15,7 +23,7 @@ from comparisons.hard.textbook import NAIVE, Setting, shade
 
 CASES = tuple(
     case
-    for module in (kernel, orientation, surfaces, physical, colour_values)
+    for module in (kernel, orientation, surfaces, physical, samplers, colour_values)
     for case in module.CASES
 )
 

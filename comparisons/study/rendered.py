@@ -17,6 +17,7 @@ from reference.planning.plan import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
+from reference.scene.sampler import with_sampler
 from reference.scene.source import Source
 
 PASSES = 4
@@ -32,9 +33,9 @@ def row(part, point):
     """
     pair = halves.pair(source(part, point), part.convention, part.resolution)
     kept = _kept(part.scene)
-    physical = kept[1].scene(halves.with_sampler(pair.physical, sampler()))
+    physical = kept[1].scene(with_sampler(pair.physical, sampler()))
     chosen = plan(pair, physical)
-    heuristic = kept[0].scene(halves.with_sampler(pair.heuristic, chosen.sampler))
+    heuristic = kept[0].scene(with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES
     plans = _plans(chosen)
     renderers = [Renderer(heuristic, None, spp, "heuristic image")]

@@ -160,16 +160,6 @@ def _bare(graph):
     return copy
 
 
-def with_sampler(graph, plugin):
-    """Return a copy of a graph whose sensors have a sampler of their own, of the given kind."""
-    copy = graph.copy()
-    for sensor in copy.nodes(SENSOR):
-        for key, _ in copy.children(sensor, mi.ObjectType.Sampler):
-            copy.detach(sensor, key)
-        copy.attach(sensor, "sampler", copy.add(mi.ObjectType.Sampler, properties(plugin)))
-    return copy
-
-
 def _set_integrator(graph, ambient, settings, interpolation, prune, model):
     props = properties(
         "heuristic",

@@ -17,9 +17,11 @@ participating media                     ``volpath``, or ``volpathmis`` where the
                                         or its extinction has a colour
 ======================================  ===========================================================
 
-All take the sampler of least noise for its time. Where no light needs random numbers, only the
-pixel filter is left to sample; the same samples are then better in few passes of many, within which
-they are stratified, and four passes are enough to see what noise is left.
+All take the sampler of :mod:`reference.scene.sampler`: stratified, with the right mean at any
+number of samples. Samples are stratified within a pass, so that few passes of many samples are
+better than many of few; eight passes are enough for standard errors. Where no light needs random
+numbers, only the pixel filter is left to sample, and four passes are enough to see what noise is
+left.
 """
 
 from collections.abc import Collection
@@ -38,14 +40,13 @@ from reference.pairing.nearest.operations import plain
 from reference.planning.facts import BSDF, EMITTER, Facts, examine
 from reference.rendering.direct import RR_DEPTH
 from reference.scene.graph import Graph
+from reference.scene.sampler import SAMPLER, STOCK_SAMPLER
 
-SAMPLER = "multijitter"
-"""Of the stock samplers the one of least noise for its time, on figures and the Cornell box alike:
-at 64 samples per pixel 10 times the efficiency of ``independent`` there, ``stratified`` 5 times."""
-
-STOCK_SAMPLER = "independent"
 STOCK_RR_DEPTH = 5
-SPP, PASSES = 256, 16
+SPP, PASSES = 512, 8
+"""64 samples per pass take half the time of 16 for the same noise (``./run bench samplers``)."""
+
+DETERMINISTIC_SPP, DETERMINISTIC_PASSES = 256, 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +139,6 @@ class Plan:
 
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
-DETERMINISTIC_PASSES = 4
 
 
 def sampler(everything: bool = False) -> str:
@@ -199,6 +199,7 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
     return replace(
         stock.directly(),
         rr_depth=STOCK_RR_DEPTH,
+        spp=SPP if is_random else DETERMINISTIC_SPP,
         passes=PASSES if is_random else DETERMINISTIC_PASSES,
         tabulate_environment=tabulated,
     )

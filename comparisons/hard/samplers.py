@@ -1,0 +1,77 @@
+"""Samplers on long paths: inside a bright sphere, whose radiance is known in closed form.
+
+Inside a sphere of radius 1 and diffuse reflectance ρ, with a point light of intensity I at its
+centre, the radiance is the same everywhere ::
+
+    L = ρ I / (π (1 − ρ))
+
+because each reflection sends the same irradiance to all of the sphere. A path takes about
+1 / (1 − ρ) reflections, and as many pairs of random numbers. Where those depend on each other, the
+mean of an image is wrong, however many passes are taken: no standard error shows it.
+
+Naively the sampler is Mitsuba's own; ours is :mod:`reference.scene.sampler`, at the same number of
+samples. Both are measured with the Mitsuba that is installed.
+"""
+
+from functools import cache
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.hard.cases import HardCase
+from reference.scene.sampler import SAMPLER, register
+
+REFLECTANCE = 0.9
+RADIANCE = REFLECTANCE / (np.pi * (1 - REFLECTANCE))
+"""Closed form for an intensity of 1."""
+
+BOUND = 0.005
+"""Of the relative error: some four standard errors of :data:`SAMPLES`."""
+
+SAMPLES, WIDTH = 256, 32
+STOCK = (("multijitter", 4), ("multijitter", 16), ("ldsampler", 16))
+
+
+def sphere(reflectance: float, width: int, sampler: dict | None = None) -> dict:
+    """Return the scene, seen from a place off its centre, as a dictionary."""
+    view = mi.ScalarTransform4f().look_at((0.3, 0.1, 0.2), (1, 0.2, 0), (0, 1, 0))
+    film = {"type": "hdrfilm", "width": width, "height": width, "rfilter": {"type": "box"}}
+    sensor = {"type": "perspective", "fov": 60, "to_world": view, "film": film}
+    if sampler:
+        sensor["sampler"] = sampler
+    inside = {"type": "diffuse", "reflectance": reflectance}
+    return {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "sphere": {"type": "sphere", "flip_normals": True, "bsdf": inside},
+        "light": {"type": "point", "position": (0, 0, 0), "intensity": 1.0},
+        "sensor": sensor,
+    }
+
+
+@cache
+def mean(sampler: str, count: int) -> float:
+    """Return the mean radiance that a sampler gives, with ``count`` samples per pixel and pass."""
+    register()
+    scene = mi.load_dict(sphere(REFLECTANCE, WIDTH, {"type": sampler, "sample_count": count}))
+    images = [
+        mi.render(scene, spp=count, seed=dr.opaque(mi.UInt32, 7919 * number))
+        for number in range(SAMPLES // count)
+    ]
+    return float(np.mean([np.array(image).mean() for image in images]))
+
+
+CASES = tuple(
+    HardCase(
+        f"{sampler} at {count} samples per pass",
+        "reference",
+        f"Inside a sphere of ρ = {REFLECTANCE} a path takes some ten reflections, and the numbers"
+        " that it takes depend on each other.",
+        BOUND,
+        lambda sampler=sampler, count=count: np.array([mean(sampler, count)]),
+        lambda count=count: np.array([mean(SAMPLER, count)]),
+        lambda: np.array([RADIANCE]),
+    )
+    for sampler, count in STOCK
+)

@@ -1,0 +1,113 @@
+"""The sampler: stratified as it says, and right in the mean however long paths are."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy import stats
+
+from comparisons.case import Request, open_case
+from comparisons.compare import compare
+from comparisons.hard.samplers import sphere
+from reference.scene.sampler import SAMPLER, cells, register, turned
+
+COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)
+
+
+@pytest.fixture
+def make(rgb):
+    """Return a function that makes a sampler, seeded for a number of pixels."""
+    register()
+
+    def seeded(count, pixels, seed=1):
+        sampler = mi.load_dict({"type": SAMPLER, "sample_count": count})
+        sampler.seed(seed, pixels * count)
+        return sampler
+
+    return seeded
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_each_pixel_has_one_sample_in_each_stratum_and_cell(make, count):
+    sampler, pixels = make(count, 50), 50
+    line = np.array(sampler.next_1d()).reshape(pixels, count)
+    x, y = np.array(sampler.next_2d()).reshape(2, pixels, count)
+    for numbers in (line, x, y):
+        assert ((numbers >= 0) & (numbers < 1)).all()
+        # A number beside a border may be rounded over it.
+        strata = np.floor(np.sort(numbers) * count - np.arange(count))
+        assert np.mean(strata == 0) > 0.99
+    columns, rows = cells(count)
+    cell = np.floor(x * columns) + columns * np.floor(y * rows)
+    assert all(len(set(each)) == count for each in cell)
+
+
+@pytest.mark.parametrize("count", [3, 16])
+def test_one_sample_is_uniform_in_all_dimensions_together(make, count):
+    """χ² of the joint strata of the first sample in two dimensions and in a pair, over pixels."""
+    pixels = 20_000 * count
+    sampler = make(count, pixels, seed=5)
+    first = slice(0, None, count)
+    numbers = [np.array(sampler.next_1d())[first] for _ in range(2)]
+    numbers += list(np.array(sampler.next_2d())[:, first])
+    bins = 4
+    joint = np.zeros(pixels, int)
+    for each in numbers:
+        joint = joint * bins + np.minimum((each * bins).astype(int), bins - 1)
+    counts = np.bincount(joint, minlength=bins ** len(numbers))
+    assert stats.chisquare(counts).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("count", [4, 16])
+def test_a_product_of_many_dimensions_has_the_right_mean(make, count):
+    """The mean of the product of 12 numbers 2u is 1; what long paths multiply is no different."""
+    pixels = 400_000 // count
+    sampler = make(count, pixels, seed=9)
+    product = np.ones(pixels * count)
+    for _ in range(12):
+        product *= 0.75 + 0.5 * np.array(sampler.next_1d())
+    means = product.reshape(pixels, count).mean(axis=1)
+    error = means.std(ddof=1) / np.sqrt(pixels)
+    assert abs(means.mean() - 1) < 4 * error
+    assert error < 1e-3
+
+
+@pytest.mark.parametrize("count", [3, 36])
+def test_a_stratum_is_uniform_whatever_the_permutation(rgb, count):
+    """χ² over 4 million hashes; the permutation of 36 alone fails it."""
+    hashes = mi.sample_tea_32(mi.UInt32(3), dr.arange(mi.UInt32, 4_000_000))
+    found = np.array(turned(mi.UInt32(1), count, *hashes, mi.Bool(True)))
+    assert stats.chisquare(np.bincount(found, minlength=count)).pvalue > 1e-4
+
+
+def test_seeds_and_pixels_do_not_share_numbers(make):
+    one, other = (np.array(make(16, 500, seed).next_1d()) for seed in (1, 2))
+    assert len(np.unique(np.concatenate([one, other]))) > 0.99 * 16_000
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.05
+
+
+def test_a_clone_goes_on_with_the_same_numbers_and_a_fork_begins_again(make):
+    sampler = make(16, 10)
+    sampler.next_1d()
+    clone, fork = sampler.clone(), sampler.fork()
+    assert dr.all(clone.next_1d() == sampler.next_1d())
+    fork.seed(1, 160)
+    assert dr.all(fork.next_1d() == make(16, 10).next_1d())
+
+
+@pytest.mark.parametrize(
+    ("reflectance", "spp"), [(0.5, None), (0.8, None), (0.9, None), (0.95, None), (0.9, 64)]
+)
+def test_the_reference_is_right_inside_a_bright_sphere(rgb, reflectance, spp):
+    """L = ρ I / (π (1 − ρ)), by the plan and the samples that ``compare`` uses.
+
+    A bias of 0.3 % fails: it is three standard errors where the samples are fewest.
+    """
+    width = 48 if spp is None else 96
+    case = open_case(sphere(reflectance, width), Request(spp=spp), name="sphere")
+    images = compare(case.source, case.options).images
+    mean, error = images.reference.mean(), images.reference_stderr
+    exact = reflectance / (np.pi * (1 - reflectance))
+    error = np.sqrt((error**2).sum()) / error.size * np.sqrt(3)  # channels are one number
+    assert abs(mean / exact - 1) < 0.003
+    assert abs(mean - exact) < 4 * error
