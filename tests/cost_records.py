@@ -36,6 +36,7 @@ def study(scene="fig-8-9"):
         difference=sum(parts.values()),
         effects=effects,
         error=sum(effects.values()),
+        left=np.zeros(image.shape[:2]),
         reference=image,
         counted=counted,
     )
@@ -101,6 +102,7 @@ def _record(scene):
             "replicates": 4,
             "orders": 0,
         },
+        "closure": {"mean": 0.0123, "low": -0.0145, "high": 0.0391},
         "split": {
             "parts": [part(name, 0.0123 * (place + 1)) for place, name in enumerate(PARTS)],
             "departure": part("departure", 0.0987),

@@ -33,6 +33,7 @@ from tests.schemas import schema
 from tests.test_plan import scene as described
 
 SCHEMA = schema("cost")
+SHARP = {"reference_spp": 64, "replicates": 8, "replicate_spp": 64}
 TINY = Effort(rounds=2, largest=4, depths=(3,), reference_spp=4, replicates=3, replicate_spp=4)
 
 
@@ -80,11 +81,25 @@ def study(request):
     set_variant("llvm_ad_rgb")
 
 
+@pytest.fixture(scope="module", params=["cornell-box", "fig-6-10"])
+def sharp(request):
+    """A study whose prices are sharp, of few pixels."""
+    few = Options(resolution=(32, 32))
+    return cost(SCENES[request.param].source(), few, replace(TINY, **SHARP)).record
+
+
+def test_with_all_effects_nothing_is_left(rgb, sharp):
+    closure = sharp.closure
+    assert closure.low <= 0 <= closure.high or abs(closure.mean) < 0.02
+    assert closure.high - closure.low < 0.1 * sharp.prices.departure
+
+
 def test_prices_add_up_to_the_departure_in_the_mean_and_in_every_pixel(study):
     prices = study.record.prices
     removed = [price.removes.value for price in prices.effects]
-    assert sum(removed) == pytest.approx(prices.departure, abs=1e-9)
-    np.testing.assert_allclose(sum(study.effects.values()), study.error, atol=1e-9)
+    left = study.record.closure.mean
+    assert sum(removed) + left == pytest.approx(prices.departure, abs=1e-9)
+    np.testing.assert_allclose(sum(study.effects.values()) + study.left, study.error, atol=1e-9)
     assert study.error.max() > 1
     assert (study.error[~study.counted] == 0).all()
     added = [price.adds_s.value for price in prices.effects]

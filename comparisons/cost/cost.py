@@ -14,13 +14,14 @@ from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.methods import Methods
 from comparisons.cost.timing import Judge, measure
 from comparisons.effects.lattice import Lattice
+from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
 from comparisons.effects.split import split
 from comparisons.options import Options
 from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import Stream, passes
-from reference.rendering.renderer import Accumulator, Renderer
+from reference.rendering.renderer import Accumulator, Mean, Renderer
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,9 @@ class Study:
     effects
         ``{effect: (H, W)}``: the ΔE2000 that it removes.
     error
-        (H, W): the kernel's ΔE2000, which those of the effects add up to.
+        (H, W): the kernel's ΔE2000, which those of the effects and what is left add up to.
+    left
+        (H, W): the ΔE2000 that is left where all effects are simulated.
     reference
         (H, W, 3).
     counted
@@ -53,6 +56,7 @@ class Study:
     difference: np.ndarray
     effects: dict
     error: np.ndarray
+    left: np.ndarray
     reference: np.ndarray
     counted: np.ndarray
 
@@ -88,14 +92,15 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     ready = prepare(source, replace(options, spp=None))
     width, height = image_size(ready.scene)
     counted = gbuffer(ready.scene, width, height).hit
-    reference = _converged(ready, effort, options.seed, progress)
+    reference, groups = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)
 
     methods = Methods(source, options, ready, effort.depths)
     measured, images = _measured(methods, effort, judge, options.seed, progress)
     lattice = Lattice(options, methods, effort.replicates, effort.replicate_spp, options.seed)
     progress("pricing effects", 0, 1)
-    priced = prices(lattice, judge, options.seed, effort.exact_effects, effort.orders)
+    noiseless = Noiseless(judge, groups)
+    priced = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders)
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
 
@@ -119,6 +124,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         rungs=tuple(Rung(r.name, r.names, r.monte_carlo, r.family) for r in methods.rungs),
         **_compared(measured),
         prices=priced.prices,
+        closure=priced.closure,
         split=Split(tuple(part for part, _ in parts), whole),
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=width * height),
@@ -134,6 +140,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         difference=difference,
         effects=priced.maps,
         error=priced.departure,
+        left=priced.left,
         reference=reference.mean,
         counted=counted,
     )
@@ -160,15 +167,21 @@ def _measured(methods, effort, judge, seed, progress):
 
 
 def _converged(ready, effort, seed, progress):
-    """Render the reference that errors are told against, with seeds that no rung has."""
+    """Render the reference that errors are told against, with seeds that no rung has.
+
+    Returns its :class:`~reference.rendering.renderer.Estimate`, and the means (R, H, W, 3) of its
+    passes in as many groups as there are replicates.
+    """
     renderer = Renderer(
         ready.scene, ready.reference.integrator, effort.reference_spp, "reference image"
     )
-    total = Accumulator()
-    count, stream = ready.plan.passes, Stream.OTHER_SIDE
+    total, groups = Accumulator(), [Mean() for _ in range(effort.replicates)]
+    each = 2 * -(-ready.plan.passes // (2 * len(groups)))
+    count, stream = each * len(groups), Stream.OTHER_SIDE
     for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
         total.add(one.images[0])
-    return total.estimate()
+        groups[one.number % len(groups)].add(one.images[0])
+    return total.estimate(), np.stack([group.mean() for group in groups])
 
 
 def _compared(measured):

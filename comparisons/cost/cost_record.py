@@ -146,6 +146,17 @@ class Price(Record):
     sampling_error: Amount
 
 
+class Closure(Record):
+    """Mean ΔE2000 that is left where all effects are simulated, without noise, and its interval.
+
+    Nothing but a fault can leave anything.
+    """
+
+    mean: float
+    low: float
+    high: float
+
+
 class Prices(Record):
     """The prices of all effects.
 
@@ -154,10 +165,10 @@ class Prices(Record):
     effects
         One :class:`Price` each.
     departure
-        Mean ΔE2000 of the heuristic half, which the prices add up to.
+        Mean ΔE2000 of the heuristic half without noise, which prices and closure add up to.
     floor
-        Mean ΔE2000 of the reference rendered with as many samples: of noise alone. The effect that
-        is added last is charged with it.
+        Mean ΔE2000 of the reference rendered with as many samples: of noise alone. It is taken out
+        of prices and closure.
     kernel_s, reference_s
         Seconds that none of the effects and all of them take.
     spp, replicates, orders
@@ -165,7 +176,7 @@ class Prices(Record):
     """
 
     effects: tuple[Price, ...]
-    departure: Amount
+    departure: float
     floor: Amount
     kernel_s: Positive
     reference_s: Positive
@@ -228,6 +239,7 @@ class Cost(Record, kw_only=True):
     equal_time: tuple[Within, ...]
     equal_error: tuple[Reached, ...]
     prices: Prices
+    closure: Closure
     split: Split
     viewing: Viewing
     pixels: Pixels

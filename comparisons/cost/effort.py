@@ -47,7 +47,7 @@ class Effort:
     largest: int = 64
     depths: tuple[int, ...] = DEPTHS
     reference_spp: int = 64
-    replicates: int = 5
+    replicates: int = 8
     replicate_spp: int = 64
     exact_effects: int = shapley.EXACT_PLAYERS
     orders: int = shapley.ORDERS

@@ -118,6 +118,13 @@ class Lattice:
         kernels = [KERNEL, PLAIN_KERNEL] if POLYGONS in self.effects else []
         return [*kernels, frozenset(effects) - {POLYGONS}]
 
+    @property
+    def grafted(self):
+        """What renders all effects as they are grafted onto the heuristic half, for the closure."""
+        if not self.effects:
+            return KERNEL
+        return frozenset(self.effects) - {POLYGONS}
+
     def _by_variant(self, keys):
         """Group keys by the variant that renders them, equal scenes next to each other."""
         groups = {}

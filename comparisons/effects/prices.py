@@ -3,8 +3,11 @@
 Both depend on what is simulated already: shadows without the light that surfaces send each other
 can look worse than neither. The price is therefore the Shapley value over the effects in which the
 halves differ (:mod:`comparisons.effects.shapley`): the mean over all orders in which they can be
-added. The errors removed add up to the whole departure, in the mean and in every pixel, and the
-times to the difference between reference and kernel.
+added. The errors removed add up to the whole departure but for the closure, in the mean and in
+every pixel, and the times to the difference between reference and kernel. The closure is the error
+that is left where all effects are simulated, which nothing but a fault can leave.
+
+All errors are without the part of noise (:mod:`comparisons.effects.noiseless`).
 """
 
 from dataclasses import dataclass
@@ -12,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons import intervals
-from comparisons.cost.cost_record import Price, Prices
+from comparisons.cost.cost_record import Closure, Price, Prices
 from comparisons.effects import shapley
 
 
@@ -24,45 +27,51 @@ class Priced:
     ----------
     prices
         The means.
+    closure
+        The mean that is left where all effects are simulated.
     maps
         ``{effect: (H, W)}``: the ΔE2000 that each removes.
     departure
-        (H, W): the ΔE2000 of the heuristic half, which the maps add up to.
+        (H, W): the ΔE2000 of the heuristic half, which the maps and what is left add up to.
+    left
+        (H, W): the ΔE2000 that is left where all effects are simulated.
     """
 
     prices: Prices
+    closure: Closure
     maps: dict
     departure: np.ndarray
+    left: np.ndarray
 
 
-def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
+def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
     """Return the effects of a lattice as :class:`Priced`.
 
     Parameters
     ----------
     lattice : comparisons.effects.lattice.Lattice
         The images.
-    judge : comparisons.cost.timing.Judge
+    noiseless : comparisons.effects.noiseless.Noiseless
         What tells their errors.
     seed
         Of the orders drawn where there are many effects.
     exact_effects, orders
         As of :func:`comparisons.effects.shapley.shares`.
     """
+    judge, counted = noiseless.judge, noiseless.judge.counted
     effects, everything = lattice.effects, frozenset(lattice.effects)
     if len(effects) <= exact_effects:
         lattice.render(key for each in shapley.subsets(effects) for key in lattice.needed(each))
+    lattice.render([lattice.grafted])
     errors, seconds = {}, {}
 
     def error(simulated):
-        """Maps (R + 1, N) of ΔE2000: of all replicates, then leaving out each in turn."""
+        """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
-            images = lattice.simulating(simulated).images
-            if simulated == everything:
-                errors[simulated] = np.zeros((lattice.replicates + 1, int(judge.counted.sum())))
-            else:
-                kept = [images.mean(axis=0), *_leaving_one_out(images)]
-                errors[simulated] = np.stack([judge.map(image)[judge.counted] for image in kept])
+            all_of_them = effects and simulated == everything
+            # Not the reference itself: what the edits of the scene leave would not be seen.
+            found = lattice.of(lattice.grafted) if all_of_them else lattice.simulating(simulated)
+            errors[simulated] = noiseless.errors(found.images)
         return errors[simulated]
 
     def time(simulated):
@@ -76,7 +85,7 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
     found, maps = [], {}
     for place, effect in enumerate(effects):
         removed = -shares.values[place]
-        maps[effect.label] = _filled(removed[0], judge.counted)
+        maps[effect.label] = _filled(removed[0], counted)
         others = everything - {effect}
         found.append(
             Price(
@@ -89,10 +98,9 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
             )
         )
     own = lattice.of("reference")
-    departure = judge.map(lattice.simulating(nothing).images.mean(axis=0))
     priced = Prices(
         effects=tuple(found),
-        departure=float(departure[judge.counted].mean()),
+        departure=float(error(nothing)[0].mean()),
         floor=judge.errors(own.images.mean(axis=0))[0],
         kernel_s=float(lattice.of("kernel").seconds.mean()),
         reference_s=float(own.seconds.mean()),
@@ -100,12 +108,10 @@ def prices(lattice, judge, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=s
         replicates=lattice.replicates,
         orders=shares.orders,
     )
-    return Priced(priced, maps, departure if effects else np.zeros_like(departure))
-
-
-def _leaving_one_out(images):
-    total = images.sum(axis=0)
-    return [(total - image) / (len(images) - 1) for image in images]
+    departure, left = (_filled(error(each)[0], counted) for each in (nothing, everything))
+    mean = _jackknife(error(everything).mean(axis=1))
+    closure = Closure(mean=mean.value, low=mean.low, high=mean.high)
+    return Priced(priced, closure, maps, departure, left)
 
 
 def _jackknife(values):

@@ -63,4 +63,6 @@ def _cells(record, names):
 
 
 def _best(record):
-    return max(record.prices.effects, key=lambda price: price.removes.value, default=None)
+    """Return the effect that removes most of those that surely remove something, or None."""
+    sure = [price for price in record.prices.effects if price.removes.low > 0]
+    return max(sure, key=lambda price: price.removes.value, default=None)

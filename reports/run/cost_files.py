@@ -7,7 +7,7 @@ from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.page.scene_view import CostView, EffectMap, picture_name
-from reports.terminal.cost_tables import noise
+from reports.terminal.cost_tables import closure, noise
 
 DIGITS = "0123456789"
 """Of the map of effects in the page: the place of each effect."""
@@ -77,7 +77,7 @@ def view(study, made):
             for name, content in made.items()
             if name.endswith(".png")
         },
-        noise=noise(study.record) if study.record.prices.effects else "",
+        noise=" ".join(each(study.record) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
     )
 

@@ -19,19 +19,27 @@ def lines(record):
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
     if record.prices.effects:
         yield from _section("Price of an effect", _prices(record))
-        yield "removed: Shapley value, the mean over all orders of adding the effects; the sum is"
-        yield f"the departure, ΔE2000 = {record.prices.departure:.4g}."
+        yield "removed: Shapley value, the mean over all orders of adding the effects."
         yield "alone, last: added first, added last."
         yield noise(record)
+        yield closure(record)
     yield from _section("Parts of the departure, linear", _parts(record))
 
 
 def noise(record):
-    """Say how much of the prices is noise."""
-    floor, count = record.prices.floor, len(record.prices.effects)
+    """Say how much noise was taken out of the prices."""
+    return f"Noise alone gives ΔE2000 = {record.prices.floor:.2g}; it was taken out."
+
+
+def closure(record):
+    """Say what prices add up to, and whether what is left is more than its interval."""
+    left, departure = record.closure, record.prices.departure
+    closes = left.low <= 0
+    judged = "they close" if closes else "more than noise: some effect has no price"
     return (
-        f"Noise alone gives ΔE2000 = {floor:.2g}. It is charged to whichever effect comes last:"
-        f" {floor:.2g} of what each removes last, about {floor / count:.2g} of its price."
+        f"With all effects simulated ΔE2000 = {left.mean:.2g} is left ({left.low:.2g} to"
+        f" {left.high:.2g}; {judged}). Prices and what is left add up to the departure,"
+        f" ΔE2000 = {departure:.4g}."
     )
 
 

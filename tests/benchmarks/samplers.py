@@ -1,6 +1,6 @@
 """Samplers and samples per pass: efficiency, and what long paths make of the mean.
 
-Efficiency is 1 / (variance × time): the variance of a pixel over passes, in the mean over the image,
+Efficiency is 1 / (variance × time): the variance of a pixel over passes, in the mean of the image,
 and the median time of a pass. It says nothing of bias, which the second table does: inside a bright
 sphere the mean is known.
 """
