@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reports import cli
 from tests.schemas import schema
 from tests.small_scene import SCENE
 
@@ -155,6 +156,16 @@ def test_plan_prints_a_table_and_json(run):
     assert data["integrator"] == "path"
     assert len(data["effects"]) == 14
     assert all(effect["called_for"] for effect in data["effects"])
+
+
+def test_what_mitsuba_says_is_no_part_of_the_json(monkeypatch, capfd):
+    """As the process prints it: Mitsuba writes past Python."""
+    words = ["fotismos", "plan", "narrow-band-lamp", "--json", "--resolution", "16x16"]
+    monkeypatch.setattr(sys, "argv", words)
+    cli.main()
+    printed, messages = capfd.readouterr()
+    assert json.loads(printed)["effects"]
+    assert "out-of-gamut" in messages
 
 
 def test_plan_verifies(run):

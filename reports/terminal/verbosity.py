@@ -53,3 +53,21 @@ def remark(lines):
     if level() > 0:
         for line in lines:
             click.echo(line, err=True)
+
+
+def divert_mitsuba():
+    """Send Mitsuba's messages to standard error: its own logger writes to standard output."""
+    import mitsuba as mi
+
+    class Messages(mi.Appender):
+        """Standard error as Mitsuba sees it; progress is shown by the command itself."""
+
+        def append(self, level, text):
+            click.echo(text, err=True)
+
+        def log_progress(self, *progress):
+            pass
+
+    logger = mi.logger()
+    logger.clear_appenders()
+    logger.add_appender(Messages())
