@@ -20,18 +20,20 @@ ROOT = Path(__file__).parent.parent
 
 def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
     out = tmp_path / "out"
-    code, printed, messages = run("compare", scene_file, "fig-8-9", "-o", out, "--spp", 4)
+    other = tmp_path / "other.xml"
+    other.write_text(SCENE.replace('value="24"', 'value="32"'), encoding="utf-8")
+    code, printed, messages = run("compare", scene_file, other, "-o", out, "--spp", 4)
     assert (code, messages) == (0, "")
     assert str(out / "index.html") in printed
     published = schema("comparison")
-    for name, scene, size in (("my-scene", "my scene", [24, 16]), ("fig-8-9",) * 2 + ([512, 512],)):
+    for name, scene, size in (("my-scene", "my scene", [24, 16]), ("other",) * 2 + ([32, 16],)):
         record = json.loads((out / name / "comparison.json").read_text(encoding="utf-8"))
         jsonschema.validate(record, published)
         assert record["scene"] == scene
         assert record["resolution"] == size
         assert (out / name / "comparison.exr").stat().st_size > 0
         assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
-    expected = [".fotismos", "fig-8-9", "index.html", "my-scene", "run.json", "tables"]
+    expected = [".fotismos", "index.html", "my-scene", "other", "run.json", "tables"]
     assert sorted(path.name for path in out.iterdir()) == expected
 
 
