@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import mitsuba as mi
 import pytest
 
 from reports import cli
@@ -168,6 +169,8 @@ def test_what_mitsuba_says_is_no_part_of_the_json(monkeypatch, capfd):
     printed, messages = capfd.readouterr()
     assert json.loads(printed)["effects"]
     assert "out-of-gamut" in messages
+    mi.Log(mi.LogLevel.Warn, "after the command")
+    assert "after the command" in capfd.readouterr().out
 
 
 def test_plan_verifies(run):

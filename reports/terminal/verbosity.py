@@ -56,7 +56,10 @@ def remark(lines):
 
 
 def divert_mitsuba():
-    """Send Mitsuba's messages to standard error: its own logger writes to standard output."""
+    """Send Mitsuba's messages to standard error while the command runs.
+
+    Its own logger writes to standard output.
+    """
     import mitsuba as mi
 
     class Messages(mi.Appender):
@@ -68,6 +71,15 @@ def divert_mitsuba():
         def log_progress(self, *progress):
             pass
 
+    def replace(appenders):
+        before = [logger.appender(number) for number in range(logger.appender_count())]
+        logger.clear_appenders()
+        for appender in appenders:
+            logger.add_appender(appender)
+        return before
+
     logger = mi.logger()
-    logger.clear_appenders()
-    logger.add_appender(Messages())
+    before = replace([Messages()])
+    context = click.get_current_context(silent=True)
+    if context is not None:  # a process of a pool has none, and keeps to it
+        context.call_on_close(lambda: replace(before))
