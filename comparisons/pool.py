@@ -203,6 +203,7 @@ def _work(pipe: Any) -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
     os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
     os.setpgid(0, 0)
+    os.dup2(2, 1)  # standard output is for the results of the process that asked
     guard = subprocess.Popen(GUARD, stdin=parent_process().sentinel)  # noqa: F841  lives as long
     if FIRST_VICTIM.exists():
         FIRST_VICTIM.write_text("1000")

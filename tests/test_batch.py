@@ -235,24 +235,26 @@ def _results(out):
     return found
 
 
-def _kill_at_random_moments(folder, tmp_path, kills):
-    """Kill a batch so many times, each time somewhere within what a whole one takes."""
+def _kill(folder, tmp_path, kills, moment):
+    """Kill a batch so many times, and let it end: its results are those of a whole one.
+
+    ``moment(out, seconds)`` returns what tells that it is time; a whole batch takes ``seconds``.
+    """
     begin = time.perf_counter()
     whole = _start(folder, tmp_path / "whole")
     messages = whole.communicate(timeout=300)[1]
     seconds = time.perf_counter() - begin
     assert (whole.returncode, messages) == (0, "")
-    out, random, kept = tmp_path / "killed", Random(kills), {}
+    out, kept = tmp_path / "killed", {}
     for number in range(kills):
         if len(kept) == len(list(folder.iterdir())):
             shutil.rmtree(out)
             kept = {}
-        batch = _start(folder, out)
-        try:
-            batch.communicate(timeout=seconds * (0.2 + random.random()))
-        except subprocess.TimeoutExpired:
-            batch.kill()
-            batch.communicate()
+        batch, is_time = _start(folder, out), moment(out, seconds)
+        while batch.poll() is None and not is_time():
+            time.sleep(0.01)
+        batch.kill()
+        batch.communicate()
         finished = {path: path.read_bytes() for path in out.glob("?/view.json")}
         for path, content in finished.items():
             json.loads(content)
@@ -266,6 +268,7 @@ def _kill_at_random_moments(folder, tmp_path, kills):
     assert _results(out) == _results(tmp_path / "whole")
     wanted, found = (sorted(p.name for p in (tmp_path / n).iterdir()) for n in ("whole", "killed"))
     assert found == wanted
+    return kept
 
 
 @pytest.fixture
@@ -277,13 +280,23 @@ def box_filtered(folder):
     return folder
 
 
-def test_killed_batches_go_on_to_the_results_of_a_whole_one(box_filtered, tmp_path):
-    _kill_at_random_moments(box_filtered, tmp_path, 3)
+def test_a_killed_batch_goes_on_to_the_results_of_a_whole_one(box_filtered, tmp_path):
+    def once_one_is_finished(out, seconds):
+        return (out / "a/view.json").exists
+
+    kept = _kill(box_filtered, tmp_path, 1, once_one_is_finished)
+    assert [path.parent.name for path in kept] == ["a"]
 
 
 @pytest.mark.slow
 def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
-    _kill_at_random_moments(box_filtered, tmp_path, 50)
+    random = Random(50)
+
+    def somewhere_within(out, seconds):
+        end = time.perf_counter() + seconds * (0.2 + random.random())
+        return lambda: time.perf_counter() > end
+
+    _kill(box_filtered, tmp_path, 50, somewhere_within)
 
 
 def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):

@@ -9,8 +9,10 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import mitsuba as mi
 import pytest
 
+from reports import cli
 from tests.schemas import schema
 from tests.small_scene import SCENE
 
@@ -19,18 +21,20 @@ ROOT = Path(__file__).parent.parent
 
 def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
     out = tmp_path / "out"
-    code, printed, messages = run("compare", scene_file, "fig-8-9", "-o", out, "--spp", 4)
+    other = tmp_path / "other.xml"
+    other.write_text(SCENE.replace('value="24"', 'value="32"'), encoding="utf-8")
+    code, printed, messages = run("compare", scene_file, other, "-o", out, "--spp", 4)
     assert (code, messages) == (0, "")
     assert str(out / "index.html") in printed
     published = schema("comparison")
-    for name, scene, size in (("my-scene", "my scene", [24, 16]), ("fig-8-9",) * 2 + ([512, 512],)):
+    for name, scene, size in (("my-scene", "my scene", [24, 16]), ("other",) * 2 + ([32, 16],)):
         record = json.loads((out / name / "comparison.json").read_text(encoding="utf-8"))
         jsonschema.validate(record, published)
         assert record["scene"] == scene
         assert record["resolution"] == size
         assert (out / name / "comparison.exr").stat().st_size > 0
         assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
-    expected = [".fotismos", "fig-8-9", "index.html", "my-scene", "run.json", "tables"]
+    expected = [".fotismos", "index.html", "my-scene", "other", "run.json", "tables"]
     assert sorted(path.name for path in out.iterdir()) == expected
 
 
@@ -155,6 +159,18 @@ def test_plan_prints_a_table_and_json(run):
     assert data["integrator"] == "path"
     assert len(data["effects"]) == 14
     assert all(effect["called_for"] for effect in data["effects"])
+
+
+def test_what_mitsuba_says_is_no_part_of_the_json(monkeypatch, capfd):
+    """As the process prints it: Mitsuba writes past Python."""
+    words = ["fotismos", "plan", "narrow-band-lamp", "--json", "--resolution", "16x16"]
+    monkeypatch.setattr(sys, "argv", words)
+    cli.main()
+    printed, messages = capfd.readouterr()
+    assert json.loads(printed)["effects"]
+    assert "out-of-gamut" in messages
+    mi.Log(mi.LogLevel.Warn, "after the command")
+    assert "after the command" in capfd.readouterr().out
 
 
 def test_plan_verifies(run):

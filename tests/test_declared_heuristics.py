@@ -18,6 +18,7 @@ from heuristic.errors import InputError
 from heuristic.heuristics import BLINN, HEURISTICS, PHONG, Heuristic, Parameter, declare, named
 from heuristic.interpolation import Interpolation
 from heuristic.mesh_shading import shading_points
+from heuristic.plugins import integrator
 from heuristic.points import Point
 from reference.pairing import halves
 from reference.rendering.renderer import Renderer
@@ -285,6 +286,28 @@ def test_what_is_prepared_is_prepared_once_for_a_scene(rgb, declared):
     second = mi.load_dict(given | {"ball": {"type": "sphere", "bsdf": given["sphere"]["bsdf"]}})
     assert np.array(mi.render(second, integrator=first.integrator(), spp=1)).max() == 2
     assert PREPARED == [1, 2]
+
+
+def test_the_materials_of_a_scene_are_found_once(rgb, monkeypatch):
+    """What is clear, two-sided and mapped is asked for in turn, layer by layer."""
+    found = []
+
+    class Counted(integrator.SceneMaterials):
+        def __init__(self, scene, *options):
+            found.append(scene.shapes()[0])
+            super().__init__(scene, *options)
+
+    monkeypatch.setattr(integrator, "SceneMaterials", Counted)
+    glass = {"type": "phong", "k_d": 0.2, "transmittance": 0.5, "twosided": True}
+    given = checks.with_film(scene("phong"), 8, 1)
+    given["pane"] = {"type": "rectangle", "bsdf": glass}
+    made = mi.load_dict(given)
+    for seed in range(2):
+        mi.render(made, spp=1, seed=seed)
+    assert len(found) == 1
+    other = mi.load_dict(given)
+    mi.render(other, integrator=made.integrator(), spp=1)
+    assert len(found) == 2
 
 
 def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):

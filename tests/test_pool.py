@@ -119,6 +119,12 @@ def test_a_task_that_kills_its_process_takes_no_other_along(capfd):
     assert "Traceback" in capfd.readouterr().err
 
 
+def test_what_a_task_prints_is_no_result(capfd):
+    with Pool(1) as pool:
+        do(pool, Task("talking", os.write, (1, b"native code")), Task("python", print, ("words",)))
+    assert capfd.readouterr() == ("", "native codewords\n")
+
+
 def test_an_idle_process_that_died_is_replaced():
     with Pool(1) as pool:
         pid = do(pool, Task("a", process, ()))["a"]

@@ -136,20 +136,21 @@ def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
 
 def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, monkeypatch):
     monkeypatch.setattr(running, "WORTH_A_PROCESS", 1)
-    wanted = study("alpha = [0.1, 0.2, 0.3]\nlight_angle = {from=0, to=85, steps=18}", "lobe", "")
+    wanted = study("alpha = [0.1, 0.3]\nlight_angle = {from=0, to=85, steps=7}", "lobe", "")
     alone = running.run(wanted, tmp_path / "a")
 
     def killing(given):
         for number, done in enumerate(running.processes(2)(given)):
             yield done
             if number == 2:
-                os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
+                for child in multiprocessing.active_children():
+                    os.kill(child.pid, signal.SIGKILL)
 
     with pytest.raises(LostProcessError, match="run the same command again"):
         running.run(wanted, tmp_path / "b", killing)
     outcome = running.run(wanted, tmp_path / "b")
     assert outcome.at_hand >= 3
-    assert outcome.done < 54
+    assert 0 < outcome.done <= 11
     assert outcome.table.equals(alone.table)
 
 
@@ -242,7 +243,7 @@ def pids(client):
 
 
 @pytest.mark.parametrize(
-    ("count", "workers"), [(24, 2), pytest.param(512, 4, marks=pytest.mark.slow)]
+    ("count", "workers"), [(10, 2), pytest.param(512, 4, marks=pytest.mark.slow)]
 )
 def test_killed_workers_change_nothing(count, workers, rgb, tmp_path):
     wanted = study(MANY % count)

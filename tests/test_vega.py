@@ -98,3 +98,24 @@ def test_the_library_is_in_the_page_once_and_only_where_a_chart_is():
 def test_the_library_can_stand_in_a_script_element():
     assert "</script" not in vega.bundle().lower()
     assert "<!--" not in vega.bundle()
+
+
+def test_the_library_is_made_once_for_all_runs(tmp_path, monkeypatch):
+    made = vega._bundled()
+    calls = []
+    monkeypatch.setattr(vega, "_bundled", lambda: calls.append(None) or made)
+
+    def bundle(cache):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+        vega.bundle.cache_clear()
+        return vega.bundle() == made
+
+    assert bundle(tmp_path / "cache")
+    assert bundle(tmp_path / "cache")
+    assert len(calls) == 1
+    (kept,) = (tmp_path / "cache/fotismos").iterdir()
+    kept.write_text(kept.read_text(encoding="utf-8")[:-9], encoding="utf-8")
+    assert bundle(tmp_path / "cache")
+    assert len(calls) == 2
+    (tmp_path / "file").write_text("")
+    assert bundle(tmp_path / "file")  # where nothing can be kept

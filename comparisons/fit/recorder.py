@@ -110,7 +110,7 @@ def _eye(shading):
 
     class Eye(type(shading)):
         def shaded(self, scene, si, view, normal, active):
-            materials = SceneMaterials(scene, prune=False)
+            materials = self.known(scene).materials
             number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
             facing = active & (self.twosided(scene, si, active) | (si.wi.z > 0))
             seen = {

@@ -26,6 +26,7 @@ equal seeds give equal rays. Python::
     {'type': 'heuristic', 'ambient': 1.0}
 """
 
+from dataclasses import dataclass
 from functools import cache
 from operator import is_
 
@@ -44,6 +45,22 @@ LAYERS = 64
 """Surfaces that a camera ray passes at most: a bound for a tower of empty ones."""
 
 
+@dataclass(frozen=True)
+class _Known:
+    """What a rendering needs to know of a scene, and the scene's parts.
+
+    ``prepared`` is what the heuristic prepares for it, None where it prepares nothing.
+    """
+
+    parts: list[mi.Object]
+    materials: SceneMaterials
+    prepared: object
+
+    def is_of(self, parts: list[mi.Object]) -> bool:
+        """Tell whether these are the parts of the scene."""
+        return len(parts) == len(self.parts) and all(map(is_, parts, self.parts))
+
+
 def define():
     """Create the classes for the current variant and register them under one name."""
 
@@ -59,14 +76,14 @@ def define():
                 for known in self.model.parameters
             }
             self.parameters_changed()
-            self._prepared = [], None
+            self._known = None
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
             self.prune = props.get("prune", True)
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
-            self.prepared(scene)  # which a symbolic loop could not do
-            if any(bsdf.is_clear for bsdf in SceneMaterials(scene).bsdfs):
+            materials = self.known(scene).materials  # which a symbolic loop could not make
+            if any(bsdf.is_clear for bsdf in materials.bsdfs):
                 colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
             else:
                 colour, hit, _ = self.layer(scene, ray, active)
@@ -86,7 +103,7 @@ def define():
         def surface_colour(self, scene, si, view, active):
             """Return the value that is seen at what a ray hits: the normal of 6.37 and 6.38."""
             twosided = self.twosided(scene, si, active)
-            normal = SceneMaterials(scene).normal(si, active)
+            normal = self.known(scene).materials.normal(si, active)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             colour = self.shaded(scene, si, view, normal, active)
@@ -99,30 +116,27 @@ def define():
             ambient = self.ambient_at(si, active)
             visible = self.visibility(scene, si, active)
             colour = mi.Spectrum(0)
-            materials = SceneMaterials(scene, self.prune, self.model.form)
-            for material, is_here in materials.at(si, active):
+            for material, is_here in self.known(scene).materials.at(si, active):
                 value = model(si.p, normal, view, material, lights, ambient, visible)
                 colour += dr.select(is_here, value, 0)
             return colour
 
         def model_at(self, scene, si):
             """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
-            prepared = self.prepared(scene)
+            prepared = self.known(scene).prepared
             return lambda *given: self.model.evaluate(
                 Given(*given), si.uv, self.parameters, prepared
             )
 
-        def prepared(self, scene):
-            """Return what the heuristic prepares for a scene."""
-            if self.model.prepare is None:
-                return None
+        def known(self, scene):
+            """Return what is :class:`_Known` of a scene, made once for all that is traced of it."""
             # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
-            known, found = self._prepared
-            if len(parts) != len(known) or not all(map(is_, parts, known)):
-                found = self.model.prepare(scene)
-                self._prepared = parts, found
-            return found
+            if self._known is None or not self._known.is_of(parts):
+                materials = SceneMaterials(scene, self.prune, self.model.form)
+                prepared = self.model.prepare(scene) if self.model.prepare else None
+                self._known = _Known(parts, materials, prepared)
+            return self._known
 
         def lights(self, scene, si, active):
             """Return the kernel's form of the scene's lights."""
@@ -139,7 +153,7 @@ def define():
 
         def twosided(self, scene, si, active):
             """Return whether the surface is two-sided; a plain False where none of the scene is."""
-            return SceneMaterials(scene).twosided(si, active)
+            return self.known(scene).materials.twosided(si, active)
 
         def traverse(self, callback):
             for name, value in {"ambient": self.ambient, **self.parameters}.items():
@@ -178,7 +192,7 @@ def _through_layers(integrator, scene, ray, active):
     while active & (layer < LAYERS):
         seen, hit, si = integrator.layer(scene, ray, active)
         colour += throughput * mi.Spectrum(seen)
-        throughput *= mi.Spectrum(SceneMaterials(scene).transmittance(si, hit))
+        throughput *= mi.Spectrum(integrator.known(scene).materials.transmittance(si, hit))
         hit_any |= hit
         ray = si.spawn_ray(ray.d)
         active = hit & (dr.max(throughput) > 0)

@@ -9,12 +9,16 @@ and names no address, so that nothing is loaded.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from comparisons.store import Entry
 from reports.charts import theme
 
 if TYPE_CHECKING:
@@ -60,10 +64,34 @@ def specification(chart: altair.TopLevelMixin) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def bundle() -> str:
-    """Vega, Vega-Lite and vega-embed as one JavaScript module that leaves `window.vegaEmbed`."""
+    """Vega, Vega-Lite and vega-embed as one JavaScript module that leaves `window.vegaEmbed`.
+
+    It takes two seconds to make, and is kept in the user's cache where there is one.
+    """
+    import vl_convert
+
+    with suppress(OSError, RuntimeError):  # no home, or none that can be written to
+        kept = Entry(_cache() / "vega.json", vl_convert.__version__)
+        found = kept.load()
+        if found is None:
+            found = {"script": _bundled()}
+            kept.path.parent.mkdir(parents=True, exist_ok=True)
+            kept.save(found)
+        return found["script"]
+    return _bundled()
+
+
+@lru_cache(maxsize=1)
+def _bundled() -> str:
     import vl_convert
 
     return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+
+
+def _cache() -> Path:
+    """The folder for what can be made again (XDG Base Directory Specification)."""
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (given if given.is_absolute() else Path.home() / ".cache") / "fotismos"
 
 
 def _inline(svg: str) -> str:

@@ -51,12 +51,11 @@ def pytest_generate_tests(metafunc):
 @pytest.fixture
 def fotismos(request):
     """Departures and baselines of scenes: see :class:`reports.ci.testing.Fotismos`."""
-    import heuristic  # noqa: F401 it tells Dr.Jit where LLVM is
+    from heuristic import backend
     from heuristic.errors import InstallationError
-    from reports.asked import jobs
 
     try:
-        jobs.check_installation()
+        backend.check()
     except InstallationError as error:
         pytest.skip(f"fotismos cannot render here. {error}")
     import mitsuba as mi

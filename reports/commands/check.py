@@ -7,7 +7,7 @@ from click.core import ParameterSource
 
 from comparisons import atomic
 from heuristic.errors import InputError
-from reports.asked import jobs
+from reports import jobs
 from reports.terminal import verbosity
 
 
@@ -66,7 +66,7 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
     _require_consistent(update, scenes, images, given)
-    jobs.check_installation()
+    jobs.make_ready()
     from comparisons.records import to_json
     from reports.ci import annotations, check_record, lines, suite
     from reports.ci.junit import document

@@ -2,7 +2,7 @@
 
 import click
 
-from reports.asked import jobs
+from reports import jobs
 from reports.run import batch
 from reports.terminal import verbosity
 

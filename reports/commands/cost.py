@@ -2,7 +2,7 @@
 
 import click
 
-from reports.asked import jobs
+from reports import jobs
 from reports.terminal import verbosity
 
 
@@ -28,7 +28,7 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.check_installation()
+    jobs.make_ready()
     from comparisons.case import open_case
     from comparisons.cost.cost import Effort, cost
     from comparisons.records import to_json

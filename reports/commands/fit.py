@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from reports.asked import jobs
+from reports import jobs
 from reports.terminal import verbosity
 
 
@@ -55,7 +55,7 @@ def fit(scenes, output, form, as_json, markdown, **words):
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong --intensities
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.check_installation()
+    jobs.make_ready()
     from comparisons import atomic
     from comparisons.case import open_case
     from comparisons.fit.fit import FitOptions, fit

@@ -2,7 +2,7 @@
 
 import click
 
-from reports.asked import jobs
+from reports import jobs
 
 
 @click.command()
@@ -19,7 +19,7 @@ def plan(scene, as_json, verify, **rendering):
       fotismos plan cornell-box
       fotismos plan --verify fig-8-9 --resolution 128x128
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.check_installation()
+    jobs.make_ready()
     from comparisons.case import open_case
     from comparisons.records import to_json
     from reports.terminal import plan_lines, progress

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import click
 
-from reports.asked import jobs
+from reports import jobs
 from reports.run import batch
 from reports.terminal import verbosity
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Cost, Measured, Price
+from comparisons.cost.cost_record import Cost, Measured, Price
+from comparisons.cost.rungs import rungs
 
 
 @dataclass(frozen=True)
@@ -33,10 +32,6 @@ class Row:
 
 def methods(records: Sequence[Cost]) -> tuple[str, ...]:
     """Return the names of all methods of some records, in the order of the ladder."""
-    if not records:
-        return ()
-    from comparisons.cost.rungs import rungs  # of no use to pages without a study of cost
-
     places = {rung.name: place for place, rung in enumerate(rungs())}
     names = dict.fromkeys(name for each in records for rung in each.rungs for name in rung.names)
     # The name of a kernel that another heuristic shades goes on behind a colon.

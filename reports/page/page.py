@@ -30,14 +30,14 @@ from comparisons.departure.spaces import luminance
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
-from reports.page import cost_overview, overview
-from reports.page.hard_cases import GROUPS, grey
+from reports.page import overview
 from reports.page.legends import legends
 from reports.page.scene_view import SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
 
 if TYPE_CHECKING:  # for what few pages show
+    from comparisons.cost.cost_record import Cost
     from comparisons.hard.collection import HardCases
     from comparisons.verification import Verification
     from heuristic.equations import Entry
@@ -102,7 +102,6 @@ def render(
         FailedScene(failure.scene, failure.error, id=overview.identifier(failure.scene, taken))
         for failure in failures
     ]
-    costs = [scene.cost.record for scene in scenes if scene.cost]
     charted = any(scene.histograms or scene.charts for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
     scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
@@ -121,13 +120,26 @@ def render(
             columns=overview.columns(),
             legends=legends(),
             equations=equations,
-            hard_cases=hard_cases,
             verifications=verifications,
-            cost_methods=cost_overview.methods(costs),
-            cost_rows=cost_overview.rows(costs),
+            **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
             run=run,
         )
     )
+
+
+def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[str, Any]:
+    """What few pages show, by modules that the others do without."""
+    shown = {"cost_rows": (), "hard_cases": hard_cases}
+    if costs:
+        from reports.page import cost_overview
+
+        shown["cost_methods"] = cost_overview.methods(costs)
+        shown["cost_rows"] = cost_overview.rows(costs)
+    if hard_cases:
+        from reports.page.hard_cases import GROUPS, grey
+
+        shown |= {"hard_groups": GROUPS, "grey": grey}
+    return shown
 
 
 def _scene(view: SceneView, taken: set[str]) -> Scene:
@@ -212,7 +224,6 @@ def _environment() -> Environment:
         zoom_to=_zoom_to,
         plain=plain,
         uri=_data_uri,
-        grey=grey,
     )
     environment.tests.update(about_noise=about_noise, finite=math.isfinite)
     environment.globals.update(
@@ -223,6 +234,5 @@ def _environment() -> Environment:
         effects_title=theme.EFFECTS_TITLE,
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
-        hard_groups=GROUPS,
     )
     return environment

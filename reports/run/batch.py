@@ -10,7 +10,7 @@ import sys
 
 from comparisons.pool import Pool, Task
 from heuristic.errors import FotismosError
-from reports.asked import jobs
+from reports import jobs
 from reports.run import single
 from reports.run.single import Wanted
 from reports.run.stages import Failure, Run

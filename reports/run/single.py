@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import structs
 
-from reports.asked import jobs
+from reports import jobs
 from reports.run.stages import Stages
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def load():
     InstallationError
         When LLVM cannot be used.
     """
-    jobs.check_installation()
+    jobs.make_ready()
     import comparisons.compare  # noqa: F401  part of start-up
 
 

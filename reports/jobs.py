@@ -10,6 +10,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from heuristic.backend import VARIANTS
+from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from comparisons.case import Request
@@ -119,8 +120,8 @@ def _with(command, *options):
     return command
 
 
-def check_installation():
-    """See that LLVM is usable, before anything compiles.
+def make_ready():
+    """Ensure that LLVM is usable, and keep standard output for results.
 
     Raises
     ------
@@ -130,6 +131,7 @@ def check_installation():
     from heuristic import backend
 
     backend.check()
+    verbosity.divert_mitsuba()
 
 
 def expand(names: Iterable[str]) -> list[str]:

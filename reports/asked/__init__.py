@@ -1,1 +1,0 @@
-"""From the words of a command to scenes and options."""
