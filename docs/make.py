@@ -50,6 +50,7 @@ def main():
     """Make everything."""
     set_variant("llvm_ad_rgb")
     replace("models.md", "equations", equation_table())
+    _guarantees()
     for name, scenes in SHEETS.items():
         pairs = [_images(scene) for scene in scenes]
         _sheet(f"models-{name}.png", scenes, [[p.heuristic for p in pairs],
@@ -121,6 +122,13 @@ def _sheet(name, titles, rows):
     for place, title in zip(axes[0], titles, strict=True):
         place.set_title(title, fontsize=8, pad=3)
     atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
+
+
+def _guarantees():
+    """List what the tests guarantee."""
+    import guarantees  # beside this script
+
+    replace("guarantees.md", "guarantees", guarantees.lines())
 
 
 def _architecture():

@@ -57,6 +57,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.guarantee("checks", "A small change is caught, whatever the seed.")
 @pytest.mark.parametrize("name", CHANGES)
 def test_a_small_change_is_caught_with_another_seed(rgb, name):
     """In the reference, whose noise could hide it; the heuristic half has next to none."""
@@ -122,6 +123,7 @@ def test_an_unchanged_scene_alarms_no_more_than_stated(rgb):
     check_alarms(SCENES["plastic-spheres"].make, (16, 16), 10, (0.05,))
 
 
+@pytest.mark.guarantee("checks", "Checks of an unchanged scene alarm no more often than stated.")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plastic-spheres", "cornell-box"])
 def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):

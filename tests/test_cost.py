@@ -88,12 +88,20 @@ def sharp(request):
     return cost(SCENES[request.param].source(), few, replace(TINY, **SHARP)).record
 
 
+@pytest.mark.guarantee(
+    "prices",
+    "With all effects simulated nothing is left of the departure: the closure's interval holds 0.",
+)
 def test_with_all_effects_nothing_is_left(rgb, sharp):
     closure = sharp.closure
     assert closure.low <= 0 <= closure.high or abs(closure.mean) < 0.02
     assert closure.high - closure.low < 0.1 * sharp.prices.departure
 
 
+@pytest.mark.guarantee(
+    "prices",
+    "Prices and closure add up to the departure, in the mean and in every pixel.",
+)
 def test_prices_add_up_to_the_departure_in_the_mean_and_in_every_pixel(study):
     prices = study.record.prices
     removed = [price.removes.value for price in prices.effects]
@@ -115,6 +123,7 @@ def test_the_departure_is_that_of_the_kernel_rendered_anew(study):
     assert study.error[study.counted].mean() == pytest.approx(error, abs=0.05 * error + noise)
 
 
+@pytest.mark.guarantee("prices", "The parts add up to the departure in every pixel.")
 def test_parts_add_up_to_the_departure_in_every_pixel(study):
     split = study.record.split
     total = sum(part.mean for part in split.parts)

@@ -87,6 +87,10 @@ def _estimate(made, integrator, stream):
     return total.estimate()
 
 
+@pytest.mark.guarantee(
+    "reference",
+    "A light that is found by way of a mirror or glass counts as in Mitsuba's `path`.",
+)
 @pytest.mark.parametrize("light", ["area", "constant", "point"])
 @pytest.mark.parametrize("ball", BALLS)
 def test_a_light_found_by_way_of_a_ball_counts_as_in_mitsubas_path(rgb, ball, light):

@@ -37,6 +37,14 @@ def test_the_index_of_equations_is_that_of_the_docstrings(make):
     assert part_of("models.md", "equations", make) == list(make.equation_table())
 
 
+def test_the_list_of_guarantees_is_that_of_the_tests(make, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    guarantees = importlib.import_module("guarantees")
+    listed = part_of("guarantees.md", "guarantees", make)
+    assert listed == "\n".join(guarantees.lines()).strip().splitlines()
+    assert {each.area for each in guarantees.guarantees()} == set(guarantees.AREAS)
+
+
 def test_the_worked_example_has_been_made(make):
     rows = part_of("reading.md", "example", make)
     assert [row.split(" | ")[-1] for row in rows[2:4]] == ["16 |", "256 |"]

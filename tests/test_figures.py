@@ -46,11 +46,20 @@ def test_all_fifteen_figures_are_there():
     assert [*letters, "fig-8-9", "fig-8-11-n9", "fig-8-11-n3"] == FIGURES
 
 
+@pytest.mark.guarantee(
+    "kernel",
+    "On every figure the kernel is within 1e-5 of the equations in NumPy float64.",
+)
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_kernel_agrees_with_the_oracle_everywhere(rgb, name):
     checks.check_figure(SCENES[name].make())
 
 
+@pytest.mark.guarantee(
+    "kernel",
+    "On every pixel of every figure the kernel and the `phong` plugin under Mitsuba's "
+    "`direct` agree to 1e-5.",
+)
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_kernel_agrees_with_mitsubas_direct_on_every_pixel(rgb, name):
     checks.check_against_direct(SCENES[name].make())

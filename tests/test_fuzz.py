@@ -20,6 +20,10 @@ def test_no_input_gives_a_nan_an_infinity_or_a_large_error(check):
     assert tally.worst <= 1
 
 
+@pytest.mark.guarantee(
+    "kernel",
+    "Of a hundred million random inputs none gives a NaN, an infinity or a large error.",
+)
 @pytest.mark.slow
 @CHECKS
 def test_no_input_of_a_hundred_million_does(check, capsys):

@@ -31,6 +31,10 @@ def test_the_naive_formula_violates_the_bound(outcomes, case):
     assert outcomes[case.name].naive_error > case.bound
 
 
+@pytest.mark.guarantee(
+    "kernel",
+    "Hard cases keep a bound of error that the formula as printed breaks.",
+)
 @ALL
 def test_ours_keeps_the_bound(outcomes, case):
     assert outcomes[case.name].our_error <= case.bound

@@ -134,6 +134,11 @@ def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.guarantee(
+    "runs",
+    "Whatever is written in whatever order, no file that fotismos did not make is replaced "
+    "or removed.",
+)
 @pytest.mark.parametrize("seed", range(8))
 def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
     """Files and folders of both kinds, written and replaced in any order, links included."""

@@ -95,6 +95,10 @@ def monte_carlo_albedo(plastic, size=700, batches=8):
     return found.mean(axis=0), found.std(axis=0, ddof=1) / sqrt(batches)
 
 
+@pytest.mark.guarantee(
+    "pairing",
+    "A matched `roughplastic` has the albedos of its Phong material.",
+)
 @pytest.mark.parametrize("phong", REACHABLE.values(), ids=REACHABLE.keys())
 def test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to(rgb, phong):
     """``k_d`` and ``2 k_s / (n + 2)``, within 5 standard errors of an independent quadrature."""
@@ -313,6 +317,7 @@ def test_emission_of_a_phong_becomes_an_area_light_of_that_radiance(rgb):
 # --- Materials -------------------------------------------------------------------------------
 
 
+@pytest.mark.guarantee("pairing", "Diffuse surfaces pair exactly.")
 def test_diffuse_pairs_exactly(rgb):
     reflectance = {"type": "rgb", "value": (0.1, 0.2, 0.3)}
     props = only(pair_of({"type": "diffuse", "reflectance": reflectance}).heuristic, BSDF)

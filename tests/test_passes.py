@@ -47,6 +47,7 @@ def arrays(result):
     return [images.heuristic, images.reference, images.reference_stderr, *images.maps.values()]
 
 
+@pytest.mark.guarantee("runs", "A run that was killed goes on to the same image, bit for bit.")
 def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
     file = tmp_path / "passes.npz"
     ended = subprocess.run(

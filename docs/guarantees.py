@@ -1,0 +1,84 @@
+"""The list of guarantees, docs/guarantees.md, from the tests that show them.
+
+A test, or a class or parametrised function of tests, states what it shows::
+
+    @pytest.mark.guarantee("marks", "Of images that differ by noise alone …")
+
+Tests are read, not imported.
+"""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+AREAS = {
+    "kernel": "Kernel and plugins",
+    "reference": "Reference",
+    "pairing": "Pairing",
+    "plans": "Plans",
+    "marks": "Marks of significance",
+    "means": "Means and floors",
+    "prices": "Prices and parts",
+    "checks": "Regression checks",
+    "runs": "Runs and files",
+}
+"""Areas of guarantees, in their order, and their headings."""
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """A sentence, and the test that shows it; a slow one is left out of ``./run test``."""
+
+    area: str
+    text: str
+    path: str
+    test: str
+    is_slow: bool
+
+
+def guarantees() -> list[Guarantee]:
+    """Return all guarantees that tests state, by area and file.
+
+    Raises
+    ------
+    ValueError
+        For an area that is not known, or a mark whose words cannot be read.
+    """
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    found = [each for path in files for each in _of_file(path)]
+    places = list(AREAS)
+    return sorted(found, key=lambda each: places.index(each.area))
+
+
+def lines() -> Iterator[str]:
+    """Yield the lines of the page's list."""
+    area = None
+    for each in guarantees():
+        if each.area != area:
+            area = each.area
+            yield from ("", f"## {AREAS[area]}", "")
+        slow = ", `-m slow`" if each.is_slow else ""
+        yield f"- {each.text} ([{each.test}](../{each.path}){slow})"
+
+
+def _of_file(path: Path) -> Iterator[Guarantee]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            continue
+        marks = {_name(mark): mark for mark in node.decorator_list}
+        if "pytest.mark.guarantee" in marks:
+            mark = marks["pytest.mark.guarantee"]
+            area, text = (ast.literal_eval(argument) for argument in mark.args)
+            if area not in AREAS:
+                raise ValueError(f"{path.name}: area {area!r} is none of {', '.join(AREAS)}")
+            is_slow = "pytest.mark.slow" in marks
+            where = path.relative_to(ROOT).as_posix()
+            yield Guarantee(area, text, where, node.name, is_slow)
+
+
+def _name(decorator: ast.expr) -> str:
+    called = decorator.func if isinstance(decorator, ast.Call) else decorator
+    return ast.unparse(called)
