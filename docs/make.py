@@ -1,4 +1,4 @@
-"""Makes what the documentation takes from the code: ``./run docs``.
+"""Makes what the documentation takes from the code: ``./run docs``; ``--all`` measures again, too.
 
 Pictures and tables come from renderings with fixed seeds; the index of equations comes from the
 docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced, the rest is
@@ -6,6 +6,7 @@ written by hand.
 """
 
 import re
+import sys
 from itertools import groupby
 from pathlib import Path
 
@@ -46,9 +47,11 @@ POLYGONS = (
 )
 
 
-def main():
-    """Make everything."""
+def main(words):
+    """Make everything; with ``--all`` what takes long, too."""
     set_variant("llvm_ad_rgb")
+    if words == ["--all"]:
+        _measurements()
     replace("models.md", "equations", equation_table())
     _guarantees()
     for name, scenes in SHEETS.items():
@@ -124,6 +127,16 @@ def _sheet(name, titles, rows):
     atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
 
 
+def _measurements():
+    """Measure again all that documents say of errors and times; it takes half an hour."""
+    import measured  # beside this script
+
+    for measure in (measured.baselines, measured.fits, measured.findings, measured.picture):
+        measure()
+    replace("../README.md", "cost", measured.prices())
+    replace("../README.md", "speed", measured.speed())
+
+
 def _guarantees():
     """List what the tests guarantee."""
     import guarantees  # beside this script
@@ -160,4 +173,4 @@ def _notebook():
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

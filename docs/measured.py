@@ -1,0 +1,156 @@
+"""What documents say of measurements: ``./run docs --all`` measures again, and writes it.
+
+Times are of the machine that it runs on. Nothing else should run beside it.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from comparisons import atomic
+from comparisons.case import Request, open_case
+from comparisons.compare import compare
+from comparisons.cost.cost import cost
+from comparisons.cost.cost_record import Cost, Measured
+from comparisons.departure.metrics import LEADING
+from reports.charts import figures, vega
+from reports.charts.error_over_time import error_over_time
+from reports.files import images
+from reports.terminal.tables import markdown
+from tests.benchmarks import kernel, lights
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+COST_SCENE, PICTURED = "cornell-box", "plastic-spheres"
+ROUNDS = 30
+CHAPTER_8 = (
+    *(f"fig-8-{number}{letter}" for number in (5, 6, 7, 8) for letter in "abc"),
+    "fig-8-9",
+    "fig-8-11-n9",
+    "fig-8-11-n3",
+)
+
+
+def baselines() -> None:
+    """Measure the baselines of the tests again: all of them, not only those that moved."""
+    for file in (ROOT / "tests" / "baselines").glob("*.json"):
+        file.unlink()
+    _run("pytest", "-q", "tests/test_baselines.py", "--fotismos-update")
+
+
+def fits() -> None:
+    """Fit the figures of chapter 8."""
+    _run("reports", "fit", *CHAPTER_8, "--markdown", "docs/fit-figures.md")
+
+
+def findings() -> None:
+    """Study Phong against roughplastic."""
+    _run("reports", "study", "studies/phong-roughplastic.toml", "--findings", "docs/findings.md")
+
+
+def prices() -> Iterator[str]:
+    """Study the cost of accuracy, draw its chart, and yield what the README says of it."""
+    case = open_case(COST_SCENE, Request())
+    record = cost(case.source, case.options).record
+    atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(error_over_time(record)))
+    rung = partial(_points, record)
+    kernel_point, shadows = rung("Phong kernel")[-1], rung("kernel with shadows")[-1]
+    first, *_, last = rung("full plan")
+    worth = {price.effect: price.removes for price in record.prices.effects}
+    by_worth = sorted(worth, key=lambda effect: -worth[effect].value)
+    prices = ", ".join(
+        f"{effect} {worth[effect].value:.2g} ({worth[effect].low:.2g} to {worth[effect].high:.2g})"
+        for effect in by_worth
+    )
+    closure = record.closure
+    yield (
+        f"The textbook's kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
+        f" after {_time(kernel_point)}, and samples do not bring it nearer; the full plan is"
+        f" {first.error:.1f} away after {_time(first)} and {last.error:.1f} after {_time(last)}."
+        f" Shadows alone give the kernel {shadows.error:.1f}, because the light between surfaces"
+        " that would fill them is missing. Over all orders of adding them, the effects remove, of"
+        f" {record.prices.departure:.1f}, with 95 % intervals: {prices}. With all of them"
+        f" {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) is left."
+    )
+
+
+def speed() -> Iterator[str]:
+    """Yield the table of the kernel's speed, and what it says of many lights."""
+    data, many = kernel.run(ROUNDS), lights.run(ROUNDS)
+    times, ratios = data["times"], data["ratios"]
+
+    def row(label: str, name: str, comment: str) -> tuple[str, str, str]:
+        return label, f"{times[name]['median_ms']:.1f} ms", comment
+
+    copies = [name for name in times if name.startswith("memory copy")]
+    fastest = min(copies, key=lambda name: times[name]["median_ms"])
+    yield from markdown(
+        [
+            ("", "Time", "The kernel is"),
+            row("Dr.Jit kernel", "Dr.Jit", ""),
+            row(
+                "memory copy of the bytes that it must read and write",
+                fastest,
+                f"{ratios['memory copy']:.1f} times that",
+            ),
+            row(
+                "Numba, parallel, three lights unrolled",
+                "Numba, three lights",
+                f"{ratios['Numba, three lights']:.1f} times as fast",
+            ),
+            row(
+                "Numba, parallel, any number of lights",
+                "Numba",
+                f"{ratios['Numba']:.0f} times as fast",
+            ),
+            row("NumPy", "NumPy", f"{ratios['NumPy']:.0f} times as fast"),
+        ],
+        right=0,
+    )
+    each = [row["ns_per_light_and_point"] for row in many if row["lights"] >= 1_000]
+    unrolled = np.median([row["unrolled_ns"] for row in many])
+    yield ""
+    yield (
+        f"With many lights it takes {min(each):.2f} to {max(each):.2f} ns per light and point from"
+        f" 1,000 to 10,000 lights, where eight lights unrolled take {unrolled:.2f} ns; compile time"
+        f" stays under {max(row['compile_s'] for row in many):.1g} s."
+    )
+
+
+def picture() -> None:
+    """Draw both halves of a scene and ΔE2000, for the head of the README."""
+    case = open_case(PICTURED, Request(resolution=(512, 300), spp=1024))
+    found = compare(case.source, case.options).images
+    shown = (images.tonemap(found.heuristic), images.tonemap(found.reference))
+    columns, inch = 3, found.counted.shape[1] / 100
+    height = found.counted.shape[0] / 100
+    figure = Figure(figsize=(columns * inch, height))
+    axes = figure.subplots(1, columns)
+    figure.subplots_adjust(0, 0, 1, 1, wspace=0.02)
+    for place, image in zip(axes, shown, strict=False):
+        place.imshow(image, interpolation="none")
+    axes[-1].imshow(found.maps[LEADING.name], cmap="magma", vmin=0, vmax=20, interpolation="none")
+    for place in axes:
+        place.axis("off")
+    atomic.write(DOCS / "plastic-spheres.png", figures.drawn(figure, "png", 100))
+
+
+def _points(record: Cost, name: str) -> tuple[Measured, ...]:
+    """Return the points of a method, also where a scene cannot tell it from another."""
+    (rung,) = [rung.name for rung in record.rungs if name in rung.names]
+    return record.points_of(rung)
+
+
+def _time(point: Measured) -> str:
+    return f"{1e3 * point.seconds.median:.0f} ms"
+
+
+def _run(module: str, *words: str) -> None:
+    subprocess.run([sys.executable, "-P", "-m", module, *words], cwd=ROOT, check=True)
