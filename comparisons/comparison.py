@@ -51,10 +51,33 @@ class Simulation(Record):
     sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
 
 
+class GuardRecord(Record):
+    """What a probe of everything found, beside a plan that leaves something out.
+
+    Attributes
+    ----------
+    state
+        Where it disagreed, everything was simulated; it is not needed where nothing is left out.
+    rays
+        Camera rays that were followed both ways.
+    departure, error
+        Mean of the plan less that of everything, as a share of it, and its standard error.
+    seconds
+        Time of the probe, which is in no other time.
+    """
+
+    state: Literal["agreed", "disagreed", "not needed"]
+    rays: Count
+    departure: float
+    error: Amount
+    seconds: Amount
+
+
 class PlanRecord(Simulation, kw_only=True):
     """Which effects the scene calls for, and what was simulated."""
 
     effects: tuple[Decision, ...]
+    guard: GuardRecord | None = None
 
 
 class Significant(Record):

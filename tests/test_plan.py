@@ -13,6 +13,7 @@ from reference.effects.bsdf_forms import TRANSMISSION
 from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.facts import examine
 from reference.planning.plan import wants_spectra
+from reference.planning.premises import Pruning, Ruling
 from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
 
@@ -181,10 +182,7 @@ def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr("reference.effects.obstacles.occlusion", lambda structure: (False, "wrong"))
-    monkeypatch.setattr(
-        "reference.effects.obstacles.interreflection", lambda structure: (False, "wrong")
-    )
+    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
     assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
 
@@ -198,7 +196,7 @@ def facts(parts):
 @pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (-0.1, True), (1e-3, False)])
 def test_a_dent_makes_a_mesh_concave_and_a_tip_does_not(rgb, tmp_path, depth, convex):
     thing = mesh(*dented_octahedron(depth), tmp_path / "thing.ply")
-    assert facts({"thing": thing})["thing"].convex is convex
+    assert facts({"thing": thing})["thing"].is_convex is convex
 
 
 def test_which_shapes_are_convex(rgb, tmp_path):
@@ -211,7 +209,7 @@ def test_which_shapes_are_convex(rgb, tmp_path):
             "tube": {"type": "cylinder", "bsdf": WHITE},
         }
     )
-    convex = {name: shape.convex for name, shape in found.items()}
+    convex = {name: shape.is_convex for name, shape in found.items()}
     assert convex == {"ball": True, "floor": True, "cube": True, "bowl": False, "tube": False}
     assert found["floor"].plane is not None
     assert not found["floor"].may_face(found["floor"])

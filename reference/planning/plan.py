@@ -35,7 +35,8 @@ from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
-from reference.planning.facts import BSDF, EMITTER, Facts, examine
+from reference.planning.facts import BSDF, Facts, examine
+from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.direct import RR_DEPTH
 from reference.scene.graph import Graph
 
@@ -124,10 +125,13 @@ class Plan:
             bsdf_samples=1,
         )
 
-    def unpruned(self) -> "Plan":
-        """Return the plan that prunes nothing: what a user gets without thinking."""
+    def unpruned(self, rule: str = "asked", evidence: str = "--everything") -> "Plan":
+        """Return the plan that prunes nothing: what a user gets without thinking.
+
+        ``rule`` and ``evidence`` say why, in the place of those of each effect.
+        """
         return Plan(
-            decisions=tuple(Decision(effect, True, "asked", "--everything") for effect in EFFECTS),
+            decisions=tuple(Decision(effect, True, rule, evidence) for effect in EFFECTS),
             kernel_terms=COEFFICIENTS,
             integrator=self.stock_integrator,
             max_depth=self.scene_depth,
@@ -191,7 +195,7 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         if len(exact) > 1 and _diffuse(graph):
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
-    tabulated = not stock.calls_for(OCCLUSION) and _can_tabulate(graph)
+    tabulated = TABULATED_ENVIRONMENT.judge(facts).holds
     is_random = mi.is_spectral or any(
         not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
         for light in facts.structure.lights
@@ -239,12 +243,3 @@ def wants_spectra(graph: Graph) -> bool:
 
 def _diffuse(graph: Graph) -> bool:
     return all(graph.plugin(index) in ("diffuse", "twosided") for index in graph.nodes(BSDF))
-
-
-def _can_tabulate(graph: Graph) -> bool:
-    """Tell whether the environment can be tabulated: one plain BSDF, one constant light, RGB."""
-    shapes = graph.nodes(mi.ObjectType.Shape)
-    kinds = [lights.of(graph.plugin(index)) for index in graph.nodes(EMITTER)]
-    extended = [kind.uniform for kind in kinds if not kind.exact]
-    textures = graph.nodes(mi.ObjectType.Texture)
-    return len(shapes) == 1 and extended == [True] and not textures and mi.is_rgb
