@@ -34,6 +34,27 @@ class Decision(Record):
     rule: str
 
 
+class RuleRecord(Record):
+    """A rule of pruning, and whether it applies.
+
+    Attributes
+    ----------
+    name
+        What is done where it applies.
+    applies
+        Whether all its premises are known to hold.
+    premise
+        The first that is not; empty where it applies.
+    evidence
+        What is not there, or what speaks against the premise.
+    """
+
+    name: str
+    applies: bool
+    premise: str
+    evidence: str
+
+
 class Simulation(Record):
     """What is simulated of a scene, and with how many samples."""
 
@@ -49,6 +70,7 @@ class Simulation(Record):
     spp: Annotated[Size, Meta(description="Samples per pixel, over all passes.")]
     passes: Size
     sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
+    rules: tuple[RuleRecord, ...] = ()
 
 
 class GuardRecord(Record):

@@ -19,6 +19,7 @@ from comparisons.comparison import (
     Override,
     Pairing,
     PlanRecord,
+    RuleRecord,
     Times,
     Unrepresentable,
 )
@@ -139,7 +140,17 @@ def simulation(plan, spp, passes):
         "spp": spp,
         "passes": passes,
         "sampler": plan.sampler,
+        "rules": tuple(_ruling(ruling) for ruling in plan.rulings),
     }
+
+
+def _ruling(ruling):
+    return RuleRecord(
+        name=ruling.rule.name,
+        applies=ruling.holds,
+        premise="" if ruling.holds else ruling.failed.sentence,
+        evidence=ruling.words,
+    )
 
 
 def plan_record(ready, passes):

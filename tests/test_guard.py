@@ -109,18 +109,25 @@ def fireflies(rng, count):
 @pytest.mark.parametrize("noise", [normal, fireflies])
 def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
     pretending(monkeypatch, noise)
-    assert rate(pruned, 2**22, 1000) <= 0.001
+    assert rate(pruned, 2**20, 100) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [normal, fireflies])
+def test_noise_alone_raises_one_alarm_in_a_thousand_at_most(pruned, monkeypatch, noise):
+    pretending(monkeypatch, noise)
+    assert rate(pruned, 2**20, 10_000) <= 0.001
 
 
 @pytest.mark.parametrize(("departure", "caught"), [(0.0, 0.0), (0.2, 1.0)])
 def test_a_fifth_of_the_light_is_seen_through_noise(pruned, monkeypatch, departure, caught):
-    """Noise of each ray three times the light, at the fewest rays."""
+    """Noise of each ray as large as the light, at the fewest rays."""
 
     def draw(rng, count):
-        return 1 - departure + 3 * rng.normal(size=count), 1 + 3 * rng.normal(size=count)
+        return 1 - departure + rng.normal(size=count), 1 + rng.normal(size=count)
 
     pretending(monkeypatch, draw)
-    assert rate(pruned, 1, 100) == caught
+    assert rate(pruned, 1, 40) == caught
 
 
 def test_the_rays_are_a_share_of_the_samples_within_limits(pruned, monkeypatch):

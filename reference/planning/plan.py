@@ -31,11 +31,17 @@ from heuristic.interpolation import Interpolation
 from heuristic.plugins.phong import COEFFICIENTS
 from reference.effects import EFFECTS
 from reference.effects.effect import Decision, Effect
-from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
+from reference.effects.obstacles import (
+    INTERREFLECTION,
+    NO_SECOND_REFLECTION,
+    NO_SHADOWS,
+    OCCLUSION,
+)
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
 from reference.planning.facts import BSDF, Facts, examine
+from reference.planning.premises import Ruling
 from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.direct import RR_DEPTH
 from reference.scene.graph import Graph
@@ -69,6 +75,8 @@ class Plan:
         Of ``path``: where Russian roulette begins to end paths.
     shadows, bsdf_samples, tabulate_environment
         Parameters of ``direct_all``.
+    rulings
+        Of :data:`RULES`: whether each applies, and if not, which premise failed.
     """
 
     decisions: tuple[Decision, ...]
@@ -84,6 +92,7 @@ class Plan:
     shadows: bool = True
     bsdf_samples: int = 1
     tabulate_environment: bool = False
+    rulings: tuple[Ruling, ...] = ()
 
     def calls_for(self, effect: Effect) -> bool:
         """Tell whether an effect is called for."""
@@ -141,6 +150,9 @@ class Plan:
         )
 
 
+RULES = (NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
+"""The rules of pruning."""
+
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 DETERMINISTIC_PASSES = 4
 
@@ -187,6 +199,7 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         stock_integrator=_stock(pair),
         scene_depth=pair.max_depth,
         rr_depth=pair.rr_depth or RR_DEPTH,
+        rulings=tuple(rule.judge(facts) for rule in RULES),
     )
     if pair.media or facts.is_clear or 0 <= pair.max_depth < 2:
         return stock
@@ -195,7 +208,7 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         if len(exact) > 1 and _diffuse(graph):
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
-    tabulated = TABULATED_ENVIRONMENT.judge(facts).holds
+    tabulated = next(r.holds for r in stock.rulings if r.rule is TABULATED_ENVIRONMENT)
     is_random = mi.is_spectral or any(
         not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
         for light in facts.structure.lights

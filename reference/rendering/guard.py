@@ -192,7 +192,6 @@ def _followed(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[in
     wavelength = sampler.next_1d() if mi.is_spectral else mi.Float(0.5)
     film, lens = sampler.next_2d(), sampler.next_2d()
     ray, weight = sensor.sample_ray_differential(sensor.shutter_open(), wavelength, film, lens)
-    dr.eval(ray, weight)
     found = []
     for integrator in integrators:
         sampler.seed(dr.opaque(mi.UInt32, next(seeds)), count)

@@ -54,6 +54,10 @@ def report(scene, ready, variant):
 def lines(plan):
     """Yield the lines of a plan: the table of effects, then what will be simulated."""
     yield from printed(_effects(plan))
+    yield ""
+    if plan.rules:
+        yield from printed(_rules(plan))
+        yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     rays = "" if plan.shadows else ", no shadow rays"
     rays += ", environment from a table" if plan.tabulated_environment else ""
@@ -78,6 +82,12 @@ def _effects(plan):
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost
+
+
+def _rules(plan):
+    yield "rule of pruning", "applies", "premise that is not known to hold", "evidence"
+    for rule in plan.rules:
+        yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
 
 
 def _verifications(results):
