@@ -37,6 +37,10 @@ def test_the_index_of_equations_is_that_of_the_docstrings(make):
     assert part_of("models.md", "equations", make) == list(make.equation_table())
 
 
+def test_the_rules_of_pruning_are_those_of_the_code(make):
+    assert part_of("plans.md", "rules", make) == list(make.rules())
+
+
 def test_the_worked_example_has_been_made(make):
     rows = part_of("reading.md", "example", make)
     assert [row.split(" | ")[-1] for row in rows[2:4]] == ["16 |", "256 |"]

@@ -73,6 +73,22 @@ def test_it_probes_in_other_variants(variant, monkeypatch):
     assert guarded(Source("wrong", inside)).guard.state is Verdict.DISAGREED
 
 
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        {"type": "radiancemeter", "origin": (0, -4, 0), "direction": (0, 1, 0)},
+        {"type": "distant", "direction": (0, 1, 0), "target": (0, 0, 0)},
+    ],
+    ids=lambda sensor: sensor["type"],
+)
+def test_it_probes_cameras_of_a_single_ray(rgb, sensor):
+    film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
+    description = scene(ball=sphere(), light=lamp((0, -3, 0)))
+    description["sensor"] = sensor | {"film": film}
+    found = guarded(Source("ray", description)).guard
+    assert (found.state, found.departure) == (Verdict.AGREED, pytest.approx(0, abs=1e-5))
+
+
 def pretending(monkeypatch, draw):
     """Let the probe's rays return what ``draw(rng, count)`` does: two arrays."""
     rng = np.random.default_rng(7)

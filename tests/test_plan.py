@@ -159,7 +159,7 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
         assert ready.plan.integrator == "direct_all"
     else:
         assert ready.plan.calls_for(OCCLUSION) or ready.plan.calls_for(INTERREFLECTION)
-    result = verify(source, Options(spp=512))
+    result = verify(source, Options(spp=512), steps=False)
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
@@ -175,7 +175,7 @@ def test_nothing_is_pruned_where_light_may_come_through_glass(rgb):
 @pytest.mark.parametrize("name", [name for name in SCENES if "lamp" not in name])
 def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
     mi.set_variant(SCENES[name].variant)
-    result = verify(SCENES[name].source(), Options(resolution=(48, 48)))
+    result = verify(SCENES[name].source(), Options(resolution=(48, 48)), steps=False)
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
@@ -184,7 +184,7 @@ def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
     monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
+    assert verify(Source("wrong", scene(**parts)), Options(spp=512), steps=False).significant > 0
 
 
 def facts(parts):
@@ -238,6 +238,11 @@ def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled
     result = verify(source, Options(spp=512))
     assert result.significant == 0
     assert result.gain > 2
+    *steps, whole = result.factors
+    assert [step.name for step in steps] == ["sampler", "integrator", "pruning"]
+    assert np.prod([step.value for step in steps]) == pytest.approx(whole.value) == result.gain
+    assert all(step.low <= step.value <= step.high for step in result.factors)
+    assert steps[2].low == steps[2].high == 1  # its plan leaves nothing out
     glossy = parts | {"ball": ball(bsdf={"type": "roughplastic"})}
     assert prepare(Source("glossy", scene(**glossy))).plan.integrator == "path"
 

@@ -17,9 +17,9 @@ participating media                     ``volpath``, or ``volpathmis`` where the
                                         or its extinction has a colour
 ======================================  ===========================================================
 
-All take the sampler of least noise for its time. Where no light needs random numbers, only the
-pixel filter is left to sample; the same samples are then better in few passes of many, within which
-they are stratified, and four passes are enough to see what noise is left.
+All take the sampler of least noise for its time. Where no light and no lens needs random numbers,
+only the pixel filter is left to sample; the same samples are then better in few passes of many,
+within which they are stratified, and four passes are enough to see what noise is left.
 """
 
 from collections.abc import Collection
@@ -209,9 +209,14 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
     tabulated = next(r.holds for r in stock.rulings if r.rule is TABULATED_ENVIRONMENT)
-    is_random = mi.is_spectral or any(
-        not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
-        for light in facts.structure.lights
+    has_lens = facts.structure.camera.plugin not in ("perspective", "orthographic")
+    is_random = (
+        has_lens
+        or mi.is_spectral
+        or any(
+            not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
+            for light in facts.structure.lights
+        )
     )
     return replace(
         stock.directly(),

@@ -60,7 +60,7 @@ def _lit_twice(facts: Facts) -> str | None:
 
 TABULATED_ENVIRONMENT = Pruning(
     name="environment from a table",
-    absent="the albedo for the view direction's cosine is all that the environment makes of it",
+    absent="noise: what is reflected of the environment is its radiance times an albedo",
     proof="Where nothing is hidden, a surface point receives the radiance L from all directions of"
     " the half space that it is seen from. It reflects L times the albedo of its BSDF for the view"
     " direction, which for an isotropic BSDF that is the same everywhere is a function of the"

@@ -199,4 +199,5 @@ def _followed(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[in
         value = dr.mean(mi.unpolarized_spectrum(radiance * weight))
         found.append(dr.select(dr.isfinite(value), value, 0))
     dr.eval(found)
-    return np.array([np.array(value, float) for value in found])
+    # A camera of a single ray, and no other random number, give one value for all.
+    return np.array([np.broadcast_to(np.array(value, float), count) for value in found])
