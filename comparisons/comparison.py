@@ -27,7 +27,15 @@ Depth = Annotated[
 
 
 class Decision(Record):
-    """Whether a scene calls for an effect, and why: a structural proof or a measurement."""
+    """Whether a scene calls for an effect, and why.
+
+    Attributes
+    ----------
+    rule
+        Of what kind the reason is, and the reason: ``structural`` follows from what the scene is
+        made of, ``simulated`` means that a premise of leaving it out is not known to hold,
+        ``asked`` that pruning is switched off, ``guard`` that a probe disagreed with the plan.
+    """
 
     name: str
     called_for: bool

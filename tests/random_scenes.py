@@ -3,8 +3,8 @@
 A scene follows from its seed alone. A scene is rendered by the plan's reference and by the
 integrator that the scene asks for, with Mitsuba's independent sampler. Where both are the same
 integrator, to the same depth, there is nothing to compare. A plan is wrong if a mean of
-the image is off by more than a percent and by more than four standard errors, and if it still is
-with 16 times the samples.
+the image is off by more than a percent and by more than four standard errors, with 16 times the
+samples if a first look finds 2.5 of them.
 
     python -m tests.random_scenes FIRST COUNT [VARIANT]
 
@@ -30,6 +30,9 @@ from reference.scene.source import Source
 
 SIZE, PASSES, SPP = 16, 8, 64
 TOLERANCE, ERRORS, MORE = 0.01, 4.0, 16
+DOUBT = 2.5
+"""Standard errors from which on a scene is rendered again with more samples."""
+
 BOTH = 4
 """Of so many scenes the heuristic half is rendered too: it has to be finite and not negative."""
 
@@ -275,7 +278,8 @@ def examine(seed, folder):
     if seed % BOTH == 0 and not _is_sound(np.array(ready.heuristic.render(seed))):
         return Examined(seed, f"{word}, the heuristic half", "not finite or negative")
     found = _judged(seed, word, ready, stock, SPP)
-    return _judged(seed, word, ready, stock, MORE * SPP) if found.state == "wrong" else found
+    doubtful = abs(found.departure) > TOLERANCE and found.errors > DOUBT
+    return _judged(seed, word, ready, stock, MORE * SPP) if doubtful else found
 
 
 def _judged(seed, word, ready, stock, spp):

@@ -18,7 +18,7 @@ DEPARTURES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 NOISES = (0.1, 1.0, 3.0, 10.0)
 SAMPLES = (2**18, 2**22, 2**26)
 RARE = (1e-2, 1e-3, 1e-4)
-SCENES = 200
+SCENES = 60
 """Random scenes, each at :data:`SEEDS` seeds."""
 
 SEEDS = 5
