@@ -45,10 +45,10 @@ def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):
     assert abs(planned - stock) < 0.002 * stock + 5 * np.hypot(error, other) + 1e-6
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_with_every_premise_taken_for_true_it_is_wrong(rgb, name, monkeypatch):
+def test_with_every_premise_taken_for_true_it_is_wrong(rgb, monkeypatch):
+    """The anisotropic one by a percent; the others by so much that the guard finds them."""
     prune_blindly(monkeypatch)
-    (planned, error), (stock, other) = means(SCENES[name]())
+    (planned, error), (stock, other) = means(SCENES["an anisotropic sphere"]())
     assert abs(planned - stock) > 0.005 * stock + 5 * np.hypot(error, other)
 
 
