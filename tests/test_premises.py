@@ -8,6 +8,7 @@ from comparisons.compare import prepare
 from comparisons.options import Options
 from reference.effects.obstacles import NO_SECOND_REFLECTION, NO_SHADOWS
 from reference.planning.facts import Facts, examine
+from reference.planning.light_by_light import LIGHT_BY_LIGHT
 from reference.planning.premises import (
     CONVEX,
     NO_MEDIUM,
@@ -168,6 +169,20 @@ def test_a_table_over_cosines_is_for_isotropic_even_surfaces(rgb, plugin, more, 
     ball = sphere(bsdf={"type": plugin, **more})
     facts = facts_of(scene(ball=ball, sky={"type": "constant"}))
     assert TABULATED_ENVIRONMENT.judge(facts).holds is holds
+
+
+def test_a_lamp_that_is_seen_from_inside_is_left_to_mitsuba(rgb):
+    """Its own integrators do not agree there on how much light it sends to itself."""
+    ball = sphere(TWO_SIDED, emitter={"type": "area", "radiance": 1.0})
+    inside = scene((0, 0, 0), (0, 1, 0), "direct", ball=ball)
+    ruling = LIGHT_BY_LIGHT.judge(facts_of(inside))
+    assert (ruling.holds, ruling.evidence) == (False, "ball: shines, and may be seen from inside")
+    assert LIGHT_BY_LIGHT.judge(facts_of(scene(ball=ball))).holds
+    images = []
+    for settings in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
+        stock = mi.load_dict(inside | {"integrator": {"type": "direct", **settings}})
+        images.append(np.array(mi.render(stock, spp=16)).mean())
+    assert abs(images[0] - images[1]) > 0.01
 
 
 def test_two_sides_of_two_kinds_have_no_table(rgb):

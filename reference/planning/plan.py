@@ -41,7 +41,8 @@ from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
 from reference.planning.facts import BSDF, Facts, examine
-from reference.planning.premises import Ruling
+from reference.planning.light_by_light import LIGHT_BY_LIGHT
+from reference.planning.premises import Pruning, Ruling
 from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.direct import RR_DEPTH
 from reference.scene.graph import Graph
@@ -150,7 +151,7 @@ class Plan:
         )
 
 
-RULES = (NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
+RULES = (LIGHT_BY_LIGHT, NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
 """The rules of pruning."""
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
@@ -201,14 +202,14 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         rr_depth=pair.rr_depth or RR_DEPTH,
         rulings=tuple(rule.judge(facts) for rule in RULES),
     )
-    if pair.media or facts.is_clear or 0 <= pair.max_depth < 2:
+    if not _holds(stock, LIGHT_BY_LIGHT):
         return stock
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
         exact = [light for light in facts.structure.lights if lights.of(light.kind).exact]
         if len(exact) > 1 and _diffuse(graph):
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
-    tabulated = next(r.holds for r in stock.rulings if r.rule is TABULATED_ENVIRONMENT)
+    tabulated = _holds(stock, TABULATED_ENVIRONMENT)
     has_lens = facts.structure.camera.plugin not in ("perspective", "orthographic")
     is_random = (
         has_lens
@@ -224,6 +225,10 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         passes=PASSES if is_random else DETERMINISTIC_PASSES,
         tabulate_environment=tabulated,
     )
+
+
+def _holds(made: Plan, rule: Pruning) -> bool:
+    return next(ruling.holds for ruling in made.rulings if ruling.rule is rule)
 
 
 def _stock(pair: Pair) -> str:
