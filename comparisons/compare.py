@@ -2,7 +2,7 @@
 
 import gc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import mitsuba as mi
@@ -25,6 +25,7 @@ from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.guard import Guard, Verdict, examine_plan
 from reference.rendering.renderer import Renderer, physical_integrator, variant
 from reference.scene.sampler import with_sampler
 
@@ -51,6 +52,7 @@ class Prepared:
     reference: Renderer
     passes: int
     planning_seconds: float
+    guard: Guard | None = None
 
 
 def prepare(source, options=None):
@@ -80,6 +82,23 @@ def prepare(source, options=None):
         passes=planned.passes,
         planning_seconds=planning,
     )
+
+
+def guarded(source, options=None):
+    """Prepare a scene as :func:`prepare` does, and probe it before anything relies on its plan.
+
+    Where the probe disagrees with the plan, everything is simulated.
+    """
+    options = options or Options()
+    ready = prepare(source, options)
+    width, height = image_size(ready.scene)
+    samples = ready.reference.spp * ready.passes * width * height
+    hidden = ready.pair.hide_emitters
+    found = examine_plan(ready.plan, ready.scene, hidden, samples, options.seed)
+    if found.state is not Verdict.DISAGREED:
+        return replace(ready, guard=found)
+    whole = prepare(source, replace(options, everything=True))
+    return replace(whole, plan=whole.plan.unpruned("guard", found.words), guard=found)
 
 
 def compare(source, options=None, progress=None, command="", kept=None):
@@ -112,10 +131,10 @@ def compare(source, options=None, progress=None, command="", kept=None):
     """
     options = options or Options()
     stages = _Stages()
-    ready = prepare(source, options)
+    ready = guarded(source, options)
     heuristic, reference = ready.heuristic, ready.reference
-    stages.done("scene and pairing", ready.planning_seconds)
-    stages.seconds["planning"] = ready.planning_seconds
+    stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
+    stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
     width, height = image_size(ready.scene)
     surface = gbuffer(ready.scene, width, height)
     stages.done("geometry")
@@ -140,7 +159,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         interpolation=options.interpolation.value,
         seed=options.seed,
         resolution=(width, height),
-        plan=record.plan_record(ready.plan, reference.spp * estimates.passes, estimates.passes),
+        plan=record.plan_record(ready, estimates.passes),
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
         limits=faults.counts(),
@@ -155,7 +174,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
         unrepresentable=record.unrepresentable(ready.pair),
         integrator_given=ready.pair.integrator,
         overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
-        warnings=tuple(ready.pair.warnings),
+        warnings=(*ready.pair.warnings, *record.guard_warnings(ready.guard)),
         versions=record.versions(),
         command=command,
         noise_target=estimates.stop,

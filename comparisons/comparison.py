@@ -27,11 +27,40 @@ Depth = Annotated[
 
 
 class Decision(Record):
-    """Whether a scene calls for an effect, and why: a structural proof or a measurement."""
+    """Whether a scene calls for an effect, and why.
+
+    Attributes
+    ----------
+    rule
+        Of what kind the reason is, and the reason: ``structural`` follows from what the scene is
+        made of, ``simulated`` means that a premise of leaving it out is not known to hold,
+        ``asked`` that pruning is switched off, ``guard`` that a probe disagreed with the plan.
+    """
 
     name: str
     called_for: bool
     rule: str
+
+
+class RuleRecord(Record):
+    """A rule of pruning, and whether it applies.
+
+    Attributes
+    ----------
+    name
+        What is done where it applies.
+    applies
+        Whether all its premises are known to hold.
+    premise
+        The first that is not; empty where it applies.
+    evidence
+        What is not there, or what speaks against the premise.
+    """
+
+    name: str
+    applies: bool
+    premise: str
+    evidence: str
 
 
 class Simulation(Record):
@@ -49,12 +78,36 @@ class Simulation(Record):
     spp: Annotated[Size, Meta(description="Samples per pixel, over all passes.")]
     passes: Size
     sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
+    rules: tuple[RuleRecord, ...] = ()
+
+
+class GuardRecord(Record):
+    """What a probe of everything found, beside a plan that leaves something out.
+
+    Attributes
+    ----------
+    state
+        Where it disagreed, everything was simulated; it is not needed where nothing is left out.
+    rays
+        Camera rays that were followed both ways.
+    departure, error
+        Mean of the plan less that of everything, as a share of it, and its standard error.
+    seconds
+        Time of the probe, which is in no other time.
+    """
+
+    state: Literal["agreed", "disagreed", "not needed"]
+    rays: Count
+    departure: float
+    error: Amount
+    seconds: Amount
 
 
 class PlanRecord(Simulation, kw_only=True):
     """Which effects the scene calls for, and what was simulated."""
 
     effects: tuple[Decision, ...]
+    guard: GuardRecord | None = None
 
 
 class Significant(Record):

@@ -14,15 +14,18 @@ from comparisons.comparison import (
     ComparisonRecord,
     Decision,
     EmitterPair,
+    GuardRecord,
     Missed,
     Override,
     Pairing,
     PlanRecord,
+    RuleRecord,
     Times,
     Unrepresentable,
 )
 from comparisons.pool import cores
 from heuristic import __version__
+from reference.rendering.guard import Verdict
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
 
@@ -137,11 +140,22 @@ def simulation(plan, spp, passes):
         "spp": spp,
         "passes": passes,
         "sampler": plan.sampler,
+        "rules": tuple(_ruling(ruling) for ruling in plan.rulings),
     }
 
 
-def plan_record(plan, spp, passes):
-    """Return the record of a plan, with the samples and passes that were rendered."""
+def _ruling(ruling):
+    return RuleRecord(
+        name=ruling.rule.name,
+        applies=ruling.holds,
+        premise="" if ruling.holds else ruling.failed.sentence,
+        evidence=ruling.words,
+    )
+
+
+def plan_record(ready, passes):
+    """Return the record of a scene's plan, with the samples and passes that were rendered."""
+    plan = ready.plan
     effects = tuple(
         Decision(
             name=decision.effect.label,
@@ -150,7 +164,29 @@ def plan_record(plan, spp, passes):
         )
         for decision in plan.decisions
     )
-    return PlanRecord(effects=effects, **simulation(plan, spp, passes))
+    samples = ready.reference.spp * passes
+    guard = guard_record(ready.guard) if ready.guard else None
+    return PlanRecord(effects=effects, guard=guard, **simulation(plan, samples, passes))
+
+
+def guard_record(guard):
+    """Return the record of what the probe of a plan found."""
+    return GuardRecord(
+        state=guard.state.value,
+        rays=guard.rays,
+        departure=guard.departure,
+        error=guard.error,
+        seconds=guard.seconds,
+    )
+
+
+def guard_warnings(guard):
+    """Yield what is to be said where the probe disagreed with the plan."""
+    if guard.state is Verdict.DISAGREED:
+        yield (
+            f"The plan leaves out light that is there, or adds some: {guard.words}. So everything"
+            " was simulated. A rule of pruning is wrong for this scene: please report it."
+        )
 
 
 def times(of_passes):

@@ -3,6 +3,9 @@
 Both references are rendered in turn, pass by pass. The difference is held against the noise of both
 sides, and the times are compared at equal noise: the variance of an independent mean falls with the
 time spent, so that ``variance x time`` is what a method costs.
+
+From everything to the plan there are three steps, each with its own factor: the plan's sampler,
+then its integrator with nothing left out, then what it leaves out.
 """
 
 from dataclasses import replace
@@ -14,12 +17,28 @@ from comparisons.departure.marks import significance
 from comparisons.records import VERSION, Record
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import Stream, pass_seed, passes
-from reference.rendering.renderer import Accumulator, Renderer
+from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
 from reference.scene.sampler import with_sampler
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
 paths carry most of it."""
+
+
+FEWEST_PASSES = 32
+"""Of each side: intervals come from pairs of passes."""
+
+RESAMPLES = 2000
+"""Of the bootstrap."""
+
+
+class Factor(Record):
+    """How many times sooner a step reaches the same noise; 95 % interval, all 1 for no step."""
+
+    name: str
+    value: float
+    low: float
+    high: float
 
 
 class Verification(Record, kw_only=True):
@@ -46,6 +65,9 @@ class Verification(Record, kw_only=True):
     gain
         ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
         planned reference reaches the same noise.
+    factors
+        The steps of the gain, whose product it is: sampler, integrator, pruning; and the gain
+        itself, with its interval.
     planning_s
         Time that planning took, tables included.
     saved_s
@@ -66,12 +88,13 @@ class Verification(Record, kw_only=True):
     planned_noise: float
     everything_noise: float
     gain: float
+    factors: tuple[Factor, ...]
     planning_s: float
     saved_s: float
     record_version: int = VERSION
 
 
-def verify(source, options=None, progress=None, level=LEVEL):
+def verify(source, options=None, progress=None, level=LEVEL, steps=True):
     """Render a scene as planned and with everything, and compare.
 
     Parameters
@@ -81,6 +104,8 @@ def verify(source, options=None, progress=None, level=LEVEL):
         they are given; the plan's own otherwise.
     level
         Chance that any pixel is marked though nothing differs.
+    steps
+        Whether to measure what each step gives; without it, only the two ends are rendered.
 
     Returns
     -------
@@ -91,20 +116,103 @@ def verify(source, options=None, progress=None, level=LEVEL):
     count = max(side.passes for side in sides)
     if sides[0].plan.max_depth != 2:
         count *= PASSES_WITH_PATHS
-    sums = [Accumulator() for _ in sides]
+    count = max(count, FEWEST_PASSES if steps else 0)
+    stages = _stages(*sides) if steps else [sides[1].reference, sides[0].reference]
+    width, height = image_size(sides[0].scene)
+    counted = gbuffer(sides[0].scene, width, height).hit
+    measured = {renderer: _Measured(renderer, counted) for renderer in stages}
     # Other seeds for the other side: equal ones would hide noise that both share.
-    streams = {Stream.COMPARED: progress, Stream.OTHER_SIDE: None}
-    loops = [
-        passes(
-            [side.reference], options.seed, count, stream=stream, progress=told, stage="verifying"
-        )
-        for side, (stream, told) in zip(sides, streams.items(), strict=True)
-    ]
-    for both in zip(*loops, strict=True):
-        for total, one in zip(sums, both, strict=True):
-            total.add(one.images[0])
-    estimates = [total.estimate() for total in sums]
-    return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed), level)
+    others = passes(stages[:1], options.seed, count, stream=Stream.OTHER_SIDE)
+    distinct = list(measured)
+    own = passes(distinct[1:], options.seed, count, progress=progress, stage="verifying")
+    for other, one in zip(others, own, strict=True):
+        for renderer, image in zip(distinct, (*other.images, *one.images), strict=True):
+            measured[renderer].add(image)
+    found = [measured[renderer] for renderer in stages]
+    kernel = _kernel_difference(sides, options.seed)
+    return _summarise(source.name, sides, found, counted, kernel, level)
+
+
+def _stages(planned, everything):
+    """Return the renderers from everything to the plan; equal ones are the same.
+
+    The second has the plan's sampler, the third its integrator too, with nothing left out.
+    """
+    plan, scene, spp = planned.plan, planned.scene, planned.reference.spp
+    whole = plan
+    if plan.integrator == "direct_all":
+        whole = replace(plan, shadows=True, max_depth=plan.scene_depth, tabulate_environment=False)
+    found = [planned.reference]
+    for before, after in ((whole, plan), (everything.plan, whole)):
+        if _simulated(before) == _simulated(after):
+            found.append(found[-1])
+            continue
+        integrator = physical_integrator(before, scene, planned.pair.hide_emitters)
+        found.append(Renderer(scene, integrator, spp, "image of a step"))
+    return [everything.reference, *reversed(found)]
+
+
+def _simulated(plan):
+    """Return what tells one plan's integrator from another's."""
+    own = (plan.shadows, plan.bsdf_samples, plan.tabulate_environment)
+    if plan.integrator != "direct_all":
+        own = (plan.rr_depth,)
+    return plan.integrator, plan.max_depth, *own
+
+
+class _Measured:
+    """The passes of one renderer: their sum, their times, and the variance of a pass.
+
+    Each pair of passes gives an estimate of the variance that depends on no other pair.
+    """
+
+    def __init__(self, renderer, counted):
+        self.renderer, self.counted = renderer, counted
+        self.total, self.variances, self._before = Accumulator(), [], None
+
+    def add(self, image):
+        self.total.add(image)
+        image = np.array(image, float)[self.counted]
+        if self._before is None:
+            self._before = image
+            return
+        spread = np.mean((image - self._before) ** 2) / 2 if image.size else 0.0
+        # A plan without any noise left would divide by zero; below rounding nothing is gained.
+        self.variances.append(max(float(spread), 1e-14))
+        self._before = None
+
+    def seconds(self):
+        return self.renderer.pass_times().median
+
+    def noise(self):
+        return float(np.sqrt(np.mean(self.variances)))
+
+    def cost(self):
+        return self.seconds() * self.noise() ** 2
+
+    def resampled(self, rng):
+        """Return costs as they might have come out: bootstrap over pairs, and over times."""
+        times = np.array(self.renderer.times[1:] or self.renderer.times)
+        shape = RESAMPLES, len(self.variances)
+        variances = rng.choice(self.variances, shape).mean(axis=1)
+        return variances * np.median(rng.choice(times, (RESAMPLES, len(times))), axis=1)
+
+
+def _factor(name, slow, fast, rng):
+    if slow is fast:
+        return Factor(name=name, value=1.0, low=1.0, high=1.0)
+    ratios = slow.resampled(rng) / fast.resampled(rng)
+    low, high = np.quantile(ratios, (0.025, 0.975))
+    return Factor(name=name, value=slow.cost() / fast.cost(), low=float(low), high=float(high))
+
+
+def _factors(measured):
+    """Return the factors of the three steps where they were measured, and of all."""
+    rng = np.random.default_rng(0)
+    names = ("sampler", "integrator", "pruning") if len(measured) > 2 else ()
+    steps = zip(names, measured, measured[1:], strict=False)
+    found = [_factor(name, slow, fast, rng) for name, slow, fast in steps]
+    return (*found, _factor("all", measured[0], measured[-1], rng))
 
 
 def _kernel_difference(sides, seed):
@@ -119,10 +227,9 @@ def _kernel_difference(sides, seed):
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(name, sides, estimates, kernel_difference, level):
-    scene = sides[0].scene
-    width, height = image_size(scene)
-    counted = gbuffer(scene, width, height).hit
+def _summarise(name, sides, measured, counted, kernel_difference, level):
+    everything, planned = measured[0], measured[-1]
+    estimates = [side.total.estimate() for side in (planned, everything)]
     difference = estimates[0].mean - estimates[1].mean
     error = np.hypot(estimates[0].standard_error, estimates[1].standard_error)
     marked = significance(
@@ -133,15 +240,9 @@ def _summarise(name, sides, estimates, kernel_difference, level):
         level,
         magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
     )
-    times = [side.reference.pass_times().median for side in sides]
-    noises = [
-        float(np.sqrt(np.mean(estimate.standard_error[counted] ** 2) * estimate.passes))
-        for estimate in estimates
-    ]
-    # A plan without any noise left would divide by zero; below rounding there is nothing to gain.
-    costs = [time * max(noise, 1e-7) ** 2 for time, noise in zip(times, noises, strict=True)]
-    gain = costs[1] / costs[0]
-    planned_total = times[0] * sides[0].passes
+    factors = _factors(measured)
+    gain = factors[-1].value
+    height, width = counted.shape
     return Verification(
         scene=name,
         planned=_word(sides[0].plan),
@@ -151,13 +252,14 @@ def _summarise(name, sides, estimates, kernel_difference, level):
         pixels=int(counted.sum()),
         largest=float(np.abs(difference).max()),
         heuristic_largest=kernel_difference,
-        planned_s=times[0],
-        everything_s=times[1],
-        planned_noise=noises[0],
-        everything_noise=noises[1],
+        planned_s=planned.seconds(),
+        everything_s=everything.seconds(),
+        planned_noise=planned.noise(),
+        everything_noise=everything.noise(),
         gain=gain,
+        factors=factors,
         planning_s=sides[0].planning_seconds,
-        saved_s=planned_total * (gain - 1),
+        saved_s=planned.seconds() * sides[0].passes * (gain - 1),
     )
 
 

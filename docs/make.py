@@ -21,6 +21,7 @@ from comparisons.compare import Options, compare
 from comparisons.gallery.builtin import builtin
 from heuristic import equations
 from heuristic.interpolation import Interpolation
+from reference.planning.plan import RULES
 from reference.scene.graph import set_variant
 from reports.charts import figures
 from reports.files import images
@@ -54,6 +55,7 @@ def main(words):
         _measurements()
     replace("models.md", "equations", equation_table())
     _guarantees()
+    replace("plans.md", "rules", rules())
     for name, scenes in SHEETS.items():
         pairs = [_images(scene) for scene in scenes]
         _sheet(f"models-{name}.png", scenes, [[p.heuristic for p in pairs],
@@ -87,6 +89,17 @@ def equation_table():
         numbers = [entry.number for entry in entries]
         rows.append((_span(numbers), _link(home), re.sub(r"``(.*?)``", r"`\1`", meaning)))
     return tables.markdown([("Equation", "Home", "What it says"), *rows], right=0)
+
+
+def rules():
+    """Yield the rules of pruning: what each leaves out, why, and what that rests on."""
+    for rule in RULES:
+        yield f"### {rule.name[0].upper()}{rule.name[1:]}"
+        yield from ("", f"*What is absent:* {rule.absent}.", "", f"*Proof.* {rule.proof}")
+        yield from ("", "*Premises*, each checked:", "")
+        yield from (f"- {premise.sentence}" for premise in rule.premises)
+        if rule is not RULES[-1]:
+            yield ""
 
 
 def _span(numbers):

@@ -90,6 +90,16 @@ def data():
             "spp": 256,
             "passes": 16,
             "sampler": "multijitter",
+            "rules": [
+                {"name": "no shadow rays", "applies": True, "premise": "", "evidence": "one shape"}
+            ],
+            "guard": {
+                "state": "agreed",
+                "rays": 8192,
+                "departure": 0.000213,
+                "error": 0.000172,
+                "seconds": 0.0456,
+            },
         },
         "viewing": Viewing(exposure=0.5).record(),
         "metrics": {

@@ -45,6 +45,10 @@ def test_the_list_of_guarantees_is_that_of_the_tests(make, monkeypatch):
     assert {each.area for each in guarantees.guarantees()} == set(guarantees.AREAS)
 
 
+def test_the_rules_of_pruning_are_those_of_the_code(make):
+    assert part_of("plans.md", "rules", make) == list(make.rules())
+
+
 def test_the_worked_example_has_been_made(make):
     rows = part_of("reading.md", "example", make)
     assert [row.split(" | ")[-1] for row in rows[2:4]] == ["16 |", "256 |"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from comparisons.departure.metrics import METRICS, drawn
-from comparisons.verification import Verification
+from comparisons.verification import Factor, Verification
 from heuristic.equations import Entry
 from reports.files import images
 from reports.page import embedding, page
@@ -252,11 +252,21 @@ def test_verifications_are_printed(record, pictures):
         "everything_s": 0.25, "everything_noise": 0.125, "planning_s": 0.002,
         "heuristic_largest": 0.0, "resolution": (96, 80), "largest": 0.5, "saved_s": 1.0,
     }  # fmt: skip
+    steps = {
+        "sampler": (5.7, 5.3, 6.1),
+        "integrator": (1.0, 1.0, 1.0),
+        "pruning": (16.0, 14.0, 17.0),
+    }
+    numbers["factors"] = tuple(
+        Factor(name=name, value=value, low=low, high=high)
+        for name, (value, low, high) in steps.items()
+    )
     verification = Verification(scene=HOSTILE, planned="direct_all", everything="path", **numbers)
     view = records.view(record, images=pictures)
     html = page.render([view], verifications=[verification])
     assert "3 of 1436" in html
     assert "91.5 ×" in html
+    assert "5.7 (5.3 to 6.1)" in html
     assert "96 × 80 pixels" in html
     assert HOSTILE not in html
     assert "Pruning" not in page.render([view])

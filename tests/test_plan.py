@@ -13,6 +13,7 @@ from reference.effects.bsdf_forms import TRANSMISSION
 from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.facts import examine
 from reference.planning.plan import wants_spectra
+from reference.planning.premises import Pruning, Ruling
 from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
 
@@ -158,7 +159,7 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
         assert ready.plan.integrator == "direct_all"
     else:
         assert ready.plan.calls_for(OCCLUSION) or ready.plan.calls_for(INTERREFLECTION)
-    result = verify(source, Options(spp=512))
+    result = verify(source, Options(spp=512), steps=False)
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
@@ -182,19 +183,16 @@ OTHERS = [name for name in SCENES if name not in (*OF_EACH_KIND, "narrow-band-la
 )
 def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
     mi.set_variant(SCENES[name].variant)
-    result = verify(SCENES[name].source(), Options(resolution=(48, 48)))
+    result = verify(SCENES[name].source(), Options(resolution=(48, 48)), steps=False)
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr("reference.effects.obstacles.occlusion", lambda structure: (False, "wrong"))
-    monkeypatch.setattr(
-        "reference.effects.obstacles.interreflection", lambda structure: (False, "wrong")
-    )
+    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
+    assert verify(Source("wrong", scene(**parts)), Options(spp=512), steps=False).significant > 0
 
 
 def facts(parts):
@@ -206,7 +204,7 @@ def facts(parts):
 @pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (-0.1, True), (1e-3, False)])
 def test_a_dent_makes_a_mesh_concave_and_a_tip_does_not(rgb, tmp_path, depth, convex):
     thing = mesh(*dented_octahedron(depth), tmp_path / "thing.ply")
-    assert facts({"thing": thing})["thing"].convex is convex
+    assert facts({"thing": thing})["thing"].is_convex is convex
 
 
 def test_which_shapes_are_convex(rgb, tmp_path):
@@ -219,7 +217,7 @@ def test_which_shapes_are_convex(rgb, tmp_path):
             "tube": {"type": "cylinder", "bsdf": WHITE},
         }
     )
-    convex = {name: shape.convex for name, shape in found.items()}
+    convex = {name: shape.is_convex for name, shape in found.items()}
     assert convex == {"ball": True, "floor": True, "cube": True, "bowl": False, "tube": False}
     assert found["floor"].plane is not None
     assert not found["floor"].may_face(found["floor"])
@@ -248,6 +246,11 @@ def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled
     result = verify(source, Options(spp=512))
     assert result.significant == 0
     assert result.gain > 2
+    *steps, whole = result.factors
+    assert [step.name for step in steps] == ["sampler", "integrator", "pruning"]
+    assert np.prod([step.value for step in steps]) == pytest.approx(whole.value) == result.gain
+    assert all(step.low <= step.value <= step.high for step in result.factors)
+    assert steps[2].low == steps[2].high == 1  # its plan leaves nothing out
     glossy = parts | {"ball": ball(bsdf={"type": "roughplastic"})}
     assert prepare(Source("glossy", scene(**glossy))).plan.integrator == "path"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
-from comparisons.compare import prepare
+from comparisons.compare import guarded
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size
 
@@ -86,7 +86,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     -------
     Measured
     """
-    ready = prepare(source, options)
+    ready = guarded(source, options)
     spp = options.spp or ready.reference.spp * ready.passes
     for half in (ready.heuristic, ready.reference):
         half.spp = max(1, spp // passes)

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.compare import prepare
+from comparisons.compare import guarded
 from comparisons.cost.cost_record import Converged, Cost, Pictures, Point, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
@@ -89,7 +89,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         options = replace(options, resolution=reduced(source, options, WIDTH))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
-    ready = prepare(source, replace(options, spp=None))
+    ready = guarded(source, replace(options, spp=None))
     width, height = image_size(ready.scene)
     counted = gbuffer(ready.scene, width, height).hit
     reference, groups = _converged(ready, effort, options.seed, progress)
@@ -131,6 +131,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         machine=Machine(**record.machine()),
         versions=record.versions(),
         command=command,
+        guard=record.guard_record(ready.guard),
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
     return Study(

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from comparisons.comparison import GuardRecord
 from comparisons.departure.spaces import Viewing
 from comparisons.records import (
     VERSION,
@@ -247,6 +248,7 @@ class Cost(Record, kw_only=True):
     versions: Versions
     command: str
     pictures: Pictures
+    guard: GuardRecord | None = None
 
     def points_of(self, rung: str) -> tuple[Measured, ...]:
         """Return the points of a rung, by its name."""

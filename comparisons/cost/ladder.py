@@ -1,6 +1,6 @@
 """The ladder of one scene, from flat shading to the full plan.
 
-What the planning rules prove absent is struck out of each rung's method first, so that methods
+What the plan leaves out is struck out of each rung's method first, so that methods
 which the scene cannot tell apart come out equal. They become one, which keeps their names.
 """
 
@@ -53,7 +53,7 @@ class Distinct:
 
 @dataclass(frozen=True)
 class Scope:
-    """What the scene has, as the plan proves it.
+    """What the scene has, as far as the plan tells.
 
     Attributes
     ----------

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from comparisons.compare import prepare
+from comparisons.compare import guarded
 from comparisons.fit import summary
 from comparisons.fit.fit_record import FitRecord, FitTimes, FormFit, LossName
 from comparisons.fit.identify import identify
@@ -20,7 +20,7 @@ from comparisons.fit.parameters import parameters
 from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Attempt, Fit, FitImages
 from comparisons.options import Options
-from comparisons.record import versions
+from comparisons.record import guard_warnings, versions
 from comparisons.records import Pixels
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
@@ -95,7 +95,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     begin = perf_counter()
     chosen = chosen or FitOptions()
     options = _completed(options or Options())
-    ready = prepare(source.edited(filter_by_box), options)
+    ready = guarded(source.edited(filter_by_box), options)
     rendered = render(ready, options, progress or (lambda *_: None))
     rendering = perf_counter() - begin
     if not rendered.counted.any():
@@ -117,7 +117,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
         pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
         fits=fits,
         best=len(fits) // len(attempts) * best,
-        warnings=tuple(ready.pair.warnings),
+        warnings=(*ready.pair.warnings, *guard_warnings(ready.guard)),
         versions=versions(),
         time=FitTimes(rendering, perf_counter() - begin - rendering),
         command=command,

@@ -15,6 +15,7 @@ from reference.effects import EFFECTS
 from reference.pairing import halves
 from reference.planning.plan import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.guard import Verdict, examine_plan
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
 from reference.scene.sampler import with_sampler
@@ -34,7 +35,7 @@ def row(part, point):
     pair = halves.pair(source(part, point), part.convention, part.resolution)
     kept = _kept(part.scene)
     physical = kept[1].scene(with_sampler(pair.physical, sampler()))
-    chosen = plan(pair, physical)
+    chosen = _guarded(part, plan(pair, physical), physical, pair)
     heuristic = kept[0].scene(with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES
     plans = _plans(chosen)
@@ -61,6 +62,31 @@ def source(part, point):
     if part.scene in SCENES:
         return Source(part.scene, lambda: SCENES[part.scene].make(point, bsdf(point)))
     return _opened(part.scene).edited(partial(set_values, values=point))
+
+
+def _guarded(part, chosen, physical, pair):
+    """Return a plan, or the one for everything where a probe of the plan disagrees.
+
+    Probed is the first point of a part in this process, for each way in which its plans prune.
+    """
+    key = (
+        part.name,
+        chosen.integrator,
+        chosen.max_depth,
+        chosen.shadows,
+        chosen.tabulate_environment,
+    )
+    if key not in _guards:
+        width, height = image_size(physical)
+        samples = part.spp * width * height
+        _guards[key] = examine_plan(chosen, physical, pair.hide_emitters, samples, part.seed)
+    found = _guards[key]
+    if found.state is not Verdict.DISAGREED:
+        return chosen
+    return chosen.unpruned("guard", found.words)
+
+
+_guards = {}
 
 
 @lru_cache(maxsize=4)

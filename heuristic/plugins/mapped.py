@@ -148,7 +148,8 @@ def define():
 def _operand(props, name):
     """Read an operand; plain numbers and colours may be larger than a reflectance."""
     value = props[name]
-    components = tuple(value) if isinstance(value, mi.ScalarColor3f) else (value,)
+    is_colour = isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d)
+    components = tuple(value) if is_colour else (value,)
     if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
         return props.get_unbounded_texture(name)
     return props.get_texture(name)

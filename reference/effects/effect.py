@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reference.planning.facts import Facts
+from reference.planning.premises import Pruning
 from reference.scene.graph import Graph
 
 PARTS = ("interpolation", "spectral", "visibility", "light form", "BSDF form", "transport")
@@ -25,8 +26,11 @@ class Effect:
         In words: what it is in either half, and what it costs.
     rule
         ``rule(facts)`` returns whether the effect is called for, and the evidence.
+    pruning
+        In the place of ``rule``: the rule of pruning by which the effect is left out. Where it does
+        not apply, the effect may be there, and is simulated.
     undecided
-        Whether a yes of the rule only means that no proof of absence was found.
+        Whether a yes of ``rule`` only means that nothing is known against the effect.
     part, colour
         One of :data:`PARTS`, and a CSS colour in charts; None for what both halves have alike.
     sampled
@@ -51,7 +55,8 @@ class Effect:
     heuristic: str
     reference: str
     cost: str
-    rule: Callable[[Facts], tuple[bool, str]]
+    rule: Callable[[Facts], tuple[bool, str]] | None = None
+    pruning: Pruning | None = None
     undecided: bool = False
     part: str | None = None
     colour: str | None = None
@@ -64,6 +69,10 @@ class Effect:
 
     def decide(self, facts: Facts) -> "Decision":
         """Apply the rule."""
+        if self.pruning is not None:
+            ruling = self.pruning.judge(facts)
+            rule = "structural" if ruling.holds else "simulated"
+            return Decision(self, not ruling.holds, rule, ruling.words)
         called_for, evidence = self.rule(facts)
         rule = "simulated" if called_for and self.undecided else "structural"
         return Decision(self, bool(called_for), rule, evidence)
@@ -82,8 +91,9 @@ class Effect:
 class Decision:
     """Whether an effect is called for, and the rule and evidence that decided.
 
-    ``rule`` says of what kind the reason is: ``structural`` for a proof from what the scene is made
-    of, ``simulated`` where no proof was found, ``asked`` where pruning is switched off.
+    ``rule`` says of what kind the reason is: ``structural`` where it follows from what the scene is
+    made of, ``simulated`` where a premise of leaving it out is not known to hold, ``asked`` where
+    pruning is switched off, ``guard`` where a probe of the scene disagreed with the plan.
     """
 
     effect: Effect

@@ -19,9 +19,9 @@ participating media                     ``volpath``, or ``volpathmis`` where the
 
 All take the sampler of :mod:`reference.scene.sampler`: stratified, with the right mean at any
 number of samples. Samples are stratified within a pass, so that few passes of many samples are
-better than many of few; eight passes are enough for standard errors. Where no light needs random
-numbers, only the pixel filter is left to sample, and four passes are enough to see what noise is
-left.
+better than many of few; eight passes are enough for standard errors. Where neither lights nor lens
+need random numbers, only the pixel filter is left to sample, and four passes are enough to see what
+noise is left.
 """
 
 from collections.abc import Collection
@@ -33,11 +33,19 @@ from heuristic.interpolation import Interpolation
 from heuristic.plugins.phong import COEFFICIENTS
 from reference.effects import EFFECTS
 from reference.effects.effect import Decision, Effect
-from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
+from reference.effects.obstacles import (
+    INTERREFLECTION,
+    NO_SECOND_REFLECTION,
+    NO_SHADOWS,
+    OCCLUSION,
+)
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
-from reference.planning.facts import BSDF, EMITTER, Facts, examine
+from reference.planning.facts import BSDF, Facts, examine
+from reference.planning.light_by_light import LIGHT_BY_LIGHT
+from reference.planning.premises import Pruning, Ruling
+from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.direct import RR_DEPTH
 from reference.scene.graph import Graph
 from reference.scene.sampler import SAMPLER, STOCK_SAMPLER
@@ -69,6 +77,8 @@ class Plan:
         Of ``path``: where Russian roulette begins to end paths.
     shadows, bsdf_samples, tabulate_environment
         Parameters of ``direct_all``.
+    rulings
+        Of :data:`RULES`: whether each applies, and if not, which premise failed.
     """
 
     decisions: tuple[Decision, ...]
@@ -84,6 +94,7 @@ class Plan:
     shadows: bool = True
     bsdf_samples: int = 1
     tabulate_environment: bool = False
+    rulings: tuple[Ruling, ...] = ()
 
     def calls_for(self, effect: Effect) -> bool:
         """Tell whether an effect is called for."""
@@ -125,10 +136,13 @@ class Plan:
             bsdf_samples=1,
         )
 
-    def unpruned(self) -> "Plan":
-        """Return the plan that prunes nothing: what a user gets without thinking."""
+    def unpruned(self, rule: str = "asked", evidence: str = "--everything") -> "Plan":
+        """Return the plan that prunes nothing: what a user gets without thinking.
+
+        ``rule`` and ``evidence`` say why, in the place of those of each effect.
+        """
         return Plan(
-            decisions=tuple(Decision(effect, True, "asked", "--everything") for effect in EFFECTS),
+            decisions=tuple(Decision(effect, True, rule, evidence) for effect in EFFECTS),
             kernel_terms=COEFFICIENTS,
             integrator=self.stock_integrator,
             max_depth=self.scene_depth,
@@ -137,6 +151,9 @@ class Plan:
             sampler=STOCK_SAMPLER,
         )
 
+
+RULES = (LIGHT_BY_LIGHT, NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
+"""The rules of pruning."""
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 
@@ -183,18 +200,24 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         stock_integrator=_stock(pair),
         scene_depth=pair.max_depth,
         rr_depth=pair.rr_depth or RR_DEPTH,
+        rulings=tuple(rule.judge(facts) for rule in RULES),
     )
-    if pair.media or facts.is_clear or 0 <= pair.max_depth < 2:
+    if not _holds(stock, LIGHT_BY_LIGHT):
         return stock
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
         exact = [light for light in facts.structure.lights if lights.of(light.kind).exact]
         if len(exact) > 1 and _diffuse(graph):
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
-    tabulated = not stock.calls_for(OCCLUSION) and _can_tabulate(graph)
-    is_random = mi.is_spectral or any(
-        not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
-        for light in facts.structure.lights
+    tabulated = _holds(stock, TABULATED_ENVIRONMENT)
+    has_lens = facts.structure.camera.plugin not in ("perspective", "orthographic")
+    is_random = (
+        has_lens
+        or mi.is_spectral
+        or any(
+            not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
+            for light in facts.structure.lights
+        )
     )
     return replace(
         stock.directly(),
@@ -203,6 +226,10 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         passes=PASSES if is_random else DETERMINISTIC_PASSES,
         tabulate_environment=tabulated,
     )
+
+
+def _holds(made: Plan, rule: Pruning) -> bool:
+    return next(ruling.holds for ruling in made.rulings if ruling.rule is rule)
 
 
 def _stock(pair: Pair) -> str:
@@ -240,12 +267,3 @@ def wants_spectra(graph: Graph) -> bool:
 
 def _diffuse(graph: Graph) -> bool:
     return all(graph.plugin(index) in ("diffuse", "twosided") for index in graph.nodes(BSDF))
-
-
-def _can_tabulate(graph: Graph) -> bool:
-    """Tell whether the environment can be tabulated: one plain BSDF, one constant light, RGB."""
-    shapes = graph.nodes(mi.ObjectType.Shape)
-    kinds = [lights.of(graph.plugin(index)) for index in graph.nodes(EMITTER)]
-    extended = [kind.uniform for kind in kinds if not kind.exact]
-    textures = graph.nodes(mi.ObjectType.Texture)
-    return len(shapes) == 1 and extended == [True] and not textures and mi.is_rgb

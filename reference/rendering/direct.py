@@ -145,10 +145,12 @@ class AlbedoTable:
     tabulated once, by Mitsuba's own sampling of the BSDF on a rank-1 lattice, and looked up at each
     camera ray, without Monte Carlo in the image.
 
-    Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most.
+    Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most. A BSDF that reflects
+    on its back too does so as on its front.
     """
 
     def __init__(self, bsdf):
+        self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         mu = np.linspace(1e-3, 1, NODES) ** 2
         grid_mu = mi.Float(np.repeat(mu, SAMPLES))
         points = [mi.Float(np.tile(row, NODES)) for row in lattice(SAMPLES)[:3]]
@@ -163,7 +165,8 @@ class AlbedoTable:
         dr.eval(self.table)
 
     def at(self, mu):
-        """Interpolate linearly at cosines ``mu``; 0 below the horizon."""
+        """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
+        mu = abs(mu) if self.has_back else mu
         place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
         place = dr.clip(place, 0, NODES - 1)
         below = dr.minimum(mi.UInt32(place), NODES - 2)

@@ -22,6 +22,7 @@ class Stream(IntEnum):
     COMPARED = 0
     OTHER_SIDE = 1
     REPLICATES = 2
+    PROBE = 3
 
 
 def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:

@@ -14,6 +14,8 @@ def lines(record):
         f"reference: {reference.integrator}, {reference.spp} samples a pixel; its noise alone"
         f" gives ΔE2000 = {reference.noise_floor:.3g}"
     )
+    if record.guard and record.guard.state == "disagreed":
+        yield "a probe disagreed with the plan, so that everything is simulated: please report it"
     yield from _section("Error and time of each method", _rungs(record))
     yield from _section("Best within a time", _equal_time(record))
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))

@@ -54,6 +54,10 @@ def report(scene, ready, variant):
 def lines(plan):
     """Yield the lines of a plan: the table of effects, then what will be simulated."""
     yield from printed(_effects(plan))
+    yield ""
+    if plan.rules:
+        yield from printed(_rules(plan))
+        yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     rays = "" if plan.shadows else ", no shadow rays"
     rays += ", environment from a table" if plan.tabulated_environment else ""
@@ -71,6 +75,11 @@ def verification_lines(results):
     yield "significant: pixels that differ by more than both sides' noise"
     yield "kernel: largest difference that the terms left out of the kernel make"
     yield "faster: how many times sooner the plan reaches the same noise"
+    yield ""
+    yield from printed(_factors(results))
+    yield "sampler: the plan's in place of the independent one"
+    yield "integrator: the plan's, with nothing left out; pruning: what it leaves out"
+    yield "all: their product; in brackets 95 % intervals"
 
 
 def _effects(plan):
@@ -78,6 +87,24 @@ def _effects(plan):
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost
+
+
+def _factors(results):
+    yield "scene", *(factor.name for factor in results[0].factors)
+    for result in results:
+        yield result.scene, *(_interval(factor) for factor in result.factors)
+
+
+def _interval(factor):
+    if factor.low == factor.high:
+        return "no change"
+    return f"{factor.value:.3g} x ({factor.low:.3g} to {factor.high:.3g})"
+
+
+def _rules(plan):
+    yield "rule of pruning", "applies", "premise that is not known to hold", "evidence"
+    for rule in plan.rules:
+        yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
 
 
 def _verifications(results):

@@ -54,6 +54,12 @@ def summary(records):
             yield f"{record.scene}: heuristic {record.heuristic}"
         if record.noise_target:
             yield _noise(record)
+        guard = record.plan.guard
+        if guard and guard.state == "disagreed":
+            yield (
+                f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
+                " light, so that everything was simulated. Please report this scene."
+            )
 
 
 def _table(records):

@@ -7,10 +7,21 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import cost, kernel, lights, samplers, scaling, stability, study, terms
+from tests.benchmarks import (
+    cost,
+    guard,
+    kernel,
+    lights,
+    samplers,
+    scaling,
+    stability,
+    study,
+    terms,
+)
 
 BENCHMARKS = {
     "cost": cost.run,
+    "guard": guard.run,
     "kernel": kernel.run,
     "lights": lights.run,
     "samplers": samplers.run,

@@ -1,0 +1,38 @@
+"""Whether every light can be asked at every sample, in the place of one picked at random."""
+
+from reference.planning.facts import Facts
+from reference.planning.premises import NO_MEDIUM, OPAQUE, Premise, Pruning
+
+
+def _shallow(facts: Facts) -> str | None:
+    depth = facts.pair.max_depth
+    return f"the scene's depth is {depth}" if 0 <= depth < 2 else None
+
+
+def _seen_inside_a_lamp(facts: Facts) -> str | None:
+    structure = facts.structure
+    for light in structure.lights:
+        shape = structure.shape(light.shape) if light.shape is not None else None
+        if shape and shape.is_hollow and not structure.camera.is_outside(shape.corners()):
+            return f"{shape.name}: shines, and may be seen from inside"
+    return None
+
+
+LIGHT_BY_LIGHT = Pruning(
+    name="every light at every sample",
+    absent="noise of picking a light: the sum over all has the mean of one over its chance",
+    proof="Mitsuba picks a light at random and divides by the chance of that. The mean is the sum"
+    " over all lights, which `direct_all` takes at each sample. The two are equal where each"
+    " estimate of a light has the right mean, however a sample of the BSDF is weighted against it.",
+    premises=(
+        NO_MEDIUM,
+        OPAQUE,
+        Premise("The scene's paths have a depth of 2 or more.", _shallow),
+        Premise(
+            "No closed shape that shines and reflects inside is seen from inside: at points of its"
+            " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF does"
+            " not, so that its mean depends on how both are weighted.",
+            _seen_inside_a_lamp,
+        ),
+    ),
+)

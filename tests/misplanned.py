@@ -1,0 +1,90 @@
+"""Six small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
+
+import mitsuba as mi
+
+from reference.planning.premises import Pruning, Ruling
+from reference.rendering.direct import AlbedoTable
+
+DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
+TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}
+SKY = {"type": "constant", "radiance": 1.0}
+
+
+def prune_blindly(monkeypatch):
+    """Take every premise for true, and know of front sides alone in the table of albedos."""
+    at = AlbedoTable.at
+
+    def at_the_front(self, mu):
+        self.has_back = False
+        return at(self, mu)
+
+    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
+    monkeypatch.setattr(AlbedoTable, "at", at_the_front)
+
+
+def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", camera=None, **parts):
+    """A scene seen from a point; ``camera`` has parameters of the sensor."""
+    camera = {"type": "perspective"} | (camera or {})
+    field = {"fov": 40.0} if camera["type"] in ("perspective", "thinlens") else {}
+    up = (0, 1, 0) if viewer[:2] == target[:2] else (0, 0, 1)
+    to_world = mi.ScalarTransform4f().look_at(viewer, target, up)
+    if camera["type"] == "orthographic":
+        to_world = to_world.scale((3.0, 3.0, 1.0))
+    film = {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}}
+    if camera["type"] == "radiancemeter":
+        film |= {"width": 1, "height": 1}
+    sensor = {"to_world": to_world, "film": film, **field, **camera}
+    return {"type": "scene", "integrator": {"type": integrator}, "sensor": sensor, **parts}
+
+
+def sphere(bsdf=DIFFUSE, **more):
+    """A unit sphere."""
+    return {"type": "sphere", "bsdf": bsdf, **more}
+
+
+def lamp(position, intensity=1.0):
+    """A point light."""
+    return {"type": "point", "position": position, "intensity": intensity}
+
+
+def _behind():
+    plate = {"type": "rectangle", "bsdf": TWO_SIDED}
+    return scene(viewer=(0, 0, -4), plate=plate, sky=SKY)
+
+
+def _cut_open():
+    inside = lamp((0, 0, 0.3))
+    return scene(camera={"near_clip": 4.0}, ball=sphere(TWO_SIDED), light=inside)
+
+
+def _wide():
+    """The camera stands beside the sphere; its ray plane goes through it."""
+    inside = lamp((0, 0, 0.3))
+    camera = {"type": "orthographic"}
+    ball = sphere(TWO_SIDED)
+    return scene((2.5, 0, 0), (2.5, 1, 0), camera=camera, ball=ball, light=inside)
+
+
+def _leaking():
+    outside = lamp((0, -4, 0.3), 10.0)
+    return scene((0, 0, 0), (0, 1, 0), "direct", ball=sphere(TWO_SIDED), light=outside)
+
+
+def _dark_room():
+    return scene((0, 0, 0), (0, 1, 0), "direct", ball=sphere(flip_normals=True), sky=SKY)
+
+
+def _brushed():
+    brushed = {"type": "roughconductor", "material": "Au", "alpha_u": 0.05, "alpha_v": 0.6}
+    return scene(ball=sphere(brushed), sky=SKY)
+
+
+SCENES = {
+    "a two-sided rectangle seen from behind": _behind,
+    "a two-sided sphere cut open by the near clip plane": _cut_open,
+    "a two-sided sphere in the ray plane of an orthographic camera": _wide,
+    "a camera inside a two-sided sphere, a point outside": _leaking,
+    "a camera inside a sphere with flipped normals, light outside": _dark_room,
+    "an anisotropic sphere": _brushed,
+}
+"""By what is wrong in them; a function each, since transforms belong to a variant."""

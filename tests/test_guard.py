@@ -1,0 +1,179 @@
+"""The guard: wrong plans are caught at default settings, right ones are left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from comparisons.compare import compare, guarded
+from comparisons.options import Options
+from reference.rendering import guard
+from reference.rendering.guard import Guard, Verdict
+from reference.scene.source import Source
+from reports.page import page
+from reports.page.scene_view import SceneView
+from reports.terminal import progress
+from tests import misplanned
+from tests.misplanned import SCENES, SKY, lamp, prune_blindly, scene, sphere
+
+SLIGHTLY_WRONG = {"an anisotropic sphere"}
+"""Off by a percent: below what the guard is for."""
+
+
+@pytest.mark.parametrize("name", sorted(set(SCENES) - SLIGHTLY_WRONG))
+def test_a_wrong_plan_is_caught(rgb, name, monkeypatch):
+    prune_blindly(monkeypatch)
+    found = guarded(Source("wrong", SCENES[name]()))
+    assert found.guard.state is Verdict.DISAGREED
+    assert abs(found.guard.departure) > 0.2
+    assert (found.plan.integrator, found.plan.sampler) == ("path", "independent")
+    assert all(decision.rule == "guard" for decision in found.plan.decisions)
+
+
+@pytest.mark.parametrize(
+    "name", ["a two-sided rectangle seen from behind", "an anisotropic sphere"]
+)
+def test_the_right_plan_of_such_a_scene_is_kept(rgb, name):
+    ready = guarded(Source("right", SCENES[name]()))
+    assert ready.guard.state is not Verdict.DISAGREED
+    assert ready.plan.sampler != "independent"
+
+
+def test_the_record_says_what_was_found_and_done(rgb, monkeypatch):
+    source = Source("wrong", SCENES["a two-sided rectangle seen from behind"]())
+    options = Options(resolution=(8, 8), spp=64)
+    right = compare(source, options).record
+    assert right.plan.guard.state == "agreed"
+    assert right.plan.guard.rays > 0
+    assert not any("report" in warning for warning in right.warnings)
+    prune_blindly(monkeypatch)
+    wrong = compare(source, options).record
+    assert wrong.plan.guard.state == "disagreed"
+    assert wrong.plan.integrator == "path"
+    assert wrong.plan.guard.departure == pytest.approx(-1, abs=0.7)
+    assert any("please report it" in warning for warning in wrong.warnings)
+    assert any("Please report" in line for line in progress.summary([wrong]))
+    assert not any("Please report" in line for line in progress.summary([right]))
+    html = page.render([SceneView(record=wrong)])
+    assert "Guard: disagreed" in html
+    assert "So everything was simulated" in html
+    assert wrong.metrics["rmse"].mean < 0.05
+
+
+def test_the_time_of_the_probe_is_a_stage_of_its_own(rgb):
+    source = Source("times", scene(ball=sphere(), sky=SKY))
+    time = compare(source, Options(resolution=(8, 8), spp=64)).record.time
+    assert time.stages["guard"] > 0
+    assert time.stages["scene and pairing"] >= 0
+
+
+def test_nothing_is_probed_where_nothing_is_left_out(rgb):
+    balls = {"one": sphere(), "two": {"type": "sphere", "center": (2, 1, 0)}}
+    source = Source("whole", scene(**balls, light=lamp((0, -3, 3))))
+    assert guarded(source).guard == Guard(Verdict.NOT_NEEDED)
+    assert guarded(source, Options(everything=True)).guard == Guard(Verdict.NOT_NEEDED)
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"], indirect=True)
+def test_it_probes_in_other_variants(variant, monkeypatch):
+    description = scene(ball=sphere(misplanned.TWO_SIDED), light=lamp((0, -4, 1), 9.0))
+    assert guarded(Source("seen", description)).guard.state is Verdict.AGREED
+    inside = SCENES["a camera inside a two-sided sphere, a point outside"]()
+    prune_blindly(monkeypatch)
+    assert guarded(Source("wrong", inside)).guard.state is Verdict.DISAGREED
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        {"type": "radiancemeter", "origin": (0, -4, 0), "direction": (0, 1, 0)},
+        {"type": "distant", "direction": (0, 1, 0), "target": (0, 0, 0)},
+    ],
+    ids=lambda sensor: sensor["type"],
+)
+def test_it_probes_cameras_of_a_single_ray(rgb, sensor):
+    film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
+    description = scene(ball=sphere(), light=lamp((0, -3, 0)))
+    description["sensor"] = sensor | {"film": film}
+    found = guarded(Source("ray", description)).guard
+    assert (found.state, found.departure) == (Verdict.AGREED, pytest.approx(0, abs=1e-5))
+
+
+def pretending(monkeypatch, draw):
+    """Let the probe's rays return what ``draw(rng, count)`` does: two arrays."""
+    rng = np.random.default_rng(7)
+
+    def followed(scene, integrators, count, seeds):
+        return np.array(draw(rng, count))
+
+    monkeypatch.setattr(guard, "_followed", followed)
+    monkeypatch.setattr(guard, "physical_integrator", lambda *given: None)
+
+
+def rate(ready, samples, repeats):
+    """Share of repeats in which the probe disagrees."""
+    plan = ready.plan
+    found = [guard.examine_plan(plan, None, False, samples, seed) for seed in range(repeats)]
+    return np.mean([each.state is Verdict.DISAGREED for each in found])
+
+
+@pytest.fixture
+def pruned(rgb):
+    return guarded(Source("pruned", scene(ball=sphere(), sky=SKY)))
+
+
+def normal(rng, count):
+    return 1 + rng.normal(size=count), 1 + rng.normal(size=count)
+
+
+def fireflies(rng, count):
+    """One ray of a thousand carries a third of the light, with no third moment."""
+    rare = (rng.random(count) < 1e-3) * (1 + rng.pareto(2.5, count)) / (5 / 3)
+    return np.ones(count), 2 / 3 + 1000 / 3 * rare
+
+
+@pytest.mark.parametrize("noise", [normal, fireflies])
+def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
+    pretending(monkeypatch, noise)
+    assert rate(pruned, 2**20, 100) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [normal, fireflies])
+def test_noise_alone_raises_one_alarm_in_a_thousand_at_most(pruned, monkeypatch, noise):
+    pretending(monkeypatch, noise)
+    assert rate(pruned, 2**20, 10_000) <= 0.001
+
+
+@pytest.mark.parametrize(("departure", "caught"), [(0.0, 0.0), (0.2, 1.0)])
+def test_a_fifth_of_the_light_is_seen_through_noise(pruned, monkeypatch, departure, caught):
+    """Noise of each ray as large as the light, at the fewest rays."""
+
+    def draw(rng, count):
+        return 1 - departure + rng.normal(size=count), 1 + rng.normal(size=count)
+
+    pretending(monkeypatch, draw)
+    assert rate(pruned, 1, 40) == caught
+
+
+def test_the_rays_are_a_share_of_the_samples_within_limits(pruned, monkeypatch):
+    pretending(monkeypatch, lambda rng, count: (1 + 9 * rng.normal(size=count), np.ones(count)))
+    few, some, many = (
+        guard.examine_plan(pruned.plan, None, False, samples, 3).rays
+        for samples in (1, 2**23, 2**40)
+    )
+    assert few == guard.FEWEST
+    assert some == pytest.approx(guard.SHARE * 2**23, rel=0.01)
+    assert guard.FEWEST < many <= guard.MOST
+
+
+def test_a_plan_made_by_hand_is_guarded_as_well(rgb):
+    """Depth 2 where the scene has light that is reflected more than once."""
+    room = {"type": "sphere", "flip_normals": True, "bsdf": misplanned.DIFFUSE}
+    source = Source("room", scene((0, 0, 0), (0, 1, 0), room=room, light=lamp((0, 0, 0.3))))
+    ready = guarded(source)
+    assert ready.guard.state is Verdict.NOT_NEEDED
+    shallow = replace(ready.plan, integrator="direct_all", max_depth=2)
+    found = guard.examine_plan(shallow, ready.scene, False, 2**18, 0)
+    assert found.state is Verdict.DISAGREED
+    assert found.departure == pytest.approx(-0.7, abs=0.1)

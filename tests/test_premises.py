@@ -1,0 +1,192 @@
+"""The rules of pruning: each is refused where a premise does not hold, and the images show why."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import prepare
+from comparisons.options import Options
+from reference.effects.obstacles import NO_SECOND_REFLECTION, NO_SHADOWS
+from reference.planning.facts import Facts, examine
+from reference.planning.light_by_light import LIGHT_BY_LIGHT
+from reference.planning.premises import (
+    CONVEX,
+    NO_MEDIUM,
+    OPAQUE,
+    SEEN_FROM_OUTSIDE,
+    STILL,
+)
+from reference.planning.shapes import Form
+from reference.planning.tabulation import TABULATED_ENVIRONMENT
+from reference.rendering.passes import pass_seed
+from reference.scene.source import Source
+from tests.misplanned import DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere
+
+SPP, PASSES = 256, 4
+
+
+def means(description):
+    """The mean of the plan's reference and of the scene's own integrator, and their doubt."""
+    ready = prepare(Source("misplanned", description), Options(spp=SPP * PASSES))
+    ready.reference.spp = SPP
+    stock = mi.load_dict(description, optimize=False)
+    found = []
+    for side in (
+        lambda seed: ready.reference.render(pass_seed(seed, 0)),
+        lambda seed: mi.render(stock, spp=SPP, seed=seed),
+    ):
+        passes = [float(np.mean(np.array(side(number)))) for number in range(PASSES)]
+        found.append((np.mean(passes), np.std(passes, ddof=1) / PASSES**0.5))
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):
+    (planned, error), (stock, other) = means(SCENES[name]())
+    assert abs(planned - stock) < 0.002 * stock + 5 * np.hypot(error, other) + 1e-6
+
+
+def test_with_every_premise_taken_for_true_it_is_wrong(rgb, monkeypatch):
+    """The anisotropic one by a percent; the others by so much that the guard finds them."""
+    prune_blindly(monkeypatch)
+    (planned, error), (stock, other) = means(SCENES["an anisotropic sphere"]())
+    assert abs(planned - stock) > 0.005 * stock + 5 * np.hypot(error, other)
+
+
+def facts_of(description):
+    ready = prepare(Source("premises", description))
+    return Facts(ready.pair, examine(ready.pair.physical, ready.scene))
+
+
+def camera(plugin="perspective", **more):
+    return {"type": plugin, **more}
+
+
+def test_a_scene_for_which_all_premises_hold_is_pruned(rgb):
+    facts = facts_of(scene(ball=sphere(), sky={"type": "constant"}))
+    for rule in (NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT):
+        assert rule.judge(facts).holds
+
+
+GLASS = {"type": "dielectric"}
+MASKED = {"type": "mask", "opacity": 0.5, "bsdf": DIFFUSE}
+BLENDED = {"type": "blendbsdf", "weight": 0.5, "one": DIFFUSE, "two": DIFFUSE}
+FOG = {"type": "homogeneous", "albedo": 0.5, "sigma_t": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("premise", "parts"),
+    [
+        (NO_MEDIUM, {"ball": sphere(bsdf={"type": "null"}, interior=FOG)}),
+        (OPAQUE, {"ball": sphere(bsdf=GLASS)}),
+        (OPAQUE, {"ball": sphere(bsdf=MASKED)}),
+        (OPAQUE, {"ball": sphere(bsdf=BLENDED)}),
+        (STILL, {"ball": sphere(), "camera": camera(shutter_open=0.0, shutter_close=1.0)}),
+        (CONVEX, {"tube": {"type": "cylinder", "bsdf": DIFFUSE}}),
+        (CONVEX, {"box": {"type": "cube", "flip_normals": True, "bsdf": DIFFUSE}}),
+        (CONVEX, {"box": {"type": "cube", "bsdf": TWO_SIDED}}),
+        (SEEN_FROM_OUTSIDE, {"ball": sphere(bsdf=TWO_SIDED), "camera": camera(near_clip=4.0)}),
+        (SEEN_FROM_OUTSIDE, {"ball": sphere(flip_normals=True), "camera": camera(near_clip=4.0)}),
+        (
+            SEEN_FROM_OUTSIDE,
+            {
+                "ball": sphere(bsdf=TWO_SIDED),
+                "viewer": (2.5, 0, 0),
+                "target": (2.5, 1, 0),
+                "camera": camera("thinlens", aperture_radius=3.0, focus_distance=5.0),
+            },
+        ),
+        (
+            SEEN_FROM_OUTSIDE,
+            {"ball": sphere(bsdf=TWO_SIDED), "camera": camera("radiancemeter")},
+        ),
+    ],
+)
+def test_a_premise_that_fails_is_named(rgb, premise, parts):
+    facts = facts_of(scene(light=lamp((0, -3, 3)), **parts))
+    for rule in (NO_SHADOWS, NO_SECOND_REFLECTION):
+        ruling = rule.judge(facts)
+        assert (ruling.failed, ruling.holds) == (premise, False)
+        assert ruling.evidence
+
+
+def test_a_mirrored_transform_turns_the_sides_round(rgb):
+    """Mitsuba's sphere then has its normals inside, as with ``flip_normals``."""
+    mirrored = mi.ScalarTransform4f().scale((-1, 1, 1))
+    shapes = {
+        "ball": sphere(),
+        "flipped": sphere(flip_normals=True),
+        "mirrored": {"type": "sphere", "to_world": mirrored, "bsdf": DIFFUSE},
+        "both": {"type": "sphere", "to_world": mirrored, "flip_normals": True, "bsdf": DIFFUSE},
+        "box": {"type": "cube", "bsdf": DIFFUSE},
+        "hollow": {"type": "cube", "flip_normals": True, "bsdf": DIFFUSE},
+    }
+    found = {s.name: s for s in facts_of(scene(**shapes, light=lamp((9, 9, 9)))).structure.shapes}
+    sides = {name: (shape.outer, shape.inner) for name, shape in found.items()}
+    out, inside = (True, False), (False, True)
+    assert sides == {
+        "ball": out, "flipped": inside, "mirrored": inside, "both": out, "box": out,
+        "hollow": inside,
+    }  # fmt: skip
+    assert found["ball"].form is Form.CLOSED
+
+
+def test_a_mesh_whose_normals_disagree_is_of_no_known_form(rgb):
+    """Of a mirrored cube Mitsuba's shading normals point outwards, and the geometric ones in."""
+    mirrored = mi.ScalarTransform4f().scale((-1, 1, 1))
+    box = {"type": "cube", "to_world": mirrored, "bsdf": DIFFUSE}
+    facts = facts_of(scene(box=box, light=lamp((9, 9, 9))))
+    assert facts.structure.shape("box").form is Form.OTHER
+
+
+def test_camera_rays_begin_where_mitsuba_lets_them(rgb):
+    """The set of origins holds those of random rays, for each kind of camera."""
+    rng = np.random.default_rng(0)
+    for kind in ("perspective", "thinlens", "orthographic"):
+        more = {"aperture_radius": 0.7, "focus_distance": 4.0} if kind == "thinlens" else {}
+        description = scene(ball=sphere(), light=lamp((9, 9, 9)), camera=camera(kind, **more))
+        description["sensor"] |= {"near_clip": 0.5}
+        ready = prepare(Source("rays", description))
+        found = examine(ready.pair.physical, ready.scene).camera
+        film, lens = (mi.Point2f(rng.random((2, 4096)).astype(np.float32)) for _ in range(2))
+        ray, _ = ready.scene.sensors()[0].sample_ray(0.0, 0.5, film, lens)
+        origins = np.array(ray.o).T
+        low, high = found.origins.min(axis=0), found.origins.max(axis=0)
+        assert np.all(origins > low - 1e-5)
+        assert np.all(origins < high + 1e-5)
+        assert np.ptp(origins @ found.axis) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("plugin", "more", "holds"),
+    [
+        ("roughconductor", {"alpha": 0.3}, True),
+        ("roughconductor", {"alpha_u": 0.1, "alpha_v": 0.5}, False),
+        ("diffuse", {"reflectance": {"type": "checkerboard"}}, False),
+    ],
+)
+def test_a_table_over_cosines_is_for_isotropic_even_surfaces(rgb, plugin, more, holds):
+    ball = sphere(bsdf={"type": plugin, **more})
+    facts = facts_of(scene(ball=ball, sky={"type": "constant"}))
+    assert TABULATED_ENVIRONMENT.judge(facts).holds is holds
+
+
+def test_a_lamp_that_is_seen_from_inside_is_left_to_mitsuba(rgb):
+    """Its own integrators do not agree there on how much light it sends to itself."""
+    ball = sphere(TWO_SIDED, emitter={"type": "area", "radiance": 1.0})
+    inside = scene((0, 0, 0), (0, 1, 0), "direct", ball=ball)
+    ruling = LIGHT_BY_LIGHT.judge(facts_of(inside))
+    assert (ruling.holds, ruling.evidence) == (False, "ball: shines, and may be seen from inside")
+    assert LIGHT_BY_LIGHT.judge(facts_of(scene(ball=ball))).holds
+    images = []
+    for settings in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
+        stock = mi.load_dict(inside | {"integrator": {"type": "direct", **settings}})
+        images.append(np.array(mi.render(stock, spp=16)).mean())
+    assert abs(images[0] - images[1]) > 0.01
+
+
+def test_two_sides_of_two_kinds_have_no_table(rgb):
+    sides = {"type": "twosided", "front": DIFFUSE, "back": {"type": "roughplastic"}}
+    plate = {"type": "rectangle", "bsdf": sides}
+    facts = facts_of(scene(plate=plate, sky={"type": "constant"}))
+    assert not TABULATED_ENVIRONMENT.judge(facts).holds

@@ -1,0 +1,59 @@
+"""Random scenes: the plan's reference has the mean of stock Mitsuba's own integrator.
+
+A seed in a test's name can be examined alone: ``python -m tests.random_scenes SEED 1 VARIANT``.
+"""
+
+import pytest
+
+from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
+from reference.planning.premises import Pruning, Ruling
+from tests.random_scenes import examine, run
+
+RIGHT = ("right", "same")
+FEW = 24
+MANY = 2000
+
+
+@pytest.mark.parametrize("seed", range(FEW))
+def test_the_plan_of_a_random_scene_is_right(rgb, tmp_path, seed):
+    found = examine(seed, tmp_path)
+    assert found.state in RIGHT, found
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"], indirect=True)
+@pytest.mark.parametrize("seed", [0, 12, 28])
+def test_it_is_in_other_variants(variant, tmp_path, seed):
+    found = examine(seed, tmp_path)
+    assert found.state in RIGHT, found
+
+
+def test_wrong_plans_are_found(rgb, tmp_path, monkeypatch):
+    """With every premise taken for true: seed 3 has shadows, or light reflected twice."""
+    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
+    assert examine(3, tmp_path).state == "wrong"
+
+
+def test_the_scenes_differ_in_what_is_called_for(rgb, tmp_path):
+    from comparisons.compare import prepare
+    from reference.scene.source import Source
+    from tests.random_scenes import random_scene
+
+    found = set()
+    for seed in range(FEW):
+        plan = prepare(Source("random", random_scene(seed, tmp_path))).plan
+        found.add((plan.calls_for(OCCLUSION), plan.calls_for(INTERREFLECTION), plan.integrator))
+    assert len(found) >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("count", "variant"),
+    [(MANY, "llvm_ad_rgb"), (MANY // 20, "llvm_ad_spectral"), (MANY // 20, "llvm_ad_mono")],
+)
+def test_the_plans_of_many_random_scenes_are_right(count, variant, capsys):
+    lines = list(run(0, count, variant))
+    with capsys.disabled():
+        print(f"\n{count} scenes in {variant}:")
+        print(*(line for line in lines if line.split()[1] not in RIGHT), sep="\n")
+    assert len(lines) == count
+    assert [line for line in lines if line.split()[1] not in RIGHT] == []
