@@ -1,7 +1,7 @@
-"""POV-Ray as a witness of the heuristic: the same figure, by a program that shares no code with it.
+"""POV-Ray as a witness of the heuristic: the same figure by a program that shares no code with it.
 
-POV-Ray's ``ambient``, ``diffuse`` and ``phong`` are the terms of equation 8.10. The translation reads
-numbers from a scene dictionary, and leaves vectors, camera and sums to POV-Ray:
+POV-Ray's ``ambient``, ``diffuse`` and ``phong`` are the terms of equation 8.10. The translation
+reads numbers from a scene dictionary, and leaves vectors, camera and sums to POV-Ray:
 
 - It is left-handed; a negative ``right`` turns it into the right-handed frame of the figures.
 - One ray per pixel, through the centre: no antialiasing, no jitter.
@@ -62,9 +62,10 @@ def _camera(sensor):
     """Of the transform, the place and the way it looks: up is z in all figures."""
     matrix = np.array(sensor["to_world"].matrix, float)
     place = matrix[:3, 3]
+    ahead = place + matrix[:3, 2] * np.linalg.norm(place)
     return (
         f"camera {{ perspective location {_triple(place)} sky z right -x up y"
-        f" angle {sensor['fov']} look_at {_triple(place + matrix[:3, 2] * np.linalg.norm(place))} }}"
+        f" angle {sensor['fov']} look_at {_triple(ahead)} }}"
     )
 
 
