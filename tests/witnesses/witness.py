@@ -67,13 +67,14 @@ class Witness:
 
 @dataclass(frozen=True)
 class Deviation:
-    """The reference less the closed form, and half widths of the intervals about it.
+    """The reference less the closed form, its standard errors, and half widths of intervals.
 
-    Both are in units of the closed form's mean. The first entry is the mean over the image, the
+    All are in units of the closed form's mean. The first entry is the mean over the image, the
     others are those over its blocks.
     """
 
     value: np.ndarray
+    standard_error: np.ndarray
     half_width: np.ndarray
     spp: int
     passes: int
@@ -100,7 +101,7 @@ def deviation(witness: Witness, everything: bool = False, factor: float = 1.0) -
     error = np.sqrt(variance / pixels) / expected.mean()
     tests = 1 if witness.mean_only else len(found)
     half_width = stats.norm.isf(CHANCE / tests / 2) * error + witness.form_error
-    return Deviation(found[:tests], half_width[:tests], spp, len(images))
+    return Deviation(found[:tests], error[:tests], half_width[:tests], spp, len(images))
 
 
 def picture(witness: Witness) -> np.ndarray:
