@@ -25,7 +25,7 @@ SINGLE = 1e-6
 """And the kernel by no more than this, absolute: positions and normals are of single precision."""
 
 SILHOUETTE = 8
-"""Pixels, of about 3,000 to 6,000, that only one of the two may see: edges, and where light ends."""
+"""Pixels, of some thousands, that one of the two alone may see: edges, and where light ends."""
 
 MEAN = 5e-5
 """What ties in the rounding to half precision leave in the mean over a figure, relative."""
