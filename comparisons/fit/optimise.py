@@ -9,7 +9,10 @@ finds that minimum exactly, so that a parameter reaches its bound and does not o
 takes ten: it sees a curvature where a distance has none.)
 
 A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
-several widths with the coefficients that suit each best.
+several widths with the coefficients that suit each best. So can a little light where there is none:
+in the dark a distance grows faster than the light, and a coefficient next to 0 is a minimum beside
+that at 0. Where the search has ended, each coefficient is put at its bounds, and the search goes on
+from there if the loss is less.
 """
 
 from dataclasses import dataclass
@@ -45,7 +48,9 @@ class Start(Record):
     Attributes
     ----------
     n
-        Exponent of the start; null for the paired parameters.
+        Exponent of the start; null for the paired parameters, and where a bound was tried.
+    bound
+        Number of the parameter that was put at a bound where another search had ended; else null.
     loss, final_loss
         Where it began and ended (:meth:`Residuals.loss`); null where it was not followed, since
         others began better.
@@ -56,6 +61,7 @@ class Start(Record):
     final_loss: Amount | None = None
     evaluations: Count = 0
     converged: bool = False
+    bound: Count | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,10 @@ class Residuals:
 
     def differences(self, x):
         """Return the differences of the coordinates, (N, K)."""
-        return self.distance.coordinates(self.model.image(x), self.viewing) - self._wanted
+        return self._differences_of(self.model.image(x))
+
+    def _differences_of(self, image):
+        return self.distance.coordinates(image, self.viewing) - self._wanted
 
     def changes(self, x):
         """Return their derivatives, (N, K, parameters)."""
@@ -101,7 +110,11 @@ class Residuals:
 
     def loss(self, x):
         """Return the loss."""
-        square = np.sum(self.differences(x) ** 2, axis=1)
+        return self.loss_of(self.model.image(x))
+
+    def loss_of(self, image):
+        """Return the loss of an image (N, 3) of the pixels that count."""
+        square = np.sum(self._differences_of(image) ** 2, axis=1)
         c = self.distance.rounding
         # The same as sqrt(d^2 + c^2) - c, without the difference of like numbers.
         values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
@@ -159,7 +172,22 @@ def minimise(residuals):
             starts.append(Start(n, losses[place], loss, evaluations, converged))
         else:
             starts.append(Start(n, losses[place]))
-    return Solution(best[1], best[0], tuple(starts))
+    return _at_bounds(residuals, Solution(best[1], best[0], tuple(starts)))
+
+
+def _at_bounds(residuals, solution):
+    """Return the solution, or a better one that has a coefficient at one of its bounds."""
+    low, high = parameters.bounds(residuals.model.parameters)
+    for place in np.flatnonzero(residuals.model.linear):
+        for bound in {low[place], high[place]} - {solution.x[place]}:
+            x = solution.x.copy()
+            x[place] = bound
+            before = residuals.loss(x)
+            if before < solution.loss:
+                x, loss, evaluations, converged = _descend(residuals, x)
+                tried = Start(None, before, loss, evaluations, converged, int(place))
+                solution = Solution(x, loss, (*solution.starts, tried))
+    return solution
 
 
 def _descend(residuals, x):
