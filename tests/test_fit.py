@@ -303,20 +303,29 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(loss, rgb):
     assert best.loss + best.parameter_error == pytest.approx(found[0], rel=1e-4)
 
 
-@pytest.mark.parametrize("name", ["fig-8-7a", "fig-8-7b", "fig-8-9"])
+@pytest.mark.parametrize("name", ["fig-8-7a", "fig-8-9"])
 def test_no_coefficient_does_better_at_one_of_its_bounds(name, rgb):
-    """A little light in the dark is a minimum of its own: k_d of 8e-5 beside the better one, 0."""
+    """In the plain mean distance, too: a loss that is rounded where it is seen ends elsewhere.
+
+    With a rounding of 1 the fit of figure 8.7a has a mean of 1.741 at k_d = 8e-5, and 1.718 at 0.
+    """
     rendered = rendered_for_a_fit(name)
     counted = rendered.counted
     surface = rendered.surface.within(counted.ravel())
     residuals = residuals_of(surface, rendered.reference.mean[counted])
+
+    def mean_distance(x):
+        return np.linalg.norm(residuals.differences(x), axis=1).mean()
+
     solution = optimise.minimise(residuals)
+    assert mean_distance(solution.x) == pytest.approx(solution.loss, abs=0.1)
     low, high = bounds(residuals.model.parameters)
     for place in np.flatnonzero(residuals.model.linear):
         for bound in (low[place], high[place]):
             x = solution.x.copy()
             x[place] = bound
             assert residuals.loss(x) >= solution.loss
+            assert mean_distance(x) >= mean_distance(solution.x)
 
 
 def rendered_for_a_fit(name):

@@ -9,13 +9,12 @@ finds that minimum exactly, so that a parameter reaches its bound and does not o
 takes ten: it sees a curvature where a distance has none.)
 
 A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
-several widths with the coefficients that suit each best. So can a little light where there is none:
-in the dark a distance grows faster than the light, and a coefficient next to 0 is a minimum beside
-that at 0. Where the search has ended, each coefficient is put at its bounds, and the search goes on
-from there if the loss is less.
+several widths with the coefficients that suit each best. So can the kink that a distance has at 0,
+which is hardly rounded in the end: each search first goes through a loss that is rounded more,
+:data:`SMOOTH`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log
 
 import numpy as np
@@ -29,6 +28,9 @@ STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
 
 FOLLOWED = 2
 """The starts that are followed to their minimum, besides the paired one: those of least loss."""
+
+SMOOTH = 1.0
+"""Rounding, in the loss's unit, of the loss that a search goes through first."""
 
 LARGEST_COUNT = 60
 """Evaluations of one search."""
@@ -48,9 +50,7 @@ class Start(Record):
     Attributes
     ----------
     n
-        Exponent of the start; null for the paired parameters, and where a bound was tried.
-    bound
-        Number of the parameter that was put at a bound where another search had ended; else null.
+        Exponent of the start; null for the paired parameters.
     loss, final_loss
         Where it began and ended (:meth:`Residuals.loss`); null where it was not followed, since
         others began better.
@@ -61,7 +61,6 @@ class Start(Record):
     final_loss: Amount | None = None
     evaluations: Count = 0
     converged: bool = False
-    bound: Count | None = None
 
 
 @dataclass(frozen=True)
@@ -95,6 +94,12 @@ class Residuals:
         self.model, self.reference = model, reference
         self.distance, self.viewing = distance, viewing
         self._wanted = distance.coordinates(reference, viewing)
+
+    def smoothed(self):
+        """Return the same with a loss that is rounded by :data:`SMOOTH` or more."""
+        rounding = max(self.distance.rounding, SMOOTH)
+        distance = replace(self.distance, rounding=rounding)
+        return Residuals(self.model, self.reference, distance, self.viewing)
 
     def differences(self, x):
         """Return the differences of the coordinates, (N, K)."""
@@ -167,27 +172,14 @@ def minimise(residuals):
     starts, best = [], (inf, paired)
     for place, (n, x) in enumerate(candidates):
         if place in followed:
+            x, _, before, _ = _descend(residuals.smoothed(), x)
             x, loss, evaluations, converged = _descend(residuals, x)
+            evaluations += before
             best = min(best, (loss, x), key=lambda pair: pair[0])
             starts.append(Start(n, losses[place], loss, evaluations, converged))
         else:
             starts.append(Start(n, losses[place]))
-    return _at_bounds(residuals, Solution(best[1], best[0], tuple(starts)))
-
-
-def _at_bounds(residuals, solution):
-    """Return the solution, or a better one that has a coefficient at one of its bounds."""
-    low, high = parameters.bounds(residuals.model.parameters)
-    for place in np.flatnonzero(residuals.model.linear):
-        for bound in {low[place], high[place]} - {solution.x[place]}:
-            x = solution.x.copy()
-            x[place] = bound
-            before = residuals.loss(x)
-            if before < solution.loss:
-                x, loss, evaluations, converged = _descend(residuals, x)
-                tried = Start(None, before, loss, evaluations, converged, int(place))
-                solution = Solution(x, loss, (*solution.starts, tried))
-    return solution
+    return Solution(best[1], best[0], tuple(starts))
 
 
 def _descend(residuals, x):
