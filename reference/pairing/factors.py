@@ -66,8 +66,8 @@ class Convention(Enum):
     ``MATCHED``
         By albedo at normal incidence (light along the normal, light leaving in all directions):
         ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
-        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe has the
-        same width (:func:`alpha_of`).
+        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe's top is as
+        wide (:func:`alpha_of`).
     """
 
     LITERAL = "literal"
@@ -101,7 +101,8 @@ def alpha_of(n, form="phong"):
     ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
     the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
-    1))``. Both forms are 1 at ``n = 0``.
+    1))``. Both forms are 1 at ``n = 0``. Near the top, that is: at half their height Phong's lobe
+    and the microfacets' are within 3 % of one width from ``n = 30`` on, and 9 % apart at ``n = 9``.
 
     >>> alpha_of(12)
     0.2
