@@ -121,12 +121,13 @@ class Significant(Record):
 
 
 class BsdfPair(Record):
-    """A BSDF and its partner; colours of one value are that value."""
+    """A BSDF and its partner; colours of one value are that value. The note says what is odd."""
 
     name: str
     given: str
     derived: str
     parameters: dict[str, Any]
+    note: str = ""
 
 
 class EmitterPair(Record):

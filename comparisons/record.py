@@ -91,6 +91,7 @@ def pairing(pair):
                 given=paired.given,
                 derived=paired.derived,
                 parameters=_short(paired.parameters),
+                note=paired.note,
             )
             for paired in pair.bsdfs
         ),

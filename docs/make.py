@@ -19,13 +19,15 @@ from nbclient import NotebookClient
 from comparisons import atomic
 from comparisons.compare import Options, compare
 from comparisons.gallery.builtin import builtin
-from heuristic import equations
+from heuristic import equations, plugins
 from heuristic.interpolation import Interpolation
 from reference.planning.plan import RULES
+from reference.rendering import direct
 from reference.scene.graph import set_variant
 from reports.charts import figures
 from reports.files import images
 from reports.terminal import tables
+from tests.witnesses import page
 
 DOCS = Path(__file__).parent
 SIDE, SAMPLES = 192, 64
@@ -64,6 +66,7 @@ def main(words):
     _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
     _architecture()
     _example()
+    _witnesses()
     _notebook()
 
 
@@ -173,6 +176,14 @@ def _example():
         results.append(compare(builtin("cornell-box").source(), options))
     atomic.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
     replace("reading.md", "example", tables.metrics_markdown(r.record for r in results))
+
+
+def _witnesses():
+    """Run the cases of docs/witnesses.md, and write what they show."""
+    plugins.register()
+    direct.register()
+    for part in ("closed_forms", "figures", "elsewhere"):
+        replace("witnesses.md", part.replace("_", " "), getattr(page, part)())
 
 
 def _notebook():

@@ -13,6 +13,7 @@ from markdown_it import MarkdownIt
 from nbclient import NotebookClient
 
 from reports import cli
+from tests.witnesses import page, test_povray
 
 ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -118,3 +119,13 @@ def test_the_notebook_is_kept_with_its_pictures_and_small():
     path = ROOT / "docs/tutorial.ipynb"
     assert path.read_text(encoding="utf-8").count('"image/png"') == 2
     assert path.stat().st_size < 400_000
+
+
+def test_the_witnesses_of_the_page_are_those_of_the_suite(make):
+    rows = [line.split(" | ") for line in part_of("witnesses.md", "closed forms", make)[2:]]
+    shown = [(row[0].removeprefix("| "), *row[1:3]) for row in rows]
+    assert shown == page.declared()
+    assert part_of("witnesses.md", "elsewhere", make) == list(page.elsewhere())
+    figures = part_of("witnesses.md", "figures", make)[2:]
+    names = [line.split(" | ")[0].removeprefix("| ") for line in figures]
+    assert names == test_povray.FIGURES + test_povray.OTHERS

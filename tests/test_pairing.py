@@ -1,6 +1,7 @@
 """The pairing of heuristic and physical values: factors, conventions, misses, refusals."""
 
 from math import pi, sqrt
+from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
@@ -15,6 +16,7 @@ from reference.pairing import albedo, factors, halves
 from reference.pairing.factors import Phong
 from tests.test_physics import look_at
 
+ROOT = Path(__file__).parents[1]
 MATCHED, LITERAL = Convention.MATCHED, Convention.LITERAL
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 
@@ -178,6 +180,49 @@ def test_a_matched_highlight_is_as_wide(rgb, form):
     wo = mi.Vector3f(mi.Float(np.sin(angles)), 0, mi.Float(np.cos(angles)))
     top, flank = np.array(bsdf.eval(context, si, wo), float)[0] / np.cos(angles)
     assert flank / top == pytest.approx(0.5, abs=0.01)
+
+
+def half_width(plastic):
+    """Return the angle at which a roughplastic's lobe has fallen to a half, in degrees."""
+    bsdf = mi.load_dict(
+        {"type": "roughplastic", "alpha": plastic.alpha, "int_ior": plastic.int_ior}
+    )
+    context = mi.BSDFContext()
+    context.type_mask = +mi.BSDFFlags.GlossyReflection
+    angles = np.linspace(0, np.pi / 2 - 1e-3, 20_001)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(angles))
+    si.wi = mi.Vector3f(0, 0, 1)
+    wo = mi.Vector3f(mi.Float(np.sin(angles)), 0, mi.Float(np.cos(angles)))
+    radiance = np.array(bsdf.eval(context, si, wo), float)[0] / np.cos(angles)
+    below = np.flatnonzero(radiance < radiance[0] / 2)
+    return np.degrees(angles[below[0]]) if len(below) else np.inf
+
+
+@pytest.mark.parametrize(
+    ("n", "wider"), [(3, 35), (5, 18), (9, 9), (15, 5), (30, 2.6), (100, 0.8), (400, 0.3)]
+)
+def test_a_matched_highlight_is_wider_by_what_the_page_says(rgb, n, wider):
+    """In percent at half the height; docs/pairing.md has this table."""
+    plastic, _ = factors.to_roughplastic(Phong((0.1,) * 3, (0.2,) * 3, n), MATCHED)
+    own = np.degrees(np.arccos(0.5 ** (1 / n)))
+    assert 100 * (half_width(plastic) / own - 1) == pytest.approx(wider, abs=0.6, rel=0.02)
+    table = (ROOT / "docs/pairing.md").read_text(encoding="utf-8")
+    assert f" {wider} % |" in table
+
+
+@pytest.mark.parametrize("name", ["fig-8-7a", "fig-8-7b", "fig-8-7c", "fig-8-8a", "fig-8-9"])
+def test_an_index_that_no_real_plastic_has_is_named(rgb, name):
+    (record,) = halves.pair(SCENES[name].source(), resolution=(8, 8)).bsdfs
+    assert record.parameters["int_ior"] > 1.8
+    assert f"{record.parameters['int_ior']:.3g}" in record.note
+    page = (ROOT / "docs/pairing.md").read_text(encoding="utf-8")
+    assert f"{record.parameters['int_ior']:.1f}" in page
+
+
+def test_a_real_plastic_has_no_note(rgb):
+    (record,) = pair_of({"type": "phong", "k_d": 0.3, "k_s": 1.0, "n": 48}).bsdfs
+    assert 1.3 < record.parameters["int_ior"] < 1.8
+    assert not record.note
 
 
 @pytest.mark.parametrize("k_s", [1e-6, 1e-8, 1e-12])

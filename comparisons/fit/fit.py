@@ -1,7 +1,9 @@
 """Fitting the heuristic half of a scene to its reference.
 
-What is left of the departure at the best parameters is the *model error*: no values of them would
-remove it. What they removed is the *parameter error* of those that the pairing table gave.
+What is left of the loss at the best parameters is the *model error*: no values of them would remove
+it. What they removed is the *parameter error* of those that the pairing table gave. Both are told
+of the loss, which was minimised, and not of other metrics, of which other parameters may leave
+less.
 """
 
 from dataclasses import dataclass, replace
@@ -155,7 +157,8 @@ def _attempt(rendered, form, chosen, viewing):
     ]
     error = rendered.difference.standard_error[counted]
     verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
-    return Attempt(model, solution, verdicts, covariance)
+    paired_loss = residuals.loss_of(rendered.before[counted])
+    return Attempt(model, solution, paired_loss, verdicts, covariance)
 
 
 def _judged(ready, rendered, attempts, viewing, intensities):
@@ -189,6 +192,7 @@ def _form_fits(attempt, departure, physical, lights):
             form=attempt.model.form,
             normalised=normalised,
             loss=attempt.solution.loss,
+            parameter_error=attempt.paired_loss - attempt.solution.loss,
             departure=departure,
             materials=summary.materials(attempt, normalised, physical),
             lights=summary.lights(attempt, lights) if lights else (),

@@ -10,24 +10,20 @@ from comparisons.records import VERSION, Amount, Count, Pixels, Record, Resoluti
 class Departure(Record):
     """Means of a metric over the counted pixels, in its unit.
 
+    It is not what was minimised, so that other parameters may leave less of it.
+
     Attributes
     ----------
     before, after
         With the paired parameters, and with the fitted ones.
     noise_floor
         What the reference's noise alone would give.
-    parameter_error
-        ``before - after``: what better parameters remove.
-    model_error
-        ``after``: what no parameters remove.
     """
 
     before: Amount
     after: Amount
     p95_after: Amount
     noise_floor: Amount
-    parameter_error: float
-    model_error: Amount
 
 
 class Fitted(Record, kw_only=True):
@@ -98,7 +94,10 @@ class FormFit(Record):
     normalised
         Whether k_s is the lobe's albedo at normal incidence.
     loss
-        At the best parameters, in the loss's own unit.
+        At the best parameters, in the loss's own unit: the *model error*, which no parameters of
+        this form remove.
+    parameter_error
+        The loss of the heuristic image as paired, less that: what better parameters remove.
     lights
         Factors on intensities; empty where they were not fitted.
     convergence
@@ -108,6 +107,7 @@ class FormFit(Record):
     form: Literal["phong", "blinn"]
     normalised: bool
     loss: Amount
+    parameter_error: float
     departure: dict[str, Departure]
     materials: tuple[FittedMaterial, ...]
     lights: tuple[FittedLight, ...]

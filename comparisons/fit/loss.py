@@ -18,6 +18,8 @@ too, but it is ruled by the darkest pixels, where the models differ whatever the
 - It is the distance and not its square that is averaged, as in the reports: a shadow, which no
   parameter makes, would otherwise bend all of them towards itself. Below :attr:`Loss.rounding` the
   distance turns into its square, ``sqrt(d^2 + c^2) - c``, so that it has derivatives everywhere.
+  That is a tenth of what is just noticeable: the loss is the mean distance to less than 0.1, and so
+  is its minimum.
 
 Residuals are not weighted by the reference's standard error: where a reference has no noise all
 weights would be infinite, and a fit to what is certain is not a fit to what is seen.
@@ -101,7 +103,7 @@ LOSSES = {
     loss.name: loss
     for loss in (
         Loss(
-            "perceptual", "ΔE (CAM16-UCS)", _perceptual, _perceptual_derivative, 0.05, rounding=1.0
+            "perceptual", "ΔE (CAM16-UCS)", _perceptual, _perceptual_derivative, 0.05, rounding=0.1
         ),
         Loss("linear", "white", _linear, _linear_derivative, 5e-4),
         Loss("log-luminance", "stops", _log, _log_derivative, 5e-3, sees_colour=False),

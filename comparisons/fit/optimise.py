@@ -9,10 +9,12 @@ finds that minimum exactly, so that a parameter reaches its bound and does not o
 takes ten: it sees a curvature where a distance has none.)
 
 A highlight's width can trap the search. It starts from the paired parameters, and from lobes of
-several widths with the coefficients that suit each best.
+several widths with the coefficients that suit each best. So can the kink that a distance has at 0,
+which is hardly rounded in the end: each search first goes through a loss that is rounded more,
+:data:`SMOOTH`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log
 
 import numpy as np
@@ -26,6 +28,9 @@ STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
 
 FOLLOWED = 2
 """The starts that are followed to their minimum, besides the paired one: those of least loss."""
+
+SMOOTH = 1.0
+"""Rounding, in the loss's unit, of the loss that a search goes through first."""
 
 LARGEST_COUNT = 60
 """Evaluations of one search."""
@@ -90,9 +95,18 @@ class Residuals:
         self.distance, self.viewing = distance, viewing
         self._wanted = distance.coordinates(reference, viewing)
 
+    def smoothed(self):
+        """Return the same with a loss that is rounded by :data:`SMOOTH` or more."""
+        rounding = max(self.distance.rounding, SMOOTH)
+        distance = replace(self.distance, rounding=rounding)
+        return Residuals(self.model, self.reference, distance, self.viewing)
+
     def differences(self, x):
         """Return the differences of the coordinates, (N, K)."""
-        return self.distance.coordinates(self.model.image(x), self.viewing) - self._wanted
+        return self._differences_of(self.model.image(x))
+
+    def _differences_of(self, image):
+        return self.distance.coordinates(image, self.viewing) - self._wanted
 
     def changes(self, x):
         """Return their derivatives, (N, K, parameters)."""
@@ -101,7 +115,11 @@ class Residuals:
 
     def loss(self, x):
         """Return the loss."""
-        square = np.sum(self.differences(x) ** 2, axis=1)
+        return self.loss_of(self.model.image(x))
+
+    def loss_of(self, image):
+        """Return the loss of an image (N, 3) of the pixels that count."""
+        square = np.sum(self._differences_of(image) ** 2, axis=1)
         c = self.distance.rounding
         # The same as sqrt(d^2 + c^2) - c, without the difference of like numbers.
         values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
@@ -154,7 +172,9 @@ def minimise(residuals):
     starts, best = [], (inf, paired)
     for place, (n, x) in enumerate(candidates):
         if place in followed:
+            x, _, before, _ = _descend(residuals.smoothed(), x)
             x, loss, evaluations, converged = _descend(residuals, x)
+            evaluations += before
             best = min(best, (loss, x), key=lambda pair: pair[0])
             starts.append(Start(n, losses[place], loss, evaluations, converged))
         else:

@@ -35,10 +35,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class Attempt:
-    """The best fit of one form, and what :mod:`comparisons.fit.identify` says of it."""
+    """The best fit of one form, and what :mod:`comparisons.fit.identify` says of it.
+
+    ``paired_loss`` is the loss of the image as paired.
+    """
 
     model: Model
     solution: Solution
+    paired_loss: float
     verdicts: list
     covariance: np.ndarray
 
@@ -59,8 +63,6 @@ def departure(before, after, reference, counted, noise, viewing):
             after=means[1],
             p95_after=float(np.percentile(maps[name][counted], 95)),
             noise_floor=noise_floor(metric, reference, noise, counted, viewing),
-            parameter_error=means[0] - means[1],
-            model_error=means[1],
         )
     return found, maps
 

@@ -21,6 +21,9 @@ STEPS = ("form", *(effect.label for effect in STEPPED))
 """What lies between the halves, in the order in which it is added to the heuristic image: the form
 of BSDFs and lights, and then one effect after the other."""
 
+DIMMED = {"quarter": 1 / 4, "sixteenth": 1 / 16}
+"""Parts of the light at which the departure is told too: what is visible depends on it."""
+
 LUMINANCE = "display-linear, 1 for a white diffuse surface that faces the light"
 IDENTITY = {
     "part": Column("", "part of the study", str),
@@ -68,6 +71,10 @@ def results():
         f"{name}_p95": Column("1", f"{label}, 95th percentile"),
         f"{name}_noise": Column("1", f"{label} that the noise of the comparison alone would give"),
         f"{name}_shape": Column("1", f"{label}, mean, after the best exposure"),
+        **{
+            f"{name}_{part}": Column("1", f"{label}, mean, under a {part} of the light")
+            for part in DIMMED
+        },
         "exposure": Column("1", f"factor on the heuristic image that makes {label} smallest"),
     }
     departure |= {name: Column("1", metric.heading) for name, metric in METRICS.items()}

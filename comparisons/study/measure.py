@@ -1,11 +1,13 @@
 """The departure of two images, or of two sets of directions, as the columns of a row."""
 
 import numpy as np
+from msgspec.structs import replace
 
 from comparisons.departure import statistics
 from comparisons.departure.metric import Pixelwise, checked_pair
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING
+from comparisons.study.columns import DIMMED
 
 
 def measure(heuristic, reference, counted, noise=None):
@@ -22,6 +24,7 @@ def measure(heuristic, reference, counted, noise=None):
         name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
         for name, metric in METRICS.items()
     }
+    dimmed = _dimmed(test, truth) if test.size else dict.fromkeys(DIMMED, np.zeros(1))
     return {
         "heuristic": float(test.mean()) if test.size else 0.0,
         "reference": float(truth.mean()) if truth.size else 0.0,
@@ -29,6 +32,7 @@ def measure(heuristic, reference, counted, noise=None):
         f"{LEADING.name}_p95": summary.p95,
         f"{LEADING.name}_noise": summary.noise_floor,
         f"{LEADING.name}_shape": summary.after_exposure.mean,
+        **{f"{LEADING.name}_{part}": float(values.mean()) for part, values in dimmed.items()},
         "exposure": summary.after_exposure.exposure,
         RATIO.name: ratio.mean,
     }
@@ -50,5 +54,17 @@ def measure_each(heuristic, reference):
         "heuristic": heuristic,
         "reference": reference,
         **{name: metric(test, truth) for name, metric in pixelwise.items()},
+        **{f"{LEADING.name}_{part}": values for part, values in _dimmed(test, truth).items()},
         RATIO.name: log2_luminance_ratio(test, truth),
+    }
+
+
+def _dimmed(test, truth):
+    """Return the leading metric of each pixel (N, 3) under the parts :data:`DIMMED` of the light.
+
+    Both models are linear in the light: less of it is a lower exposure on both images.
+    """
+    return {
+        part: LEADING(test, truth, replace(DEFAULT_VIEWING, exposure=factor))
+        for part, factor in DIMMED.items()
     }

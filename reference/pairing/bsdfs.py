@@ -20,9 +20,16 @@ COLOURS = {
 """Colours that are read when a scene is paired, and checked before."""
 
 
+PLASTICS = (1.3, 1.8)
+"""Indices of refraction of real plastics: fluoropolymers have 1.3, those full of sulphur 1.76."""
+
+
 @dataclass(frozen=True)
 class PairedBSDF:
-    """What a BSDF was replaced by, what the replacement misses, and what it has no form for."""
+    """What a BSDF was replaced by, what the replacement misses, and what it has no form for.
+
+    ``note`` says what is odd about the replacement.
+    """
 
     name: str
     given: str
@@ -30,6 +37,7 @@ class PairedBSDF:
     parameters: dict
     misses: tuple = ()
     lost: tuple = ()
+    note: str = ""
 
 
 def give_default(graph):
@@ -132,11 +140,25 @@ def _physical_properties(graph, index, convention):
         plastic, misses = _roughplastic_of(phong(graph, index), convention)
         props = properties("roughplastic", **asdict(plastic))
         record = PairedBSDF(
-            graph.label(index), "phong", "roughplastic", asdict(plastic), tuple(misses)
+            graph.label(index),
+            "phong",
+            "roughplastic",
+            asdict(plastic),
+            tuple(misses),
+            note=_unreal(plastic),
         )
     if given.get("twosided"):
         props["twosided"] = True
     return props, record
+
+
+def _unreal(plastic):
+    """Return a note on an index of refraction that no real plastic has; empty for others."""
+    low, high = PLASTICS
+    index = plastic.int_ior / plastic.ext_ior
+    if low <= index <= high:
+        return ""
+    return f"no real plastic has the index {index:.3g}: theirs are {low:g} to {high:g}"
 
 
 def phong(graph, index):

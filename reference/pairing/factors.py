@@ -8,9 +8,10 @@ Physical (Mitsuba)                             Heuristic
 ``diffuse``, reflectance ``rho``               ``k_d = k_a = rho``, ``k_s = 0``
 ``point``, intensity ``I``                     ``I_p0 = I / pi``, ``f_att = 1 / d^2``
 ``directional``, irradiance ``E``              ``I_p = E / pi``, ``f_att = 1``
-``spot``, intensity ``I``                      ``I_p0 = I / pi``, ``f_att = 1 / d^2``, the same
-                                               cone, ``m`` fitted; the other way cone and beam
-                                               width are fitted (`lights.spots`)
+``spot``, intensity ``I``                      ``I_p0 = s I / pi``, ``f_att = 1 / d^2``, the same
+                                               cone, ``m`` fitted, ``s`` that of equal flux; the
+                                               other way cone and beam width are fitted
+                                               (`lights.spots`)
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
@@ -18,8 +19,7 @@ closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L
 emission of radiance ``L``                     ``k_i = L``
 =============================================  =====================================================
 
-A point or spot of another ``f_att`` gets the intensity that gives the same mean irradiance over the
-visible surface, so that only the fall-off's shape is left as a difference.
+The rule for the level of lights without an exact pair is in :mod:`reference.pairing.lights`.
 
 A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
 mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded
@@ -66,8 +66,8 @@ class Convention(Enum):
     ``MATCHED``
         By albedo at normal incidence (light along the normal, light leaving in all directions):
         ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
-        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe has the
-        same width (:func:`alpha_of`).
+        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe's top is as
+        wide (:func:`alpha_of`).
     """
 
     LITERAL = "literal"
@@ -101,7 +101,8 @@ def alpha_of(n, form="phong"):
     ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
     the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
-    1))``. Both forms are 1 at ``n = 0``.
+    1))``. Both forms are 1 at ``n = 0``. Near the top, that is: at half their height Phong's lobe
+    and the microfacets' are within 3 % of one width from ``n = 30`` on, and 9 % apart at ``n = 9``.
 
     >>> alpha_of(12)
     0.2

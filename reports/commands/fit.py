@@ -46,7 +46,7 @@ from reports.terminal import verbosity
 def fit(scenes, output, form, as_json, markdown, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
-    The departure before less that after is the parameter error, the departure after the model
+    What the best parameters remove of the loss is the parameter error, what they leave the model
     error: no parameters remove it. Writes OUTPUT/SCENE/fit.json and fit.png (before, reference,
     after, residual). Unless told otherwise it renders 96x96 pixels with 64 samples each.
 

@@ -78,7 +78,9 @@ def markdown(records, scenes):
     yield (
         "Mean colour difference from the reference with the paired parameters (*before*) and with"
         " the best ones of the best form (*after*), and what the reference's noise alone would"
-        " give (*floor*). *Parameter error* is before less after, *model error* is after."
+        " give (*floor*). *Parameter error* and *model error* are of the loss, which is minimised:"
+        " what the best parameters remove of it, and what they leave. A metric is not minimised,"
+        " and other parameters may leave less of it."
     )
     yield ""
     yield from tables.markdown(_scene_rows(records), right=2)
@@ -90,12 +92,12 @@ def markdown(records, scenes):
 
 def _scene_rows(records):
     labels = (f"{metric.label}: before → after (floor)" for metric in drawn().values())
-    errors = ("parameter error (ΔE2000)", "model error (ΔE2000)")
+    errors = ("parameter error (loss)", "model error (loss)")
     yield "scene", "best form", *labels, *errors, "seconds"
     for record in records:
         departures = [record.nearest.departure[name] for name in drawn()]
         cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
-        parts = _three(departures[0].parameter_error), _three(departures[0].model_error)
+        parts = _three(record.nearest.parameter_error), _three(record.nearest.loss)
         yield record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"
 
 
@@ -123,12 +125,15 @@ def _departures(record):
         return name, *map(_three, means), loss
 
     yield "mean of", *(metric.label for metric in drawn().values()), "loss"
-    yield row("paired", record.fits[0], "before")
+    nearest = record.nearest
+    paired = nearest.loss + nearest.parameter_error
+    yield row("paired", record.fits[0], "before", f"{paired:.4g}")
     for fit in record.fits:
         yield row(_form(fit), fit, "after", f"{fit.loss:.4g}")
     yield row("noise floor", record.fits[0], "noise_floor")
-    yield row("parameter error", record.nearest, "parameter_error")
-    yield row("model error", record.nearest, "model_error")
+    blank = [""] * len(drawn())
+    yield "parameter error", *blank, f"{nearest.parameter_error:.4g}"
+    yield "model error", *blank, f"{nearest.loss:.4g}"
 
 
 def _parameters(fit):

@@ -91,6 +91,9 @@ def details(record):
     for light in pairing.emitters:
         note = f" ({light.note})" if light.note else ""
         yield f"  {light.name}: {light.given} as {light.derived}{note}"
+    for material in pairing.bsdfs:
+        if material.note:
+            yield f"  {material.name}: {material.given} as {material.derived} ({material.note})"
     for miss in pairing.misses:
         yield f"  missed: {miss.what}, {miss.wanted:.3g} wanted, {miss.reached:.3g} reached"
     for warning in record.warnings:

@@ -13,6 +13,25 @@ Physical                            Nearest
 textured ``area``                   as ``area``, of its mean radiance
 any other                           none: it is left out
 ==================================  ===============================================================
+
+**Level.** A light without an exact pair differs from its form in the other half by shape. Its level
+follows one rule, so that shape alone is what differs:
+
+*Equal flux, where the light says what it sends; equal mean irradiance over the surface that the
+camera sees, where it does not.*
+
+A light says what it sends where its own parameters tell its flux: what falls off as the inverse
+square sends the same flux through any sphere about it. Its pair then depends neither on the scene
+nor on the view. A light of another ``f_att`` has no flux: what it sends depends on how far one
+goes, and only the scene says how far that is.
+
+===============================  ==================================================================
+Equal flux                       ``spot`` both ways, textured ``spot``, ``projector``; ``area``, in
+                                 its far field; of environments the mean radiance, which is equal
+                                 flux through a small sphere, and the sun's irradiance
+Equal mean irradiance            ``heuristic_point``, ``heuristic_spot`` of another ``f_att`` than
+                                 ``1 / d^2``
+===============================  ==================================================================
 """
 
 from collections.abc import Callable, Iterator

@@ -4,6 +4,7 @@ Parallel light is an exact pair; a point is one where it falls off as Mitsuba's 
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import mitsuba as mi
 import numpy as np
@@ -22,22 +23,47 @@ def _to_heuristic(light: Given) -> PairedEmitter:
 
 
 def _to_physical(light: Given) -> PairedEmitter:
-    factor, exact, note = level(light, lambda travel: 1.0)
-    position, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)
+    found = level(light)
+    position, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(found.factor)
     props = properties("point", position=position, intensity=intensity)
-    return light.replace(props, factor, exact, note)
+    return light.replace(props, found.factor, found.keeps_flux, found.note)
 
 
-def level(light: Given, cone: Callable[[np.ndarray], object]) -> tuple[float, bool, str]:
-    """Return the factor from ``I_p0`` to Mitsuba's intensity, whether it is exact, and a note.
+@dataclass(frozen=True)
+class Level:
+    """The factor from ``I_p0`` to Mitsuba's intensity, whether both send one flux, and a note."""
 
-    ``cone(travel)`` is the light's factor in directions of travel (N, 3), which both sides share in
-    this mean.
+    factor: float
+    keeps_flux: bool
+    note: str
+
+
+def _everywhere(travel: np.ndarray) -> float:
+    return 1.0
+
+
+def level(
+    light: Given,
+    cone: Callable[[np.ndarray], object] = _everywhere,
+    derived_cone: Callable[[np.ndarray], object] = _everywhere,
+    flux_ratio: float = 1.0,
+) -> Level:
+    """Return the :class:`Level` of a heuristic point or spot (:mod:`reference.pairing.lights`).
+
+    Parameters
+    ----------
+    light
+        The light, whose ``f_att`` decides: of equal flux where it is the inverse square, of equal
+        mean irradiance over the visible surface where it is another.
+    cone, derived_cone
+        Factors of the light and of Mitsuba's in directions of travel (N, 3).
+    flux_ratio
+        The light's flux over that of Mitsuba's, both of one intensity on the axis.
     """
     defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
     k0, k1, k2 = (light.number(key, default) for key, default in defaults)
     if (k0, k1, k2) == INVERSE_SQUARE:
-        return IRRADIANCE_PER_INTENSITY, True, ""
+        return Level(IRRADIANCE_PER_INTENSITY * flux_ratio, True, "")
     clamped = light.value("clamped", False)
 
     def chapters(distance, travel):
@@ -45,13 +71,13 @@ def level(light: Given, cone: Callable[[np.ndarray], object]) -> tuple[float, bo
         return (np.minimum(factor, 1) if clamped else factor) * cone(travel)
 
     def physical(distance, travel):
-        return cone(travel) / distance**2
+        return derived_cone(travel) / distance**2
 
     place = light.position()
     here, there = (light.surface().mean_irradiance(place, f) for f in (chapters, physical))
     ratio = here / there if there > 0 else 1.0
     note = "same mean irradiance over the visible surface; only the fall-off's shape differs"
-    return IRRADIANCE_PER_INTENSITY * ratio, False, note
+    return Level(IRRADIANCE_PER_INTENSITY * ratio, False, note)
 
 
 POINT = LightKind(

@@ -2,7 +2,10 @@
 
 Mitsuba's ``spot`` is even up to its beam width and falls linearly in the angle to 0 at its cutoff;
 the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can be the other. The fit minimises
-``int (cos^m(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle.
+``int (s f(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle, ``g`` being
+the fall-off that is given and ``f`` the other's. The level ``s`` is not fitted: it is the one of
+equal flux, ``s int f sin = int g sin``, after the rule of :mod:`reference.pairing.lights`. On the
+axis the two then differ.
 
 The nearest form of a picture thrown by a point is the even cone of the same flux.
 """
@@ -48,12 +51,14 @@ STEPS = 2048
 
 
 def exponent_for(cutoff: float, beam_width: float) -> float:
-    """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off; angles in degrees."""
+    """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off at equal flux; angles in degrees."""
     theta, weight = _cone(cutoff)
-    wanted = linear_falloff(theta, cutoff, beam_width)
+    wanted, flux = linear_falloff(theta, cutoff, beam_width), linear_flux(cutoff, beam_width)
 
     def distance(log_m):
-        return np.sum(weight * (power_falloff(theta, np.expm1(log_m)) - wanted) ** 2)
+        m = np.expm1(log_m)
+        fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
+        return np.sum(weight * (fitted - wanted) ** 2)
 
     # In log(1 + m), because sharp spots differ little from one exponent to the next.
     found = minimize_scalar(distance, bounds=(0, np.log(LARGEST_EXPONENT)), method="bounded")
@@ -61,15 +66,17 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
 
 
 def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
-    """Return the cutoff and beam width whose linear fall-off is nearest to ``cos^m``, in degrees.
+    """Return the cutoff and beam width of the linear fall-off that is nearest to ``cos^m``.
 
-    A sharp beam ends long before its cone does, so that the cutoff is fitted too, up to the cone's.
+    At equal flux, and in degrees. A sharp beam ends long before its cone does, so that the cutoff
+    is fitted too, up to the cone's.
     """
     theta, weight = _cone(cutoff)
-    wanted = power_falloff(theta, exponent)
+    wanted, flux = power_falloff(theta, exponent), power_flux(cutoff, exponent)
 
     def distance(edge, beam_width):
-        return np.sum(weight * (linear_falloff(theta, edge, beam_width) - wanted) ** 2)
+        fitted = flux / linear_flux(edge, beam_width) * linear_falloff(theta, edge, beam_width)
+        return np.sum(weight * (fitted - wanted) ** 2)
 
     def best_beam(edge):
         # Mitsuba refuses a beam as wide as the cone; just below it the cone is even.
@@ -90,9 +97,25 @@ def linear_falloff(theta: np.ndarray, cutoff: float, beam_width: float) -> np.nd
     return np.clip((cutoff - theta) / max(cutoff - beam_width, 1e-12), 0, 1)
 
 
+def linear_flux(cutoff: float, beam_width: float) -> float:
+    """Return ``int g(t) sin(t) dt`` of that: ``1 - (sin c - sin b) / (c - b)``; in degrees."""
+    c, b = np.radians((cutoff, min(beam_width, cutoff * (1 - 1e-9))))
+    # The quotient of the sines as a product: for narrow beams it is nearly 1.
+    return float(1 - np.cos((c + b) / 2) * np.sinc((c - b) / (2 * np.pi)))
+
+
 def power_falloff(theta: np.ndarray, exponent: float) -> np.ndarray:
-    """Return ``cos^m(theta)``, 0 beyond a right angle; ``theta`` in degrees."""
+    """Return ``cos^m(theta)``, 0 beyond a right angle but for ``m = 0``; ``theta`` in degrees."""
+    if exponent == 0:
+        return np.ones_like(theta)
     return np.maximum(np.cos(np.radians(theta)), 0) ** exponent * (theta < 90)
+
+
+def power_flux(cutoff: float, exponent: float) -> float:
+    """Return ``int cos^m(t) sin(t) dt`` up to a cutoff in degrees."""
+    cosine = np.cos(np.radians(cutoff))
+    edge = cosine if exponent == 0 else max(cosine, 0.0)
+    return float((1 - edge ** (exponent + 1)) / (exponent + 1))
 
 
 def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
@@ -106,16 +129,21 @@ def _to_heuristic(light: Given) -> PairedEmitter:
     cutoff = light.number("cutoff_angle", 20.0)
     beam_width = light.number("beam_width", 0.75 * cutoff)
     exponent = exponent_for(cutoff, beam_width)
+    factor = INTENSITY_FACTOR * linear_flux(cutoff, beam_width) / power_flux(cutoff, exponent)
     props = heuristic(
         "heuristic_spot",
+        factor,
         position=mi.ScalarPoint3d(*light.position()),
         direction=mi.ScalarVector3f(*light.column(2)),
         cutoff=cutoff,
         exponent=exponent,
         intensity=light.value("intensity", 1.0),
     )
-    note = f"m = {exponent:.4g} fitted to the linear fall-off from {beam_width:g} to {cutoff:g} deg"
-    return light.replace(props, INTENSITY_FACTOR, exact=False, note=note)
+    note = (
+        f"m = {exponent:.4g} fitted to the linear fall-off from {beam_width:g} to {cutoff:g} deg;"
+        " same flux"
+    )
+    return light.replace(props, factor, exact=False, note=note)
 
 
 def _to_physical(light: Given) -> PairedEmitter:
@@ -124,21 +152,26 @@ def _to_physical(light: Given) -> PairedEmitter:
     cutoff, exponent = light.number("cutoff", 30.0), light.number("exponent", 0.0)
     edge, beam_width = cone_for(cutoff, exponent)
 
-    def cone(travel):
-        theta = np.degrees(np.arccos(np.clip(travel @ axis, -1, 1)))
-        return power_falloff(theta, exponent) * (theta <= cutoff)
+    def angle(travel):
+        return np.degrees(np.arccos(np.clip(travel @ axis, -1, 1)))
 
-    factor, _, note = point_lights.level(light, cone)
+    level = point_lights.level(
+        light,
+        lambda travel: power_falloff(angle(travel), exponent) * (angle(travel) <= cutoff),
+        lambda travel: linear_falloff(angle(travel), edge, beam_width),
+        power_flux(cutoff, exponent) / linear_flux(edge, beam_width),
+    )
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
     ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
     props = properties(
         "spot",
         to_world=mi.ScalarTransform4f().look_at(*(end.tolist() for end in ends)),
-        intensity=light.scaled_intensity(factor),
+        intensity=light.scaled_intensity(level.factor),
         cutoff_angle=edge,
         beam_width=beam_width,
     )
-    return light.replace(props, factor, exact=False, note=f"{fitted}; {note}" if note else fitted)
+    note = f"{fitted}; {level.note or 'same flux'}"
+    return light.replace(props, level.factor, exact=False, note=note)
 
 
 SPOT = LightKind(

@@ -1,0 +1,83 @@
+"""The tables of docs/witnesses.md, made from the cases' own declarations and by running them."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from comparisons.gallery.builtin import SCENES
+from reports.terminal import tables
+from tests.witnesses import test_closed_forms, test_povray
+from tests.witnesses.witness import Witness, deviation
+
+TESTS = Path(__file__).parents[1]
+
+ELSEWHERE = (
+    "test_physics::test_a_diffuse_plane_under_a_point_light",
+    "test_physics::test_a_diffuse_sphere_under_a_directional_light",
+    "test_physics::test_a_diffuse_sphere_in_a_constant_environment",
+    "test_physics::test_the_spot_of_an_area_light_is_right_in_the_far_field",
+    "test_physics::test_white_diffuse_light_of_unit_intensity_has_the_value_1",
+    "test_pairing::test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to",
+    "test_pairing::test_the_albedo_of_the_lobe",
+    "test_furnace::test_phongs_lobe_creates_light_towards_grazing_and_is_not_reciprocal",
+    "test_furnace::test_roughplastic_loses_light_and_is_reciprocal",
+)
+"""Other tests that hold something against a closed form or an independent quadrature."""
+
+
+def closed_forms() -> Iterator[str]:
+    """Yield the table of the reference against closed forms, with what was measured."""
+    rows = [(*_declared(witness), *_measured(witness)) for witness in test_closed_forms.WITNESSES]
+    head = ("Case", "Closed form", "By", "Reference less form", "95 % interval", "Samples")
+    return tables.markdown([head, *rows], right=3)
+
+
+def declared() -> list[tuple[str, ...]]:
+    """Return what the first columns of that table say, case by case."""
+    return [_declared(witness) for witness in test_closed_forms.WITNESSES]
+
+
+def figures() -> Iterator[str]:
+    """Yield the table of the kernel's figures against POV-Ray's."""
+    rows = [_figure(name) for name in test_povray.FIGURES + test_povray.OTHERS]
+    head = ("Scene", "Pixels that both see", "One alone sees", "Largest difference, in roundings")
+    return tables.markdown([head, *rows], right=1)
+
+
+def elsewhere() -> Iterator[str]:
+    """Yield the list of the other tests, each with what it says of itself.
+
+    Raises
+    ------
+    KeyError
+        When a test of that name no longer exists.
+    """
+    for entry in ELSEWHERE:
+        module, name = entry.split("::")
+        tree = ast.parse((TESTS / f"{module}.py").read_text(encoding="utf-8"))
+        found = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        said = (ast.get_docstring(found[name]) or "").split("\n\n")[0]
+        words = name.removeprefix("test_").replace("_", " ")
+        text = f": {' '.join(said.split()).replace('``', '`')}" if said else ""
+        yield f"- [{words}](../tests/{module}.py){text}"
+
+
+def _declared(witness: Witness) -> tuple[str, ...]:
+    return witness.name, witness.form, witness.source
+
+
+def _measured(witness: Witness) -> tuple[str, ...]:
+    found = deviation(witness)
+    spread = 1.96 * found.standard_error[0] + witness.form_error
+    return f"{100 * found.value[0]:+.3f} %", f"± {100 * spread:.3f} %", f"{found.spp}"
+
+
+def _figure(name: str) -> tuple[str, ...]:
+    with TemporaryDirectory() as folder:
+        kernel, witness, alone = test_povray.seen_by_both(SCENES[name].make(), Path(folder))
+    rounding = test_povray.HALF * kernel + test_povray.SINGLE
+    largest = float(np.max(np.abs(kernel - witness) / rounding))
+    return name, str(len(kernel)), str(alone), f"{largest:.2f}"

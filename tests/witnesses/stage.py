@@ -1,0 +1,50 @@
+"""What the scenes of the witnesses are made of: a camera without perspective, plates and lamps."""
+
+import mitsuba as mi
+
+GREY = 0.5
+"""Reflectance of what is looked at, unless a case says otherwise."""
+
+BLACK = {"type": "diffuse", "reflectance": 0.0}
+
+
+def scene(camera, max_depth=-1, **parts):
+    """Return a scene that is rendered by ``path``, from a camera and named parts."""
+    integrator = {"type": "path", "max_depth": max_depth}
+    return {"type": "scene", "integrator": integrator, "sensor": camera, **parts}
+
+
+def above(half=1.0, height=0.5, centre=(0.0, 0.0)):
+    """Return a camera that looks down at a square of the floor, x rightwards and y upwards."""
+    x, y = centre
+    return camera((x, y, height), (x, y, 0), (0, 1, 0), half)
+
+
+def camera(origin, target, up, half):
+    """Return an orthographic camera, whose film is as wide as twice ``half``."""
+    to_world = mi.ScalarTransform4f().look_at(origin, target, up).scale((half, half, 1))
+    film = {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}}
+    return {"type": "orthographic", "to_world": to_world, "film": film}
+
+
+def diffuse(reflectance=GREY):
+    """Return a diffuse material."""
+    return {"type": "diffuse", "reflectance": reflectance}
+
+
+def floor(half=2.0, reflectance=GREY):
+    """Return a square about the origin in the plane z = 0, facing up."""
+    to_world = mi.ScalarTransform4f().scale(half)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": diffuse(reflectance)}
+
+
+def plate(centre, toward, up, half_width, half_height, **rest):
+    """Return a rectangle that faces a point; its height is along ``up``, black unless told."""
+    to_world = mi.ScalarTransform4f().look_at(centre, toward, up)
+    to_world = to_world.scale((half_width, half_height, 1))
+    return {"type": "rectangle", "to_world": to_world, "bsdf": BLACK, **rest}
+
+
+def shining(radiance=1.0):
+    """Return what makes a shape a lamp."""
+    return {"type": "area", "radiance": radiance}

@@ -1,0 +1,83 @@
+"""The heuristic against POV-Ray: the figures of chapter 8, pixel by pixel."""
+
+from dataclasses import replace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.gallery.builtin import SCENES
+from heuristic import shading
+from tests.witnesses import povray
+
+pytestmark = pytest.mark.skipif(
+    povray.PROGRAM is None, reason="POV-Ray is not installed; as root: apt-get install povray"
+)
+
+SIZE = 96
+FIGURES = [name for name in SCENES if name.startswith("fig-8")]
+OTHERS = ["fig-6-5-m1", "fig-6-5-m40", "fig-6-14"]
+
+HALF = 2.0**-11
+"""Half precision rounds by no more, relative."""
+
+SINGLE = 1e-6
+"""And the kernel by no more than this, absolute: positions and normals are of single precision."""
+
+SILHOUETTE = 8
+"""Pixels, of some thousands, that one of the two alone may see: edges, and where light ends."""
+
+MEAN = 5e-5
+"""What ties in the rounding to half precision leave in the mean over a figure, relative."""
+
+
+def kernel_picture(scene):
+    """Render a figure by the integrator ``heuristic``, one ray through the centre of each pixel."""
+    sensor = dict(scene["sensor"])
+    sensor["film"] = sensor["film"] | {"width": SIZE, "height": SIZE}
+    sensor["sampler"] = {"type": "stratified", "sample_count": 1, "jitter": False}
+    made = mi.load_dict({**scene, "sensor": sensor}, optimize=False)
+    return np.array(mi.render(made, spp=1, seed=0), float)
+
+
+def seen_by_both(scene, folder):
+    """Return the pixels (N, 3) that kernel and POV-Ray see, and how many one of them alone sees."""
+    kernel, witness = kernel_picture(scene), povray.render(scene, SIZE, folder)
+    seen, attested = (picture.max(axis=2) > SINGLE for picture in (kernel, witness))
+    both = seen & attested
+    return kernel[both], witness[both], int(np.count_nonzero(seen != attested))
+
+
+def require_agreement(name, folder):
+    """Compare kernel and POV-Ray on all pixels that both see, and in the mean over them."""
+    kernel, witness, alone = seen_by_both(SCENES[name].make(), folder)
+    assert len(witness) > 0.1 * SIZE**2, "the picture should not be black"
+    assert alone <= SILHOUETTE
+    np.testing.assert_array_less(np.abs(kernel - witness), HALF * kernel + SINGLE)
+    assert witness.mean() == pytest.approx(kernel.astype(np.float16).mean(dtype=float), rel=MEAN)
+
+
+@pytest.mark.parametrize("name", FIGURES + OTHERS)
+def test_a_figure_is_that_of_povray_to_half_float_rounding(rgb, name, tmp_path):
+    require_agreement(name, tmp_path)
+
+
+def scaled(right, factor, **changes):
+    """Return a kernel that is wrong by a factor, and by other values of the material."""
+
+    def wrong(position, normal, view, material, lights, ambient=0, visible=None):
+        changed = replace(material, **changes)
+        return factor * right(position, normal, view, changed, lights, ambient, visible)
+
+    return wrong
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"factor": 1.001}, {"factor": 1.0001}, {"factor": 1, "n": 9.01}, {"factor": 1, "k_a": 0}],
+    ids=["0.1 %", "0.01 %", "exponent", "no ambient light"],
+)
+def test_a_wrong_kernel_is_found_out(rgb, wrong, tmp_path, monkeypatch):
+    monkeypatch.setattr(shading, "shade", scaled(shading.shade, **wrong))
+    with pytest.raises(AssertionError):
+        require_agreement("fig-8-9", tmp_path)
