@@ -9,13 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons.compare import LEVEL, Options, prepare
-from comparisons.departure.marks import significance
+from comparisons.compare import leading_distance, prepare
+from comparisons.departure import marks
+from comparisons.options import Options
 from comparisons.records import VERSION, Record
 from reference.pairing import halves
 from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import Stream, pass_seed, passes
-from reference.rendering.renderer import Accumulator, Renderer
+from reference.rendering.renderer import Accumulator, Renderer, add_difference
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
@@ -32,7 +34,7 @@ class Verification(Record, kw_only=True):
     resolution
         Width and height in pixels.
     significant
-        Pixels that differ by more than the noise of both sides and float32 rounding.
+        Pixels that are shown to differ (:mod:`comparisons.departure.marks`).
     pixels
         Pixels compared: those whose centre sees a surface.
     largest
@@ -71,7 +73,7 @@ class Verification(Record, kw_only=True):
     record_version: int = VERSION
 
 
-def verify(source, options=None, progress=None, level=LEVEL):
+def verify(source, options=None, progress=None, level=marks.LEVEL):
     """Render a scene as planned and with everything, and compare.
 
     Parameters
@@ -91,7 +93,9 @@ def verify(source, options=None, progress=None, level=LEVEL):
     count = max(side.passes for side in sides)
     if sides[0].plan.max_depth != 2:
         count *= PASSES_WITH_PATHS
-    sums = [Accumulator() for _ in sides]
+    scene = sides[0].scene
+    counted = gbuffer(scene, *image_size(scene)).hit
+    sums = [Accumulator(), Accumulator(), DifferenceSums(counted)]
     # Other seeds for the other side: equal ones would hide noise that both share.
     streams = {Stream.COMPARED: progress, Stream.OTHER_SIDE: None}
     loops = [
@@ -101,10 +105,19 @@ def verify(source, options=None, progress=None, level=LEVEL):
         for side, (stream, told) in zip(sides, streams.items(), strict=True)
     ]
     for both in zip(*loops, strict=True):
-        for total, one in zip(sums, both, strict=True):
-            total.add(one.images[0])
-    estimates = [total.estimate() for total in sums]
-    return _summarise(source.name, sides, estimates, _kernel_difference(sides, options.seed), level)
+        add_difference(sums, [one.images[0] for one in both])
+    *estimates, difference = (total.estimate() for total in sums)
+    distance = leading_distance(options.viewing)
+    marked = marks.find(difference, estimates[0].mean, counted, distance, level=level)
+    return _summarise(
+        source.name,
+        sides,
+        estimates,
+        counted,
+        heuristic_largest=_kernel_difference(sides, options.seed),
+        largest=float(np.abs(difference.mean).max()),
+        significant=int((marked == marks.MARKED).sum()),
+    )
 
 
 def _kernel_difference(sides, seed):
@@ -119,20 +132,8 @@ def _kernel_difference(sides, seed):
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(name, sides, estimates, kernel_difference, level):
-    scene = sides[0].scene
-    width, height = image_size(scene)
-    counted = gbuffer(scene, width, height).hit
-    difference = estimates[0].mean - estimates[1].mean
-    error = np.hypot(estimates[0].standard_error, estimates[1].standard_error)
-    marked = significance(
-        difference,
-        error,
-        estimates[0].passes,
-        max(int(counted.sum()), 1),
-        level,
-        magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
-    )
+def _summarise(name, sides, estimates, counted, **found):
+    height, width = counted.shape
     times = [side.reference.pass_times().median for side in sides]
     noises = [
         float(np.sqrt(np.mean(estimate.standard_error[counted] ** 2) * estimate.passes))
@@ -147,10 +148,7 @@ def _summarise(name, sides, estimates, kernel_difference, level):
         planned=_word(sides[0].plan),
         everything=_word(sides[1].plan),
         resolution=(width, height),
-        significant=int((marked & counted).sum()),
         pixels=int(counted.sum()),
-        largest=float(np.abs(difference).max()),
-        heuristic_largest=kernel_difference,
         planned_s=times[0],
         everything_s=times[1],
         planned_noise=noises[0],
@@ -158,6 +156,7 @@ def _summarise(name, sides, estimates, kernel_difference, level):
         gain=gain,
         planning_s=sides[0].planning_seconds,
         saved_s=planned_total * (gain - 1),
+        **found,
     )
 
 
