@@ -19,6 +19,9 @@ from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import Stream, pass_seed, passes
 from reference.rendering.renderer import Accumulator, Renderer, add_difference
 
+LEVEL = 0.01
+"""Chance that any pixel is marked though nothing differs."""
+
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
 paths carry most of it."""
@@ -73,7 +76,7 @@ class Verification(Record, kw_only=True):
     record_version: int = VERSION
 
 
-def verify(source, options=None, progress=None, level=marks.LEVEL):
+def verify(source, options=None, progress=None, level=LEVEL):
     """Render a scene as planned and with everything, and compare.
 
     Parameters

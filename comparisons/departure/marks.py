@@ -144,8 +144,8 @@ def _chances(difference: Array, variance: Array, sizes: Array, freedom: Array) -
 class _Around:
     """What is pooled, by block (h, w, 3), of the pixels' means.
 
-    ``sizes`` and ``largest_sizes`` (2, h, w, 3) are those of contributions, as `_chances` takes
-    them: κ3/κ2 of the noise around, and at most.
+    ``sizes`` (2, h, w, 3) are those of contributions, as `_chances` takes them: κ3/κ2 of the noise
+    around; ``largest_sizes`` (2, 1, 1, 3) the largest of the image.
     """
 
     pixels: Array
@@ -163,11 +163,11 @@ class _Around:
         pixels, mean, variance, squares, *skewed = map(np.concatenate, zip(*parts, strict=True))
         third, moved = np.array(skewed[:2]), np.array(skewed[2:])
         # Where noise is large on both sides the cubes of the one would hide those of the other.
-        of_all = ratio(third.sum(axis=(1, 2)), moved.sum(axis=(1, 2)))[:, None, None]
         one_sided = ratio(neighbourhood(third, 1), neighbourhood(moved, 1))
+        largest = one_sided.max(axis=(1, 2))[:, None, None]
         around = neighbourhood(variance)
         both = ratio(neighbourhood(third[0] - third[1]), around)
-        sizes = np.where(around > 0.0, np.maximum([both, -both], 0.0), of_all)
+        sizes = np.where(around > 0.0, np.maximum([both, -both], 0.0), largest)
         # Variances differ from block to block: the own one counts as much as the eight around it.
         near = [neighbourhood(sums) + 8.0 * sums for sums in (pixels, variance, squares)]
         pooled = ratio(near[1], near[0])
@@ -178,7 +178,7 @@ class _Around:
             difference=ratio(mean, pixels),
             variance=ratio(variance, pixels**2),
             sizes=sizes,
-            largest_sizes=np.maximum(one_sided, of_all),
+            largest_sizes=largest,
             pooled_variance=pooled,
             pooled_freedom=_prior_freedom(scatter, freedom),
             own_freedom=freedom,
@@ -187,8 +187,7 @@ class _Around:
     def differing(self, level: float, inflation: float) -> NDArray[np.bool_]:
         """The blocks (h, w) that differ.
 
-        Of contributions the larger counts, of those around and of those in all of the image: what
-        is rare may have been seen elsewhere only.
+        The largest contributions of the image count: what is rare may have been seen elsewhere.
         """
         sizes = ratio(self.largest_sizes, self.pixels) * inflation
         # A quarter, since neighbours and their squares are not quite independent.
