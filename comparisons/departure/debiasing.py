@@ -9,10 +9,17 @@ adding the noise once more. Over a block of pixels let ``f0`` be the mean distan
 
 where the distance is the noise alone ``f1 = √2 f0`` and nothing is left; where it is far larger the
 squares grow in proportion to the variance. It is the simulation and extrapolation of Cook and
-Stefanski (J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. Blocks, since their
-distances differ; a block's square may come out negative, and its root then counts as negative, so
-that no bias is left in the mean of many. The added noise is a contrast of the groups of passes:
-weights that add up to 0 and give it the variance of the mean.
+Stefanski (J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. Where noise moves
+colours along one line, to and fro through the truth, this takes off too much. The same formula with
+the means of squared distances is right there, where the pixels of a block depart alike, and takes
+off too little where they do not; so does taking off nothing. The estimate is the middle of the two,
+and half of what lies between them is added to its interval; so is a part of the noise, `CURVATURE`,
+since colour spaces are curved. Where the standard error is more than a third of the values, skewed
+noise shifts the very mean of the colours, and the interval does not hold.
+
+Blocks, since their distances differ; a block's square may come out negative, and its root then
+counts as negative, so that little bias is left in the mean of many. The added noise is a contrast
+of the groups of passes: weights that add up to 0 and give it the variance of the mean.
 
 The intervals are Student's, by the jackknife over the groups of passes. Where groups are too few,
 or the metric looks at neighbourhoods, the triangle inequality gives a wider one: a mean distance is
@@ -41,6 +48,12 @@ Array = NDArray[np.float64]
 #: Noise is added in this many independent ways, and what comes of it is averaged.
 CONTRASTS = 3
 
+#: Of the square of the noise, for doubt: colour spaces are curved, and noise is not small in them.
+CURVATURE = 0.06
+
+#: By which a noise floor may be too small, which is itself an estimate.
+MARGIN = 1.25
+
 #: Groups of passes that a jackknife needs: without one of them two are left to make noise of.
 FEWEST = 3
 
@@ -68,7 +81,7 @@ def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
         for name, limit in zip(_limits(metric), metric.visible, strict=True)
     }
     clean = np.sqrt(max(mean**2 - floor**2, 0.0))
-    return Debiased(float(clean), max(mean - floor, 0.0), mean + floor, visible)
+    return Debiased(float(clean), max(mean - MARGIN * floor, 0.0), mean + MARGIN * floor, visible)
 
 
 def debiased(
@@ -101,6 +114,8 @@ def debiased(
     # What noise adds is found on the sample, what it is taken from on all pixels.
     measured, added = _numbers(metric, raw), whole.raw - whole.clean
     half = np.array([student(0.0, float(each), count).high for each in error])
+    middle = max(measured[0] - added[0], 0.0)
+    half[0] += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
     value, low, high = np.maximum(measured[0] - added[0] + half[0] * np.array([0, -1, 1]), 0.0)
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
@@ -136,6 +151,9 @@ def _numbers(metric: Metric, distances: Array) -> Array:
 class _Extrapolated:
     """`_numbers` as measured and without noise, and what noise adds to the sum of each block.
 
+    ``gap`` is what lies between the two estimates of the mean, ``noise`` the root of what noise
+    adds to the mean square of blocks.
+
     The share above a threshold is extrapolated in two ways: linearly, by what the noise adds when
     added once more, and with the distances of a block scaled to its mean without noise.
     """
@@ -143,6 +161,8 @@ class _Extrapolated:
     raw: Array
     clean: Array
     added: Array
+    gap: float
+    noise: float
 
     @classmethod
     def of(
@@ -159,10 +179,15 @@ class _Extrapolated:
         pixels = grouped.by_block(np.ones(len(plain)))
         before, after = grouped.by_block(plain), grouped.by_block(np.mean(noisy, axis=0))
         if metric.linear:
-            added = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2)
+            added, gap = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2), 0.0
+            noise = 0.0
         else:
-            square = 2.0 * before**2 - after**2
-            added = before - np.sign(square) * np.sqrt(np.abs(square))
+            squares = [grouped.by_block(plain**2), grouped.by_block(np.mean(np.square(noisy), 0))]
+            lower = _root(2.0 * before**2 - after**2)
+            upper = np.minimum(_root((2.0 * squares[0] - squares[1]) * pixels), before)
+            added = before - (lower + upper) / 2.0
+            gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
+            noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
         shares = [
             grouped.by_block((np.array(noisy) > limit).mean(axis=0) - (plain > limit))
             for limit in metric.visible
@@ -174,7 +199,7 @@ class _Extrapolated:
         ]
         added = np.column_stack([added, *shares])
         raw = _numbers(metric, plain)
-        return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added)
+        return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
 
     def sampling_error(self, grouped: Grouped) -> Array:
         """Standard error of what noise adds, from the blocks that were left out of the sample."""
@@ -183,6 +208,10 @@ class _Extrapolated:
         share = 1.0 - grouped.sampled / grouped.total
         spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
         return np.sqrt(share * len(left)) * spread / pixels.sum()
+
+
+def _root(squares: Array) -> Array:
+    return np.sign(squares) * np.sqrt(np.abs(squares))
 
 
 def contrasts(sizes: Array) -> Array:
