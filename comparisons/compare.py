@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import mitsuba as mi
-import numpy as np
 
 from comparisons import record, render
 from comparisons.comparison import (
@@ -14,8 +13,7 @@ from comparisons.comparison import (
     Significant,
     TimeSpent,
 )
-from comparisons.departure import limits, regions, statistics
-from comparisons.departure.marks import significance
+from comparisons.departure import limits, marks, regions, statistics
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
 from comparisons.departure.statistics import histogram
 from comparisons.options import Options
@@ -29,14 +27,8 @@ from reference.rendering.guard import Guard, Verdict, examine_plan
 from reference.rendering.renderer import Renderer, physical_integrator, variant
 from reference.scene.sampler import with_sampler
 
-LEVEL = 0.01
-"""Chance that an image without any difference has one pixel marked as significant."""
-
 LARGEST = 2**26
 """Pixels of an image: sums, images and maps of a comparison take some 300 bytes each."""
-
-ROWS = 256
-"""Of an image, tested for significance at a time."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -142,7 +134,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
-    numbers, images = _measure(estimates, surface, options)
+    numbers, images = _measure(estimates, surface, options, ready.plan.exact)
     stages.done("metrics")
     faults = limits.find(
         limits.of_scene(ready.scene, width, height),
@@ -192,7 +184,7 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         return Renderer(scene, None, spp, "heuristic image")
 
 
-def _measure(estimates, surface, options):
+def _measure(estimates, surface, options, exact):
     """Compute numbers, as fields of the record, and maps over the pixels that see a surface.
 
     The doubt in question is that of the difference: what both halves share cancels in it.
@@ -203,13 +195,20 @@ def _measure(estimates, surface, options):
     metrics, maps = {}, {}
     for name, metric in METRICS.items():
         metrics[name], found = statistics.summarise(
-            metric, test, reference, counted, options.viewing, noise
+            metric,
+            test,
+            reference,
+            counted,
+            options.viewing,
+            noise,
+            estimates.difference.grouped,
         )
         if metric.drawn:
             maps[name] = found
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
-    significant = _significant(estimates, counted)
-    fraction = float(significant[counted].mean()) if counted.any() else 0.0
+    significant = marks.find(
+        estimates.difference, test, counted, leading_distance(options.viewing), exact=exact
+    )
     images = Images(
         heuristic=test,
         reference=reference,
@@ -223,26 +222,22 @@ def _measure(estimates, surface, options):
     numbers = {
         "metrics": metrics,
         "log2_luminance": ratio,
-        "significant": Significant(fraction=fraction, level=LEVEL),
+        "significant": Significant(
+            fraction=_share(significant[counted] == marks.MARKED),
+            undetermined=_share(significant[counted] == marks.UNDETERMINED),
+            level=marks.LEVEL,
+        ),
     }
     return numbers, images
 
 
-def _significant(estimates, counted):
-    """Mark the pixels that differ by more than noise, some rows at a time to save memory."""
-    test, reference = estimates.heuristic, estimates.reference.mean
-    marked = np.empty(counted.shape, bool)
-    for start in range(0, len(counted), ROWS):
-        rows = slice(start, start + ROWS)
-        marked[rows] = significance(
-            estimates.difference.mean[rows],
-            estimates.difference.standard_error[rows],
-            estimates.difference.passes,
-            max(int(counted.sum()), 1),
-            LEVEL,
-            magnitude=np.maximum(np.abs(test[rows]), np.abs(reference[rows])),
-        )
-    return marked
+def leading_distance(viewing):
+    """Return ``(test, reference) -> (N,)``: distances of colours (N, 3) in the leading metric."""
+    return lambda test, reference: LEADING.against(reference, ..., viewing)(test)
+
+
+def _share(found):
+    return float(found.mean()) if found.size else 0.0
 
 
 class _Stages:

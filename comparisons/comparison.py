@@ -111,12 +111,20 @@ class PlanRecord(Simulation, kw_only=True):
 
 
 class Significant(Record):
-    """Pixels whose difference is more than the noise of both renderings."""
+    """Pixels that are shown to differ, of the counted ones. It grows with the samples."""
 
     fraction: Share
+    undetermined: Annotated[
+        Share, Meta(description="Not shown to differ, though a visible difference may hide there.")
+    ]
     level: Annotated[
         float,
-        Meta(gt=0, lt=1, description="Chance that an image without difference has one such pixel."),
+        Meta(
+            gt=0,
+            lt=1,
+            description="Expected share of wrong ones among them; where the images do not differ,"
+            " the chance of any.",
+        ),
     ]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from comparisons.comparison import NoiseTarget
 from comparisons.departure.metrics import LEADING
+from reference.rendering.moments import DifferenceEstimate, DifferenceSums
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, Estimate, Mean, add_difference
 
@@ -74,7 +75,7 @@ class Rendered:
 
     heuristic: np.ndarray
     reference: Estimate
-    difference: Estimate
+    difference: DifferenceEstimate
     passes: int
     new: int
     stop: NoiseTarget | None
@@ -102,7 +103,7 @@ def render(ready, options, counted, progress, kept=None):
     Rendered
     """
     halves = (ready.heuristic, ready.reference)
-    sums = [Mean(), Accumulator(), Accumulator()]
+    sums = [Mean(), Accumulator(), DifferenceSums(counted)]
     done = before = _restore(kept.load() if kept else None, sums, halves)
     reached = None
     loop = passes(halves, options.seed, ready.passes, first=before, progress=progress)

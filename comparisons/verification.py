@@ -10,15 +10,21 @@ then its integrator with nothing left out, then what it leaves out.
 
 from dataclasses import replace
 
+import mitsuba as mi
 import numpy as np
 
-from comparisons.compare import LEVEL, Options, prepare
-from comparisons.departure.marks import significance
+from comparisons.compare import leading_distance, prepare
+from comparisons.departure import marks
+from comparisons.options import Options
 from comparisons.records import VERSION, Record
 from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import Stream, pass_seed, passes
 from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
 from reference.scene.sampler import with_sampler
+
+LEVEL = 0.01
+"""Chance that any pixel is marked though nothing differs."""
 
 PASSES_WITH_PATHS = 4
 """Times as many passes where paths are sampled: their variance is itself hard to measure, since few
@@ -51,7 +57,7 @@ class Verification(Record, kw_only=True):
     resolution
         Width and height in pixels.
     significant
-        Pixels that differ by more than the noise of both sides and float32 rounding.
+        Pixels that are shown to differ (:mod:`comparisons.departure.marks`).
     pixels
         Pixels compared: those whose centre sees a surface.
     largest
@@ -123,14 +129,26 @@ def verify(source, options=None, progress=None, level=LEVEL, steps=True):
     measured = {renderer: _Measured(renderer, counted) for renderer in stages}
     # Other seeds for the other side: equal ones would hide noise that both share.
     others = passes(stages[:1], options.seed, count, stream=Stream.OTHER_SIDE)
-    distinct = list(measured)
+    distinct, apart = list(measured), DifferenceSums(counted)
     own = passes(distinct[1:], options.seed, count, progress=progress, stage="verifying")
     for other, one in zip(others, own, strict=True):
-        for renderer, image in zip(distinct, (*other.images, *one.images), strict=True):
+        images = dict(zip(distinct, (*other.images, *one.images), strict=True))
+        for renderer, image in images.items():
             measured[renderer].add(image)
-    found = [measured[renderer] for renderer in stages]
-    kernel = _kernel_difference(sides, options.seed)
-    return _summarise(source.name, sides, found, counted, kernel, level)
+        everything, planned = (mi.TensorXd(images[stages[place]]) for place in (0, -1))
+        apart.add(planned - everything)
+    found, difference = [measured[renderer] for renderer in stages], apart.estimate()
+    distance = leading_distance(options.viewing)
+    marked = marks.find(difference, found[-1].total.mean(), counted, distance, level=level)
+    return _summarise(
+        source.name,
+        sides,
+        found,
+        counted,
+        heuristic_largest=_kernel_difference(sides, options.seed),
+        largest=float(np.abs(difference.mean).max()),
+        significant=int((marked == marks.MARKED).sum()),
+    )
 
 
 def _stages(planned, everything):
@@ -227,19 +245,8 @@ def _kernel_difference(sides, seed):
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(name, sides, measured, counted, kernel_difference, level):
+def _summarise(name, sides, measured, counted, **found):
     everything, planned = measured[0], measured[-1]
-    estimates = [side.total.estimate() for side in (planned, everything)]
-    difference = estimates[0].mean - estimates[1].mean
-    error = np.hypot(estimates[0].standard_error, estimates[1].standard_error)
-    marked = significance(
-        difference,
-        error,
-        estimates[0].passes,
-        max(int(counted.sum()), 1),
-        level,
-        magnitude=np.maximum(*(np.abs(estimate.mean) for estimate in estimates)),
-    )
     factors = _factors(measured)
     gain = factors[-1].value
     height, width = counted.shape
@@ -248,10 +255,7 @@ def _summarise(name, sides, measured, counted, kernel_difference, level):
         planned=_word(sides[0].plan),
         everything=_word(sides[1].plan),
         resolution=(width, height),
-        significant=int((marked & counted).sum()),
         pixels=int(counted.sum()),
-        largest=float(np.abs(difference).max()),
-        heuristic_largest=kernel_difference,
         planned_s=planned.seconds(),
         everything_s=everything.seconds(),
         planned_noise=planned.noise(),
@@ -260,6 +264,7 @@ def _summarise(name, sides, measured, counted, kernel_difference, level):
         factors=factors,
         planning_s=sides[0].planning_seconds,
         saved_s=planned.seconds() * sides[0].passes * (gain - 1),
+        **found,
     )
 
 

@@ -25,6 +25,13 @@ def metric(mean, visible=("1", "2", "5")):
         "p95": 2.1 * mean,
         "max": 3.3 * mean,
         "visible": {limit: 0.0771 * mean / 13 / float(limit) for limit in visible},
+        "visible_between": {
+            limit: {"low": 0.0688 * mean / 13 / float(limit), "high": 0.0829 * mean / 13}
+            for limit in visible
+        },
+        "debiased": 0.97 * mean,
+        "low": 0.94 * mean,
+        "high": 1.02 * mean,
         "noise_floor": 0.0123 * mean,
         "after_exposure": after | {"p95": 1.9 * mean, "max": 3.1 * mean},
     }
@@ -109,7 +116,7 @@ def data():
             "rmse": metric(0.04871, ()),
         },
         "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
-        "significant": {"fraction": 0.632, "level": 0.01},
+        "significant": {"fraction": 0.632, "undetermined": 0.171, "level": 0.05},
         "limits": {"clamped": 3, "terminator": 4, "energy_loss": 5, "fireflies": 6, "any": 17},
         "pixels": {"counted": 20, "total": 24},
         "regions": [

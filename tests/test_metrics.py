@@ -4,9 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from scipy import stats
 
-from comparisons.departure.marks import critical_t, significance
 from comparisons.departure.metrics import (
     LOG2_EPSILON,
     METRICS,
@@ -355,48 +353,6 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
     # An exact test image sees just this against a noisy reference.
     seen = metric.mean(metric(reference, reference + second))
     assert seen == pytest.approx(floor, rel=0.05)
-
-
-def test_critical_value_is_students():
-    for passes, values in ((2, 1), (4, 48), (16, 786_432), (64, 786_432)):
-        each = 1 - (1 - 0.01) ** (1 / values) if values < 100 else -np.log(0.99) / values
-        expected = stats.t.isf(each / 2, passes - 1)
-        assert critical_t(passes, values) == pytest.approx(expected, rel=1e-6)
-
-
-def test_significance_keeps_its_level_and_sees_a_difference():
-    """Images without any difference are marked in `level` of the cases, taken as whole images.
-
-    With 2,000 images and a level of 10 %, 200 ± 13 are expected; the bounds are 5 deviations.
-    """
-    rng = np.random.default_rng(4)
-    trials, passes, shape = 2000, 6, (4, 4, 3)
-    alarms = 0
-    for _ in range(trials):
-        samples = rng.normal(0, 0.01, (passes, *shape))
-        error = samples.std(axis=0, ddof=1) / np.sqrt(passes)
-        alarms += significance(samples.mean(axis=0), error, passes, 16, level=0.1).any()
-    assert 135 < alarms < 265
-
-    samples = rng.normal(0, 0.01, (32, *shape))
-    samples[:, 1, 2, 0] += 0.05
-    error = samples.std(axis=0, ddof=1) / np.sqrt(32)
-    marked = significance(samples.mean(axis=0), error, 32, 16)
-    assert marked.shape == (4, 4)
-    assert np.argwhere(marked).tolist() == [[1, 2]]
-
-
-def test_without_noise_only_rounding_is_excused():
-    difference = np.zeros((1, 4, 3))
-    difference[0, 1] = 5e-7  # under the absolute floor
-    difference[0, 2] = 5e-4  # under the relative floor of a value of 100
-    difference[0, 3] = 2e-3
-    marked = significance(difference, np.zeros_like(difference), 1, 4, magnitude=100.0)
-    assert marked.tolist() == [[False, False, False, True]]
-    marked = significance(difference, np.zeros_like(difference), 1, 4)
-    assert marked.tolist() == [[False, False, True, True]]
-    with pytest.raises(ValueError, match="at least 2"):
-        significance(difference, np.ones_like(difference), 1, 4)
 
 
 def test_non_finite_pixels_are_named(images):

@@ -5,8 +5,8 @@ the one exposure factor on the test image that makes it smallest. The second is 
 the departure; what lies between the two is *level*.
 
 A colour difference is never negative, so a noisy reference differs from the truth by ΔE > 0 even
-where the test image is exact; `noise_floor` says by how much. Which pixels differ by more than
-noise is told by `comparisons.departure.marks`.
+where the test image is exact; `noise_floor` says by how much, and `comparisons.departure.debiasing`
+takes it out of the mean. Which pixels are shown to differ `comparisons.departure.marks` tells.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
+from comparisons.departure import debiasing
 from comparisons.departure.metric import Distances, Metric, Pixelwise, checked_pair
 from comparisons.departure.metrics import log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from comparisons.records import Amount, Count, Positive, Record, Share
+from reference.rendering.moments import Grouped
 
 #: Pixels measured at a time: temporaries stay small whatever the image's size.
 _BLOCK_PIXELS = 2**20
@@ -37,6 +39,13 @@ class Exposed(Record):
     max: Amount
 
 
+class Between(Record):
+    """A 95 % interval of a share."""
+
+    low: Share
+    high: Share
+
+
 class Summary(Record):
     """A metric over the counted pixels, in the metric's own unit."""
 
@@ -47,6 +56,12 @@ class Summary(Record):
     visible: Annotated[
         dict[str, Share], Meta(description="Share of the pixels above each threshold.")
     ]
+    visible_between: Annotated[
+        dict[str, Between], Meta(description="Where these shares may lie without noise, at 95 %.")
+    ]
+    debiased: Annotated[Amount, Meta(description="Mean without what the reference's noise adds.")]
+    low: Annotated[Amount, Meta(description="Of the mean without noise, at 95 %.")]
+    high: Amount
     noise_floor: Annotated[
         Amount, Meta(description="Mean that the reference's own noise alone would give.")
     ]
@@ -69,6 +84,7 @@ def summarise(
     mask: ArrayLike,
     viewing: Viewing = DEFAULT_VIEWING,
     noise: ArrayLike | None = None,
+    grouped: Grouped | None = None,
 ) -> tuple[Summary, Array]:
     """The numbers of `metric` over `mask`, and its map over the whole image.
 
@@ -78,6 +94,8 @@ def summarise(
         Boolean (H, W): the pixels that count. With none, every number is 0 and the factor 1.
     noise
         A noise image (H, W, 3) as for `noise_floor`; without it the floor is 0.
+    grouped
+        Groups of passes of the difference, for the interval; without it a wider one is given.
 
     The best exposure is used only if it lowers the mean over all counted pixels, so
     ``after_exposure.mean <= mean`` always. Raises as `comparisons.departure.metrics.delta_e_2000`.
@@ -105,9 +123,23 @@ def summarise(
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
     visible = {f"{limit:g}": _share(values > limit) for limit in metric.visible}
-    floor = metric.mean(np.concatenate(noisy)) if has_noise else 0.0
-    at_best = Exposed(exposure=factor, **after)
-    summary = Summary(**numbers, visible=visible, noise_floor=floor, after_exposure=at_best)
+    noise_alone = np.concatenate(noisy) if has_noise else np.zeros(0)
+    clean = None
+    if not noise_alone.any():
+        clean = debiasing.exactly(numbers["mean"], visible)
+    elif pixelwise and grouped is not None:
+        clean = debiasing.debiased(metric, test, grouped, viewing, values)
+    clean = clean or debiasing.roughly(metric, values, noise_alone)
+    summary = Summary(
+        **numbers,
+        visible=visible,
+        visible_between={name: Between(low=a, high=b) for name, (a, b) in clean.visible.items()},
+        debiased=clean.value,
+        low=clean.low,
+        high=clean.high,
+        noise_floor=metric.mean(noise_alone),
+        after_exposure=Exposed(exposure=factor, **after),
+    )
     return summary, distance
 
 

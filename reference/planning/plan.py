@@ -73,6 +73,9 @@ class Plan:
         What a user of Mitsuba gets without thinking, and the scene's own limit of path length.
     sampler, spp, passes
         Of both halves; ``spp`` over all passes, unless the user gives another.
+    exact
+        Whether nothing is random but where camera rays fall: both halves are then functions of the
+        ray alone, and their difference has no noise.
     rr_depth
         Of ``path``: where Russian roulette begins to end paths.
     shadows, bsdf_samples, tabulate_environment
@@ -90,6 +93,7 @@ class Plan:
     sampler: str = SAMPLER
     spp: int = SPP
     passes: int = PASSES
+    exact: bool = False
     rr_depth: int = STOCK_RR_DEPTH
     shadows: bool = True
     bsdf_samples: int = 1
@@ -224,6 +228,7 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         rr_depth=STOCK_RR_DEPTH,
         spp=SPP if is_random else DETERMINISTIC_SPP,
         passes=PASSES if is_random else DETERMINISTIC_PASSES,
+        exact=not is_random,
         tabulate_environment=tabulated,
     )
 

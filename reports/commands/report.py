@@ -64,8 +64,7 @@ def _verify(names, request):
     """Hold the plan of each scene against everything simulated, at a small size."""
     from comparisons.case import open_case
     from comparisons.check.moved import level_of_each
-    from comparisons.compare import LEVEL
-    from comparisons.verification import verify
+    from comparisons.verification import LEVEL, verify
     from reports.terminal import progress
 
     level = level_of_each(LEVEL, len(names))

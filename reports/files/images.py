@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from comparisons.departure import marks
 from comparisons.departure.metrics import LEADING, RATIO, drawn
 from comparisons.record import Images
 
@@ -25,8 +26,9 @@ ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
 #: Pixels of a thumbnail's longer side, which a card shows at two thirds of that.
 THUMBNAIL = 160
 
-#: Colours of `mask_map`: marked, not marked, not counted (sRGB).
+#: Colours of `mask_map`: marked, not marked, not counted, undetermined (sRGB).
 MARKED, UNMARKED, UNCOUNTED = (213, 94, 0), (222, 226, 230), (130, 136, 143)
+UNDETERMINED = (240, 201, 119)
 
 
 def tonemap(rgb: ArrayLike, exposure: float = 1.0) -> Image.Image:
@@ -47,11 +49,17 @@ def signed_map(values: ArrayLike, limit: float, colormap: str = SIGNED_COLOURS) 
 
 
 def mask_map(marked: ArrayLike, counted: ArrayLike | None = None) -> Image.Image:
-    """A boolean map (H, W): orange where marked, light grey where not, dark if not counted."""
-    index = np.where(np.asarray(marked, bool), np.uint8(0), np.uint8(1))
+    """A map (H, W) of marks, 1, 0.5 or 0: orange where marked, pale where left open, else grey.
+
+    Pixels that are not counted are of a darker grey.
+    """
+    marked = np.asarray(marked, np.float64)
+    index = np.where(marked == marks.MARKED, np.uint8(0), np.uint8(1))
+    index[marked == marks.UNDETERMINED] = 3
     if counted is not None:
         index[~np.asarray(counted, bool)] = 2
-    return _with_palette(index, np.array([MARKED, UNMARKED, UNCOUNTED], np.uint8))
+    colours = [MARKED, UNMARKED, UNCOUNTED, UNDETERMINED]
+    return _with_palette(index, np.array(colours, np.uint8))
 
 
 def colour_bar(colormap: str, stops: int = 17) -> str:

@@ -21,6 +21,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.departure import marks
 from comparisons.departure.metrics import drawn
 from comparisons.records import Record, plain
 
@@ -37,7 +38,7 @@ NEGATIVE = 0x8000
 LONGEST = 1024
 
 #: Bits of the plane "flags".
-SIGNIFICANT, COUNTED = 1, 2
+SIGNIFICANT, COUNTED, UNDETERMINED = 1, 2, 4
 
 Codes = NDArray[np.uint16]
 
@@ -97,8 +98,11 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
         add(name, _means(channels[f"{name}.Y"], block), DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
     add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)
-    significant = _means(channels["significant.Y"], block) > 0.0
+    marked = np.asarray(channels["significant.Y"], np.float64)
+    significant = _means(marked == marks.MARKED, block) > 0.0
+    undetermined = (_means(marked == marks.UNDETERMINED, block) > 0.0) & ~significant
     flags = SIGNIFICANT * significant + COUNTED * (_means(counted, block) > 0.0)
+    flags = flags + UNDETERMINED * undetermined
     add("flags", flags.astype(np.uint16), 0)
 
     raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)

@@ -35,9 +35,7 @@ def legends() -> tuple[Legend, ...]:
     return (
         *errors,
         Legend(RATIO.name, RATIO.label, "ratio", RATIO.limit, signed, stops, RATIO.definition),
-        Legend(
-            "significant", "Significant difference", "mask", note="more than the reference's noise"
-        ),
+        Legend("significant", "Shown to differ", "mask", note="shown to differ, however little"),
     )
 
 

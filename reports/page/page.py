@@ -34,7 +34,16 @@ from reports.page import overview
 from reports.page.legends import legends
 from reports.page.scene_view import SceneView
 from reports.run.stages import Failure, Run
-from reports.terminal.printing import about_noise, code_spans, number, parameter, percent, seconds
+from reports.terminal.printing import (
+    NOTICEABLE,
+    about_noise,
+    code_spans,
+    may_be_none,
+    number,
+    parameter,
+    percent,
+    seconds,
+)
 
 if TYPE_CHECKING:  # for what few pages show
     from comparisons.cost.cost_record import Cost
@@ -169,7 +178,7 @@ def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[s
             "signed": images.colour_table(images.SIGNED_COLOURS),
             "value": images.colour_table(images.VALUE_COLOURS),
         },
-        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED],
+        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED, images.UNDETERMINED],
         "luminance": luminance(np.eye(3)).tolist(),
         "epsilon": LOG2_EPSILON,
     }
@@ -225,14 +234,16 @@ def _environment() -> Environment:
         plain=plain,
         uri=_data_uri,
     )
-    environment.tests.update(about_noise=about_noise, finite=math.isfinite)
+    environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
     environment.globals.update(
         forms=FORMS,
         marked=images.css_colour(images.MARKED),
         unmarked=images.css_colour(images.UNMARKED),
         uncounted=images.css_colour(images.UNCOUNTED),
+        undetermined=images.css_colour(images.UNDETERMINED),
         effects_title=theme.EFFECTS_TITLE,
         value_bar=images.colour_bar(images.VALUE_COLOURS),
         pixelated_below=PIXELATED_BELOW,
+        noticeable=NOTICEABLE,
     )
     return environment

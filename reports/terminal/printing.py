@@ -8,8 +8,8 @@ from markupsafe import Markup
 
 from comparisons.departure.statistics import Summary
 
-#: A mean up to this many times its noise floor is said to be about noise.
-NOISE_MARGIN = 1.1
+#: A departure of this size, in the metric by which scenes are judged, can be seen.
+NOTICEABLE = 1.0
 
 
 def number(value: float | None) -> str:
@@ -56,8 +56,13 @@ def code_spans(text: str) -> Markup:
 
 
 def about_noise(metric: Summary) -> bool:
-    """Whether a metric's mean is about what its noise floor gives (see `NOISE_MARGIN`)."""
-    return metric.noise_floor > 0 and metric.mean <= NOISE_MARGIN * metric.noise_floor
+    """Whether a mean is nothing but noise: it may be 0, and is no more than `NOTICEABLE`."""
+    return may_be_none(metric) and metric.high <= NOTICEABLE
+
+
+def may_be_none(metric: Summary) -> bool:
+    """Whether a mean may be 0 without its noise, be it that noise hides a departure or not."""
+    return metric.noise_floor > 0 and metric.low == 0
 
 
 def _minus(digits: str) -> str:

@@ -19,9 +19,16 @@ function inspect(painter, scene, [x, y]) {
     reference: ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)),
     ...Object.fromEntries(painter.page.maps.map((/** @type {any} */ map) => [map.name, mapText(map)])),
     standard_error: shown("standard_error"),
-    significant: flags & COUNTED ? (flags & SIGNIFICANT ? "yes" : "no") : "not counted",
+    significant: markText(flags),
     effect: effectAt(scene, x, y),
   };
+}
+
+/** Whether a pixel is shown to differ. @param {number} flags */
+function markText(flags) {
+  if (!(flags & COUNTED)) return "not counted";
+  if (flags & SIGNIFICANT) return "yes";
+  return flags & UNDETERMINED ? "undetermined" : "no";
 }
 
 /** @param {Images} images @param {string} name @param {number} place */

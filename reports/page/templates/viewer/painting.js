@@ -1,7 +1,7 @@
 // Pictures out of numbers: the two renderings and the maps, one canvas each, kept until they change.
 
-/** Significant and counted, as in the plane "flags". */
-const SIGNIFICANT = 1, COUNTED = 2;
+/** Significant, counted and undetermined, as in the plane "flags". */
+const SIGNIFICANT = 1, COUNTED = 2, UNDETERMINED = 4;
 
 /** An opaque pixel as the canvas keeps it, on machines of little-endian order (all that browsers run on). */
 const rgba = (/** @type {number} */ r, /** @type {number} */ g, /** @type {number} */ b) =>
@@ -110,9 +110,10 @@ class Painter {
   /** @param {Uint32Array} pixels */
   paintFlags(pixels) {
     const flags = this.images.codes.flags;
-    const [marked, unmarked, uncounted] = this.page.mask.map((/** @type {number[]} */ c) => rgba(c[0], c[1], c[2]));
+    const [marked, unmarked, uncounted, open] = this.page.mask.map((/** @type {number[]} */ c) => rgba(c[0], c[1], c[2]));
     for (let i = 0; i < pixels.length; i++) {
-      pixels[i] = flags[i] & COUNTED ? (flags[i] & SIGNIFICANT ? marked : unmarked) : uncounted;
+      const unshown = flags[i] & UNDETERMINED ? open : unmarked;
+      pixels[i] = flags[i] & COUNTED ? (flags[i] & SIGNIFICANT ? marked : unshown) : uncounted;
     }
   }
 

@@ -1,0 +1,227 @@
+"""What a metric would be without noise: its mean and its visible shares, each with an interval.
+
+A distance is never negative, so that noise raises it: near zero by as much as the root of the
+noise's variance, far from it by as much as the variance itself. Both follow from one rule, by
+adding the noise once more. Over a block of pixels let ``f0`` be the mean distance as measured and
+``f1`` that after noise of the same distribution is added to the reference; then ::
+
+    f² (debiased) = f0² − (f1² − f0²)
+
+where the distance is the noise alone ``f1 = √2 f0`` and nothing is left; where it is far larger the
+squares grow in proportion to the variance. It is the simulation and extrapolation of Cook and
+Stefanski (J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. Where noise moves
+colours along one line, to and fro through the truth, this takes off too much. The same formula with
+the means of squared distances is right there, where the pixels of a block depart alike, and takes
+off too little where they do not; so does taking off nothing. The estimate is the middle of the two,
+and half of what lies between them is added to its interval; so is a part of the noise, `CURVATURE`,
+since colour spaces are curved. Where the standard error is more than a third of the values, skewed
+noise shifts the very mean of the colours, and the interval does not hold.
+
+Blocks, since their distances differ; a block's square may come out negative, and its root then
+counts as negative, so that little bias is left in the mean of many. The added noise is a contrast
+of the groups of passes: weights that add up to 0 and give it the variance of the mean.
+
+The intervals are Student's, by the jackknife over the groups of passes. Where groups are too few,
+or the metric looks at neighbourhoods, the triangle inequality gives a wider one: a mean distance is
+off by no more than the distance of the reference from the truth, the noise floor.
+
+All of it is computed on the blocks that are sampled (`reference.rendering.moments.sample`), at most
+16,384 pixels, and carried over to the image as the bias found there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.departure.blocks import ratio
+from comparisons.departure.metric import Metric, Pixelwise
+from comparisons.departure.spaces import Viewing
+from comparisons.intervals import jackknife_error, student
+from reference.rendering.moments import Grouped
+
+Array = NDArray[np.float64]
+
+#: Noise is added in this many independent ways, and what comes of it is averaged.
+CONTRASTS = 3
+
+#: Of the square of the noise, for doubt: colour spaces are curved, and noise is not small in them.
+CURVATURE = 0.06
+
+#: By which a noise floor may be too small, which is itself an estimate.
+MARGIN = 1.25
+
+#: Groups of passes that a jackknife needs: without one of them two are left to make noise of.
+FEWEST = 3
+
+
+@dataclass(frozen=True)
+class Debiased:
+    """A mean without the part of noise, 95 % intervals of it and of the share above thresholds."""
+
+    value: float
+    low: float
+    high: float
+    visible: dict[str, tuple[float, float]]
+
+
+def exactly(mean: float, visible: dict[str, float]) -> Debiased:
+    """What is measured without noise."""
+    return Debiased(mean, mean, mean, {limit: (share, share) for limit, share in visible.items()})
+
+
+def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
+    """From distances (N,) and those that noise alone would give, by the triangle inequality."""
+    mean, floor = metric.mean(values), metric.mean(noise)
+    visible = {
+        name: (float((values - noise > limit).mean()), float((values + noise > limit).mean()))
+        for name, limit in zip(_limits(metric), metric.visible, strict=True)
+    }
+    clean = np.sqrt(max(mean**2 - floor**2, 0.0))
+    return Debiased(float(clean), max(mean - MARGIN * floor, 0.0), mean + MARGIN * floor, visible)
+
+
+def debiased(
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: Array
+) -> Debiased | None:
+    """Take the noise out of a metric; None where the groups of passes are too few.
+
+    test
+        The test image (H, W, 3), linear.
+    grouped
+        Groups of passes of its difference from the reference, at a sample of pixels.
+    raw
+        The distances (N,) of all counted pixels.
+    """
+    count = len(grouped.sizes)
+    if count < FEWEST:
+        return None
+    shown = test.reshape(-1, 3)[grouped.places]
+    coordinates = metric.coordinates(shown, viewing)
+
+    def distances(difference: Array) -> Array:
+        return metric.difference(metric.coordinates(shown - difference, viewing), coordinates)
+
+    whole = _Extrapolated.of(metric, distances, grouped, range(count))
+    left_out = [
+        _Extrapolated.of(metric, distances, grouped, [k for k in range(count) if k != out]).clean
+        for out in range(count)
+    ]
+    error = np.hypot(jackknife_error(left_out), whole.sampling_error(grouped))
+    # What noise adds is found on the sample, what it is taken from on all pixels.
+    measured, added = _numbers(metric, raw), whole.raw - whole.clean
+    half = np.array([student(0.0, float(each), count).high for each in error])
+    middle = max(measured[0] - added[0], 0.0)
+    half[0] += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
+    value, low, high = np.maximum(measured[0] - added[0] + half[0] * np.array([0, -1, 1]), 0.0)
+    if metric.linear:
+        value, low, high = np.sqrt([value, low, high])
+    shares = _shares(measured[1:] - added[1:], half[1:], np.abs(added[1:]))
+    visible = dict(zip(_limits(metric), shares, strict=True))
+    return Debiased(float(value), float(low), float(high), visible)
+
+
+def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]]:
+    """Join the intervals of two estimates of shares (2 n,): neither extrapolation is right for all.
+
+    Half of what noise added to the first is taken for doubt of how it goes on below the noise.
+    """
+    count = len(found) // 2
+    half = half + np.concatenate([added[:count] / 2.0, np.zeros(count)])
+    low = (found - half).reshape(2, count).min(axis=0)
+    high = (found + half).reshape(2, count).max(axis=0)
+    return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
+
+
+def _limits(metric: Metric) -> tuple[str, ...]:
+    return tuple(f"{limit:g}" for limit in metric.visible)
+
+
+def _numbers(metric: Metric, distances: Array) -> Array:
+    """The mean, of a linear metric the mean square; and the shares above thresholds, twice."""
+    first = np.mean(distances**2) if metric.linear else distances.mean()
+    shares = [(distances > limit).mean() for limit in metric.visible]
+    return np.array([first, *shares, *shares])
+
+
+@dataclass(frozen=True)
+class _Extrapolated:
+    """`_numbers` as measured and without noise, and what noise adds to the sum of each block.
+
+    ``gap`` is what lies between the two estimates of the mean, ``noise`` the root of what noise
+    adds to the mean square of blocks.
+
+    The share above a threshold is extrapolated in two ways: linearly, by what the noise adds when
+    added once more, and with the distances of a block scaled to its mean without noise.
+    """
+
+    raw: Array
+    clean: Array
+    added: Array
+    gap: float
+    noise: float
+
+    @classmethod
+    def of(
+        cls,
+        metric: Metric,
+        distances: Callable[[Array], Array],
+        grouped: Grouped,
+        chosen: Sequence[int],
+    ) -> _Extrapolated:
+        means, sizes = grouped.means[chosen], grouped.sizes[chosen]
+        mean = np.average(means, axis=0, weights=sizes)
+        plain = distances(mean)
+        noisy = [distances(mean + np.tensordot(w, means, 1)) for w in contrasts(sizes)]
+        pixels = grouped.by_block(np.ones(len(plain)))
+        before, after = grouped.by_block(plain), grouped.by_block(np.mean(noisy, axis=0))
+        if metric.linear:
+            added, gap = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2), 0.0
+            noise = 0.0
+        else:
+            squares = [grouped.by_block(plain**2), grouped.by_block(np.mean(np.square(noisy), 0))]
+            lower = _root(2.0 * before**2 - after**2)
+            upper = np.minimum(_root((2.0 * squares[0] - squares[1]) * pixels), before)
+            added = before - (lower + upper) / 2.0
+            gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
+            noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
+        shares = [
+            grouped.by_block((np.array(noisy) > limit).mean(axis=0) - (plain > limit))
+            for limit in metric.visible
+        ]
+        kept = ratio(np.maximum(before - added, 0.0), before)[grouped.blocks]
+        shares += [
+            grouped.by_block((plain > limit) - 1.0 * (plain * kept > limit))
+            for limit in metric.visible
+        ]
+        added = np.column_stack([added, *shares])
+        raw = _numbers(metric, plain)
+        return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
+
+    def sampling_error(self, grouped: Grouped) -> Array:
+        """Standard error of what noise adds, from the blocks that were left out of the sample."""
+        pixels = grouped.by_block(np.ones(len(grouped.places)))
+        left = self.added - np.outer(pixels, self.added.sum(axis=0) / pixels.sum())
+        share = 1.0 - grouped.sampled / grouped.total
+        spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
+        return np.sqrt(share * len(left)) * spread / pixels.sum()
+
+
+def _root(squares: Array) -> Array:
+    return np.sign(squares) * np.sqrt(np.abs(squares))
+
+
+def contrasts(sizes: Array) -> Array:
+    """Weights (m, K) of groups of passes that make noise of their means, as large as their mean's.
+
+    They are orthogonal to each other, add up to 0, and their squares over the sizes to one over
+    all passes.
+    """
+    count = len(sizes)
+    waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
+    waves[:, 0] = np.sqrt(sizes)
+    basis, _ = np.linalg.qr(waves)
+    return (basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]).T

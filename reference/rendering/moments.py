@@ -1,0 +1,149 @@
+"""Sums of the passes of a difference that tell how far its noise is from a normal distribution.
+
+Path-traced noise is skewed: rare paths carry much of the light, and as long as none has come a
+pixel looks darker and surer than it is. The third moment of the passes tells how large such
+contributions are, and means of groups of passes tell how any number made of the image scatters.
+"""
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from reference.rendering.renderer import Accumulator, Estimate
+
+GROUPS = 8
+"""Of passes, at most: seven degrees of freedom for an interval."""
+
+BLOCK = 8
+"""Side in pixels of the blocks that are sampled, and that marks are tested in."""
+
+BLOCKS = 256
+"""Sampled at most: 16,384 pixels, all of an image of 128 x 128. It bounds memory and time."""
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """Means of groups of passes at some pixels.
+
+    Attributes
+    ----------
+    means
+        (K, P, 3): the mean of each group, in doubles. Group k holds passes k, k + 8, k + 16, …
+    sizes
+        (K,): passes of each group.
+    places
+        (P,): the pixels, counted in reading order.
+    blocks
+        (P,): the block of each pixel, numbered from 0 to ``sampled - 1``.
+    sampled, total
+        Blocks that were sampled, and blocks with a counted pixel.
+    """
+
+    means: np.ndarray
+    sizes: np.ndarray
+    places: np.ndarray
+    blocks: np.ndarray
+    sampled: int
+    total: int
+
+    def by_block(self, values):
+        """Return the sums (B, ...) over the sampled blocks of values (P, ...) of the pixels."""
+        sums = np.zeros((self.sampled, *values.shape[1:]))
+        np.add.at(sums, self.blocks, values)
+        return sums
+
+
+@dataclass(frozen=True)
+class DifferenceEstimate(Estimate):
+    """The mean difference of two halves, and how its noise is distributed.
+
+    Attributes
+    ----------
+    third
+        (H, W, 3): third cumulant of ``mean``, without bias from 4 passes on; 0 with fewer.
+        Negative where single contributions to the reference are large.
+    grouped
+        Means of groups of passes at a sample of pixels.
+    """
+
+    third: np.ndarray
+    grouped: Grouped
+
+
+class DifferenceSums(Accumulator):
+    """Running sums of the passes of a difference, for a :class:`DifferenceEstimate`.
+
+    Parameters
+    ----------
+    counted
+        (H, W): the pixels from which blocks are sampled.
+    """
+
+    SUMS = (*Accumulator.SUMS, "cubes")
+
+    def __init__(self, counted):
+        super().__init__()
+        self._sample = sample(counted)
+        flat = 3 * self._sample[0][:, None] + np.arange(3)
+        self._index = mi.UInt32(flat.ravel().astype(np.uint32))
+        self._groups = np.zeros((GROUPS, flat.size))
+
+    def _step(self, image):
+        count, step = self.count, image - self._mean
+        share = step / dr.opaque(mi.Float64, count)
+        # The update of a third central moment by one value (Pébay 2008, equation 2.8), which takes
+        # the mean and the squares as they were before.
+        cubic = dr.opaque(mi.Float64, (count - 1) * (count - 2))
+        self._cubes += share * (share * step * cubic - 3 * self._squares)
+        super()._step(image)
+        if self._index.shape[0]:
+            values = dr.gather(mi.Float64, image.array, self._index)
+            self._groups[(count - 1) % GROUPS] += np.array(values)
+
+    def state(self):
+        """Return the sums as arrays, for :meth:`restore`."""
+        return super().state() | {"groups": self._groups.copy()}
+
+    def restore(self, state):
+        """Go on from the :meth:`state` of another one."""
+        super().restore(state)
+        self._groups = np.array(state["groups"])
+
+    def estimate(self):
+        """Return what the passes so far say."""
+        plain, n = super().estimate(), self.count
+        third = np.array(self._cubes)
+        # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, that of the mean 1/n² of it.
+        third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
+        return DifferenceEstimate(**vars(plain), third=third, grouped=self._grouped())
+
+    def _grouped(self):
+        sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)
+        sizes = sizes[sizes > 0]
+        means = self._groups[: len(sizes)] / sizes[:, None]
+        places, blocks, total = self._sample
+        shape = (len(sizes), len(places), 3)
+        sampled = int(blocks.max()) + 1 if len(blocks) else 0
+        return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+
+
+def sample(counted):
+    """Draw blocks that hold counted pixels; the same ones for the same image.
+
+    Returns
+    -------
+    places, blocks, total
+        Pixels in reading order and the block of each, as in :class:`Grouped`.
+    """
+    rows, columns = np.nonzero(counted)
+    across = -(-counted.shape[1] // BLOCK)
+    own = rows // BLOCK * across + columns // BLOCK
+    numbers = np.unique(own)
+    # A random draw, not every n-th block: a stride would fall in step with the image.
+    chosen = np.random.default_rng(0).permutation(len(numbers))[:BLOCKS]
+    chosen = numbers[np.sort(chosen)]
+    inside = np.isin(own, chosen)
+    places = rows[inside] * counted.shape[1] + columns[inside]
+    return places, np.searchsorted(chosen, own[inside]), len(numbers)
