@@ -6,7 +6,7 @@ import pytest
 from comparisons.cost.timing import Judge
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import DEFAULT_VIEWING
-from comparisons.effects.noiseless import Noiseless, contrasts
+from comparisons.effects.noiseless import Noiseless
 from reference.rendering.renderer import Estimate
 
 SIZE, REPLICATES, NOISE = 32, 8, 0.05
@@ -68,10 +68,3 @@ def test_without_noise_errors_are_the_metrics():
     )
     found = Noiseless(judge, flat).errors(1.2 * flat)
     np.testing.assert_allclose(found, true(0.36), rtol=1e-6)
-
-
-@pytest.mark.parametrize("count", [3, 4, 7, 8])
-def test_contrasts_are_noise_of_the_means_size(count):
-    weights = contrasts(count)
-    np.testing.assert_allclose(weights.sum(axis=1), 0, atol=1e-12)
-    np.testing.assert_allclose(weights @ weights.T, np.eye(len(weights)) / count, atol=1e-12)

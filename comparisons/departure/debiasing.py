@@ -183,8 +183,8 @@ class _Extrapolated:
             noise = 0.0
         else:
             squares = [grouped.by_block(plain**2), grouped.by_block(np.mean(np.square(noisy), 0))]
-            lower = _root(2.0 * before**2 - after**2)
-            upper = np.minimum(_root((2.0 * squares[0] - squares[1]) * pixels), before)
+            lower = signed_root(2.0 * before**2 - after**2)
+            upper = np.minimum(signed_root((2.0 * squares[0] - squares[1]) * pixels), before)
             added = before - (lower + upper) / 2.0
             gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
             noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
@@ -210,7 +210,8 @@ class _Extrapolated:
         return np.sqrt(share * len(left)) * spread / pixels.sum()
 
 
-def _root(squares: Array) -> Array:
+def signed_root(squares: Array) -> Array:
+    """The roots of numbers, negative of negative ones: noise around 0 leaves no bias in a mean."""
     return np.sign(squares) * np.sqrt(np.abs(squares))
 
 

@@ -2,40 +2,17 @@
 
 A distance is never negative, so that noise raises it, and raises it more where less is left to see.
 Prices are differences of such errors: each would be charged with the noise that its effect brings.
-So the noise is added once more, and what it adds is taken away. Over a block of pixels let ``f0``
-be the mean distance as measured, and ``f1`` that after noise of the same distribution was added to
-both images; then ::
-
-    f² (without noise) = f0² − (f1² − f0²)
-
-Of noise alone ``f1 = √2 f0``, and nothing is left; far from it the squares grow with the variance.
-A negative square counts as a negative root, so that the mean of many blocks is not biased. Within a
-block each pixel keeps its share.
-
-Source of the method: J. R. Cook and L. A. Stefanski, *Simulation-extrapolation estimation in
-parametric measurement error models*, J. Am. Stat. Assoc. 89, 1994.
+So the noise of both images is added once more, and what it adds to each block is taken away, by
+the formula of :mod:`comparisons.departure.debiasing`. Within a block each pixel keeps its share.
+Where a departure is near the size of the noise, up to a third of what noise adds can be left.
 """
 
 from functools import cached_property
 
 import numpy as np
 
-BLOCK = 8
-"""Pixels along each side of a block."""
-
-CONTRASTS = 2
-"""Ways in which noise is added, whose mean counts."""
-
-
-def contrasts(count: int) -> np.ndarray:
-    """Return weights (m, count) that make noise of independent images, as large as their mean's.
-
-    Each row adds up to 0, and its squares to ``1 / count``; rows are orthogonal. Images with these
-    weights keep no signal, and have the variance of their mean.
-    """
-    rows = np.arange(1, 1 + min(CONTRASTS, count - 1))[:, None]
-    waves = np.cos(np.pi * rows * (np.arange(count) + 0.5) / count)
-    return waves * np.sqrt(2) / count
+from comparisons.departure.debiasing import contrasts, signed_root
+from reference.rendering.moments import BLOCK
 
 
 class Noiseless:
@@ -66,7 +43,7 @@ class Noiseless:
         found = []
         for chosen, references in self._references:
             some = images[chosen]
-            weights = contrasts(len(some))
+            weights = contrasts(np.ones(len(some)))
             noise = np.tensordot(weights, some, 1)
             shown = (some.mean(axis=0), *(some.mean(axis=0) + each for each in noise))
             plain, *noisy = (
@@ -87,7 +64,7 @@ class Noiseless:
         found = []
         for chosen in sets:
             mean = self._groups[chosen].mean(axis=0)
-            noise = np.tensordot(contrasts(len(chosen)), self._groups[chosen], 1)
+            noise = np.tensordot(contrasts(np.ones(len(chosen))), self._groups[chosen], 1)
             # The other sign than an image's: the noise of both is independent.
             images = (mean, *(mean - each for each in noise))
             found.append((chosen, [self._coordinates(image) for image in images]))
@@ -99,7 +76,6 @@ class Noiseless:
     def _without_noise(self, plain, noisy):
         """Return distances (N,) without noise, from those measured and those with more of it."""
         before, after = (np.bincount(self._blocks, each) for each in (plain, noisy))
-        square = 2 * before**2 - after**2
-        clean = np.sign(square) * np.sqrt(np.abs(square))
+        clean = signed_root(2 * before**2 - after**2)
         share = np.divide(clean, before, out=np.zeros_like(clean), where=before > 0)
         return plain * share[self._blocks]
