@@ -43,7 +43,8 @@ compare(SCENES["cornell-box"].source(), options, progress, kept=kept)
 
 def arrays(result):
     images = result.images
-    return [images.heuristic, images.reference, images.reference_stderr, *images.maps.values()]
+    halves = [images.heuristic, images.reference, images.reference_stderr]
+    return [*halves, images.significant, *images.maps.values()]
 
 
 def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
