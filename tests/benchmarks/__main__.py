@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import cost, kernel, lights, scaling, stability, study, terms
+from tests.benchmarks import cost, kernel, lights, marks, scaling, stability, study, terms
 
 BENCHMARKS = {
     "cost": cost.run,
     "kernel": kernel.run,
     "lights": lights.run,
+    "marks": marks.run,
     "scaling": scaling.run,
     "stability": stability.run,
     "study": study.run,
