@@ -55,7 +55,7 @@ def channels(width, height, seed=0):
         "reference": image(3),
         "reference_stderr": image(3),
         **{name: image() for name in drawn()},
-        "significant": rng.random((height, width)) > 0.5,
+        "significant": rng.choice([0.0, 0.5, 1.0], (height, width)),
     }
     return exr.channels(layers)
 
@@ -96,8 +96,9 @@ def test_the_page_holds_what_the_exr_holds():
     largest = np.max([stored[f"reference_stderr.{c}"] for c in "RGB"], axis=0)
     for (y, x), code in np.ndenumerate(planes["standard_error"]):
         assert value_of(code, 2) == float(f"{float(largest[y, x]):.1e}")
-    np.testing.assert_array_equal(planes["flags"] & 1, stored["significant.Y"])
-    np.testing.assert_array_equal(planes["flags"] >> 1, counted)
+    np.testing.assert_array_equal(planes["flags"] & 1, stored["significant.Y"] == 1)
+    np.testing.assert_array_equal((planes["flags"] & 4) > 0, stored["significant.Y"] == 0.5)
+    np.testing.assert_array_equal((planes["flags"] & 2) > 0, counted)
 
 
 def test_a_large_image_is_averaged_over_blocks(monkeypatch):
@@ -110,7 +111,7 @@ def test_a_large_image_is_averaged_over_blocks(monkeypatch):
     for y, x in ((0, 0), (1, 2), (2, 3)):  # the last is a single pixel, at the corner
         mean = image[2 * y : 2 * y + 2, 2 * x : 2 * x + 2].mean()
         assert math.isclose(value_of(planes["reference.R"][y, x], 3), mean, rel_tol=0.006)
-    assert planes["flags"][2, 3] & 1 == stored["significant.Y"][4, 6]
+    assert planes["flags"][2, 3] & 1 == (stored["significant.Y"][4, 6] == 1)
 
 
 def test_smooth_images_take_little_room():

@@ -55,11 +55,12 @@ def test_signed_map_is_blue_below_red_above_and_pale_at_zero():
     assert zero.min() > 240
 
 
-def test_mask_map_has_three_colours():
-    picture = pixels_of(images.mask_map([[True, False, False]], [[True, True, False]]))
+def test_mask_map_has_four_colours():
+    picture = pixels_of(images.mask_map([[1.0, 0.0, 0.5, 0.5]], [[True, True, True, False]]))
     assert [tuple(map(int, p)) for p in picture[0]] == [
         images.MARKED,
         images.UNMARKED,
+        images.UNDETERMINED,
         images.UNCOUNTED,
     ]
 

@@ -191,10 +191,18 @@ def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, mo
     assert "means over 2 × 2 pixels" in shown()
 
 
-def test_a_mean_at_the_noise_floor_is_said_to_be_noise(record, pictures):
-    assert "about noise" not in Page(page.render([records.view(record)])).text
-    record["metrics"]["dE2000"]["noise_floor"] = 4.2
-    assert "about noise" in Page(page.render([records.view(record)])).text
+def test_nothing_but_noise_is_said_where_a_departure_would_have_shown(record, pictures):
+    def shown(**interval):
+        record["metrics"]["dE2000"].update(interval)
+        return Page(page.render([records.view(record)])).text
+
+    assert "about noise" not in shown()
+    said = shown(debiased=0.1, low=0.0, high=0.4)
+    assert "about noise" in said
+    assert "nothing but noise. A mean above 0.400 would have shown" in " ".join(said.split())
+    said = shown(debiased=0.1, low=0.0, high=4.0)
+    assert "about noise" not in said
+    assert "noise may hide a mean of up to 4.00" in " ".join(said.split())
 
 
 @pytest.mark.parametrize(

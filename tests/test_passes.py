@@ -44,7 +44,8 @@ compare(SCENES["cornell-box"].source(), options, progress, kept=kept)
 
 def arrays(result):
     images = result.images
-    return [images.heuristic, images.reference, images.reference_stderr, *images.maps.values()]
+    halves = [images.heuristic, images.reference, images.reference_stderr]
+    return [*halves, images.significant, *images.maps.values()]
 
 
 @pytest.mark.guarantee("runs", "A run that was killed goes on to the same image, bit for bit.")

@@ -4,7 +4,7 @@ A distance is never negative, so that noise raises it, and raises it more where 
 Prices are differences of such errors: each would be charged with the noise that its effect brings.
 So the noise of both images is added once more, and what it adds to each block is taken away, by
 the formula of :mod:`comparisons.departure.debiasing`. Within a block each pixel keeps its share.
-Where a departure is near the size of the noise, up to a third of what noise adds can be left.
+Where a departure is near the size of the noise, up to two fifths of what noise adds can be left.
 """
 
 from functools import cached_property

@@ -46,7 +46,7 @@ def check_inspector(shown, channels, x, y):
         assert read(shown[name]) == float(f"{channels[f'{name}.Y'][y, x]:.2e}")
     error = max(rgb(channels, "reference_stderr", x, y))
     assert read(shown["standard_error"]) == float(f"{error:.1e}")
-    marked = "yes" if channels["significant.Y"][y, x] else "no"
+    marked = {0.0: "no", 0.5: "undetermined", 1.0: "yes"}[channels["significant.Y"][y, x]]
     assert shown["significant"] == (marked if y else "not counted")
 
 
@@ -159,8 +159,9 @@ def test_error_maps_have_their_colours_and_their_bar(visitor, report):
     red, _, blue = visitor.colour_of(20, 28)
     assert (red > blue) == (ratio > 0)
     page.get_by_label("Map of the error").select_option("significant")
-    marked = (213, 94, 0) if channels["significant.Y"][28, 20] else (222, 226, 230)
-    assert visitor.colour_of(20, 28) == marked
+    colours = {0.0: (222, 226, 230), 0.5: (240, 201, 119), 1.0: (213, 94, 0)}
+    for x, y in ((20, 28), (21, 28), (22, 28), (23, 28), (24, 28)):
+        assert visitor.colour_of(x, y) == colours[channels["significant.Y"][y, x]]
     assert visitor.colour_of(20, 0) == (130, 136, 143)
 
 
