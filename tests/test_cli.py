@@ -145,7 +145,7 @@ def test_plan_prints_a_table_and_json(run):
     assert code == 0
     for word in (
         "occlusion",
-        "only sphere reflects",
+        "direct light alone",
         "direct_all, no shadow rays",
         "k_a, k_d, k_s",
     ):
@@ -155,6 +155,19 @@ def test_plan_prints_a_table_and_json(run):
     assert data["integrator"] == "path"
     assert len(data["effects"]) == 14
     assert all(effect["called_for"] for effect in data["effects"])
+
+
+def test_plan_names_the_premise_that_fails(run):
+    code, printed, _ = run("plan", "cornell-box", "--json")
+    assert code == 0
+    rules = {rule["name"]: rule for rule in json.loads(printed)["rules"]}
+    assert rules["every light at every sample"]["applies"]
+    shadows = rules["no shadow rays"]
+    assert not shadows["applies"]
+    assert "box around a light" in shadows["premise"]
+    assert "may stand between" in shadows["evidence"]
+    code, printed, _ = run("plan", "cornell-box")
+    assert "premise that is not known to hold" in printed
 
 
 def test_plan_verifies(run):
