@@ -166,7 +166,11 @@ def compare(source, options=None, progress=None, command="", kept=None):
         unrepresentable=record.unrepresentable(ready.pair),
         integrator_given=ready.pair.integrator,
         overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
-        warnings=(*ready.pair.warnings, *record.guard_warnings(ready.guard)),
+        warnings=(
+            *ready.pair.warnings,
+            *record.guard_warnings(ready.guard),
+            *record.path_warnings(ready),
+        ),
         versions=record.versions(),
         command=command,
         noise_target=estimates.stop,

@@ -25,6 +25,7 @@ from comparisons.comparison import (
 )
 from comparisons.pool import cores
 from heuristic import __version__
+from reference.planning.light_by_light import loses_light
 from reference.rendering.guard import Verdict
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
@@ -187,6 +188,16 @@ def guard_warnings(guard):
         yield (
             f"The plan leaves out light that is there, or adds some: {guard.words}. So everything"
             " was simulated. A rule of pruning is wrong for this scene: please report it."
+        )
+
+
+def path_warnings(ready):
+    """Yield what is to be said where Mitsuba's ``path`` loses light."""
+    if loses_light(ready.plan.integrator, ready.pair):
+        yield (
+            "Mitsuba's path counts a ray as black that passes straight through masks into the"
+            " background, with the light that the masks reflect: the reference is too dark there."
+            " With the integrator volpath it is not."
         )
 
 

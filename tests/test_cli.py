@@ -149,7 +149,7 @@ def test_plan_prints_a_table_and_json(run):
     assert code == 0
     for word in (
         "occlusion",
-        "only sphere reflects",
+        "direct light alone",
         "direct_all, no shadow rays",
         "k_a, k_d, k_s",
     ):
@@ -171,6 +171,19 @@ def test_what_mitsuba_says_is_no_part_of_the_json(monkeypatch, capfd):
     assert "out-of-gamut" in messages
     mi.Log(mi.LogLevel.Warn, "after the command")
     assert "after the command" in capfd.readouterr().out
+
+
+def test_plan_names_the_premise_that_fails(run):
+    code, printed, _ = run("plan", "cornell-box", "--json")
+    assert code == 0
+    rules = {rule["name"]: rule for rule in json.loads(printed)["rules"]}
+    assert rules["every light at every sample"]["applies"]
+    shadows = rules["no shadow rays"]
+    assert not shadows["applies"]
+    assert "box around a light" in shadows["premise"]
+    assert "may stand between" in shadows["evidence"]
+    code, printed, _ = run("plan", "cornell-box")
+    assert "premise that is not known to hold" in printed
 
 
 def test_plan_verifies(run):

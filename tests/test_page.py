@@ -274,7 +274,7 @@ def test_verifications_are_printed(record, pictures):
     html = page.render([view], verifications=[verification])
     assert "3 of 1436" in html
     assert "91.5 ×" in html
-    assert "5.7 (5.3 to 6.1)" in html
+    assert "5.70 (5.30 to 6.10)" in html
     assert "96 × 80 pixels" in html
     assert HOSTILE not in html
     assert "Pruning" not in page.render([view])

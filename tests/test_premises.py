@@ -8,7 +8,7 @@ from comparisons.compare import prepare
 from comparisons.options import Options
 from reference.effects.obstacles import NO_SECOND_REFLECTION, NO_SHADOWS
 from reference.planning.facts import Facts, examine
-from reference.planning.light_by_light import LIGHT_BY_LIGHT
+from reference.planning.light_by_light import LIGHT_BY_LIGHT, loses_light
 from reference.planning.premises import (
     CONVEX,
     NO_MEDIUM,
@@ -183,6 +183,22 @@ def test_a_lamp_that_is_seen_from_inside_is_left_to_mitsuba(rgb):
         stock = mi.load_dict(inside | {"integrator": {"type": "direct", **settings}})
         images.append(np.array(mi.render(stock, spp=16)).mean())
     assert abs(images[0] - images[1]) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("integrator", "kept"), [("direct", 1.0), ("path", 0.75), ("volpath", 1.0)]
+)
+def test_a_mask_reflects_its_share_but_in_mitsubas_path(rgb, integrator, kept):
+    """Half opaque, it reflects half of the light; `path` loses what rays gather that pass twice."""
+    masked = {"type": "mask", "opacity": 0.5, "bsdf": DIFFUSE}
+    sun = {"type": "directional", "direction": (0.3, 1, -0.2), "irradiance": 1.0}
+    images = {}
+    for bsdf in (DIFFUSE, masked):
+        source = Source("mask", scene(integrator=integrator, ball=sphere(bsdf), sun=sun))
+        ready = prepare(source, Options(spp=SPP))
+        images[bsdf["type"]] = np.array(ready.reference.render(1)).mean()
+    assert images["mask"] == pytest.approx(0.5 * kept * images["diffuse"], rel=0.01)
+    assert loses_light(ready.plan.integrator, ready.pair) is (kept < 1)
 
 
 def test_two_sides_of_two_kinds_have_no_table(rgb):

@@ -1,6 +1,8 @@
-"""Whether every light can be asked at every sample, in the place of one picked at random."""
+"""Where Mitsuba's integrators agree: on every light in the place of one, and on masks."""
 
-from reference.planning.facts import Facts
+from reference.pairing import lights
+from reference.pairing.halves import Pair
+from reference.planning.facts import BSDF, EMITTER, Facts
 from reference.planning.premises import NO_MEDIUM, OPAQUE, Premise, Pruning
 
 
@@ -36,3 +38,17 @@ LIGHT_BY_LIGHT = Pruning(
         ),
     ),
 )
+
+
+def loses_light(integrator: str, pair: Pair) -> bool:
+    """Tell whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
+
+    A camera ray that passes straight through everything that it meets, and ends in nothing that is
+    shown, counts as black, with what it gathered at the surfaces on its way. Of a closed mask of
+    opacity ``o`` before nothing, the share ``(1 - o)^2`` is lost. ``volpath`` keeps it.
+    """
+    graph = pair.physical
+    passing = any(graph.plugin(index) in ("mask", "null") for index in graph.nodes(BSDF))
+    emitters = (lights.of(graph.plugin(index)) for index in graph.nodes(EMITTER))
+    is_shown = any(kind.surrounds for kind in emitters) and not pair.hide_emitters
+    return integrator == "path" and passing and not is_shown

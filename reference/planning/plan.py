@@ -238,11 +238,14 @@ def _holds(made: Plan, rule: Pruning) -> bool:
 
 
 def _stock(pair: Pair) -> str:
-    """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media."""
+    """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media.
+
+    ``direct`` is no ``path`` of depth 2: that loses light at masks.
+    """
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator
     if not pair.media:
-        return "path"
+        return "direct" if pair.integrator == "direct" else "path"
     graph = pair.physical
     extinctions = (
         graph.props(index).get(key, 0.0)

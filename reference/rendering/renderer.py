@@ -217,11 +217,10 @@ def variant(name):
 def physical_integrator(plan, scene, hide_emitters):
     """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
-    description = {
-        "type": plan.integrator,
-        "hide_emitters": hide_emitters,
-        "max_depth": plan.max_depth,
-    }
+    description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+    if plan.integrator == "direct":
+        return mi.load_dict(description)
+    description["max_depth"] = plan.max_depth
     if plan.integrator in PATHS:
         return mi.load_dict(description | {"rr_depth": plan.rr_depth})
     own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
