@@ -55,11 +55,11 @@ def guarantees() -> list[Guarantee]:
 
 def lines() -> Iterator[str]:
     """Yield the lines of the page's list."""
-    area = None
-    for each in guarantees():
+    area, found = None, guarantees()
+    for each in found:
         if each.area != area:
             area = each.area
-            yield from ("", f"## {AREAS[area]}", "")
+            yield from (*([""] if each is not found[0] else []), f"## {AREAS[area]}", "")
         slow = ", `-m slow`" if each.is_slow else ""
         yield f"- {each.text} ([{each.test}](../{each.path}){slow})"
 

@@ -36,6 +36,10 @@ def without_noise(test, passes):
     return raw.mean(), debiased(LEADING, test, found.grouped, DEFAULT_VIEWING, raw)
 
 
+@pytest.mark.guarantee(
+    "means",
+    "Intervals of mean ΔE2000 hold the truth at departures of 0, 1 and 5.",
+)
 @pytest.mark.parametrize("count", [4, 16])
 @pytest.mark.parametrize(("factor", "about"), [(1.0, 0), (1.045, 1), (1.245, 5)])
 def test_the_mean_without_noise_has_little_bias_and_an_honest_interval(rgb, factor, about, count):
@@ -73,6 +77,7 @@ def test_shares_of_visible_pixels_are_within_their_intervals(rgb):
     assert np.mean(inside, axis=0).min() >= 0.75
 
 
+@pytest.mark.guarantee("means", "A tenth more brightness on a plain grey does not pass as noise.")
 @pytest.mark.parametrize("spread", [0.3, 0.45])
 def test_a_tenth_more_brightness_is_no_noise_on_a_plain_grey(rgb, spread):
     """The mean is at its floor, up to 1.1 times, which says nothing: noise hides the departure."""

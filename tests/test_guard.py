@@ -20,6 +20,10 @@ SLIGHTLY_WRONG = {"an anisotropic sphere"}
 """Off by a percent: below what the guard is for."""
 
 
+@pytest.mark.guarantee(
+    "plans",
+    "The guard catches each wrong plan of a fifth of the light or more at default settings.",
+)
 @pytest.mark.parametrize("name", sorted(set(SCENES) - SLIGHTLY_WRONG))
 def test_a_wrong_plan_is_caught(rgb, name, monkeypatch):
     prune_blindly(monkeypatch)
@@ -139,6 +143,10 @@ def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
     assert rate(pruned, 2**20, 100) == 0
 
 
+@pytest.mark.guarantee(
+    "plans",
+    "Noise alone makes the guard disagree in one scene of a thousand at most.",
+)
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [normal, fireflies])
 def test_noise_alone_raises_one_alarm_in_a_thousand_at_most(pruned, monkeypatch, noise):

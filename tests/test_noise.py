@@ -73,6 +73,10 @@ def test_the_floor_is_what_runs_measure_with_few_samples_too(rgb):
     check_floor(list(runs(12, FEW)), 0.1)
 
 
+@pytest.mark.guarantee(
+    "means",
+    "Over a hundred seeds standard errors and noise floors are what runs scatter by.",
+)
 @pytest.mark.slow
 def test_over_a_hundred_seeds(rgb):
     estimates = list(runs(100))

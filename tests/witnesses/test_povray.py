@@ -57,6 +57,10 @@ def require_agreement(name, folder):
     assert witness.mean() == pytest.approx(kernel.astype(np.float16).mean(dtype=float), rel=MEAN)
 
 
+@pytest.mark.guarantee(
+    "kernel",
+    "The figures of chapter 8 are POV-Ray's, pixel by pixel, to half-float rounding.",
+)
 @pytest.mark.parametrize("name", FIGURES + OTHERS)
 def test_a_figure_is_that_of_povray_to_half_float_rounding(rgb, name, tmp_path):
     require_agreement(name, tmp_path)
