@@ -320,6 +320,7 @@ def examine_batch(first, count, variant):
     from reference.rendering import direct
 
     mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)  # of samples that are rounded up
     plugins.register()
     direct.register()
     with tempfile.TemporaryDirectory() as folder:
