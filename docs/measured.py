@@ -66,7 +66,7 @@ def prices() -> Iterator[str]:
     worth = {price.effect: price.removes for price in record.prices.effects}
     by_worth = sorted(worth, key=lambda effect: -worth[effect].value)
     prices = ", ".join(
-        f"{effect} {worth[effect].value:.2g} ({worth[effect].low:.2g} to {worth[effect].high:.2g})"
+        f"{effect} {worth[effect].value:.3g} ({worth[effect].low:.3g} to {worth[effect].high:.3g})"
         for effect in by_worth
     )
     closure = record.closure
@@ -112,7 +112,7 @@ def speed() -> Iterator[str]:
             ),
             row("NumPy", "NumPy", f"{ratios['NumPy']:.0f} times as fast"),
         ],
-        right=0,
+        right=1,
     )
     each = [row["ns_per_light_and_point"] for row in many if row["lights"] >= 1_000]
     unrolled = np.median([row["unrolled_ns"] for row in many])

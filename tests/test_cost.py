@@ -100,6 +100,29 @@ def test_with_all_effects_nothing_is_left(rgb, sharp):
 
 @pytest.mark.guarantee(
     "prices",
+    "On the Cornell box intervals of prices hold the converged price in 35 of 40 runs or more.",
+)
+@pytest.mark.slow
+def test_intervals_of_prices_hold_the_converged_price(rgb, capsys):
+    def removes(seed, spp):
+        effort = replace(TINY, **SHARP | {"reference_spp": spp, "replicate_spp": spp})
+        asked = Options(resolution=(64, 64), seed=seed)
+        record = cost(SCENES["cornell-box"].source(), asked, effort).record
+        return {price.effect: price.removes for price in record.prices.effects}
+
+    converged = removes(1_000, 8 * SHARP["replicate_spp"])
+    found = [removes(seed, SHARP["replicate_spp"]) for seed in range(40)]
+    for effect, price in converged.items():
+        held = sum(one[effect].low <= price.value <= one[effect].high for one in found)
+        width = np.median([one[effect].high - one[effect].low for one in found])
+        with capsys.disabled():
+            print(f"\n{effect}: {price.value:.3f}, held {held} of 40, median width {width:.3f}")
+        assert held >= 35
+        assert width < max(0.2, price.value / 2)
+
+
+@pytest.mark.guarantee(
+    "prices",
     "Prices and closure add up to the departure, in the mean and in every pixel.",
 )
 def test_prices_add_up_to_the_departure_in_the_mean_and_in_every_pixel(study):
