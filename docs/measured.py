@@ -20,6 +20,7 @@ from comparisons.compare import compare
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Measured
 from comparisons.departure.metrics import LEADING
+from comparisons.verification import Factor, verify
 from reports.charts import figures, vega
 from reports.charts.error_over_time import error_over_time
 from reports.files import images
@@ -30,6 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 COST_SCENE, PICTURED = "cornell-box", "plastic-spheres"
 ROUNDS = 30
+VERIFIED = ("fig-8-9", "fig-6-10", "cornell-box", "plastic-spheres", "narrow-band-lamp")
 CHAPTER_8 = (
     *(f"fig-8-{number}{letter}" for number in (5, 6, 7, 8) for letter in "abc"),
     "fig-8-9",
@@ -79,6 +81,23 @@ def prices() -> Iterator[str]:
         f" {record.prices.departure:.1f}, with 95 % intervals: {prices}. With all of them"
         f" {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) is left."
     )
+
+
+def gains() -> Iterator[str]:
+    """Verify plans, and yield the table of what they save."""
+    names = ("sampler", "integrator", "pruning", "all")
+    rows = []
+    for scene in VERIFIED:
+        case = open_case(scene, Request())
+        factors = {factor.name: factor for factor in verify(case.source, case.options).factors}
+        rows.append((scene, *(_factor(factors[name]) for name in names)))
+    yield from markdown([("Scene", *names), *rows], right=1)
+
+
+def _factor(factor: Factor) -> str:
+    if factor.low == factor.high:
+        return "no change"
+    return f"{factor.value:.3g} ({factor.low:.3g} to {factor.high:.3g})"
 
 
 def speed() -> Iterator[str]:
