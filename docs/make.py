@@ -144,7 +144,7 @@ def _sheet(name, titles, rows):
 
 
 def _measurements():
-    """Measure again all that documents say of errors and times; it takes half an hour."""
+    """Measure again all that documents say of errors and times; it takes a quarter of an hour."""
     import measured  # beside this script
 
     for measure in (measured.baselines, measured.fits, measured.findings, measured.picture):

@@ -99,8 +99,8 @@ def _check_wavelengths(material, lights, ambient):
 
 BLOCK = 16
 """Lights in one kernel. More are summed block after block by the same kernel, each light costing
-about what it costs unrolled; a loop inside the kernel would fetch each parameter for each pixel
-anew, and take twice as long. Larger blocks compile longer and gain little (see the benchmarks)."""
+about what it costs unrolled; a loop inside the kernel would fetch each parameter again for each
+pixel, and take twice as long. Larger blocks compile longer and gain little (see the benchmarks)."""
 
 
 def sum_lights(

@@ -1,7 +1,7 @@
-"""Scenes that serve many points: made once a structure, and edited through ``mitsuba.traverse``.
+"""Scenes that serve many points: made once per structure, and edited through ``mitsuba.traverse``.
 
 Two graphs have one structure if they differ at most in values that :data:`EDITABLE` names. The
-scenes of the first are then edited into those of the second, which makes nothing anew that does not
+scenes of the first are then edited into those of the second, which makes nothing again that does not
 depend on the values, and leaks nothing.
 """
 

@@ -15,6 +15,7 @@ from tests.witnesses.witness import Witness, deviation
 TESTS = Path(__file__).parents[1]
 
 ELSEWHERE = (
+    "test_sampler::test_the_reference_is_right_inside_a_bright_sphere",
     "test_physics::test_a_diffuse_plane_under_a_point_light",
     "test_physics::test_a_diffuse_sphere_under_a_directional_light",
     "test_physics::test_a_diffuse_sphere_in_a_constant_environment",
