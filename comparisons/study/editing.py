@@ -1,8 +1,8 @@
 """Scenes that serve many points: made once per structure, and edited through ``mitsuba.traverse``.
 
 Two graphs have one structure if they differ at most in values that :data:`EDITABLE` names. The
-scenes of the first are then edited into those of the second, which makes nothing again that does not
-depend on the values, and leaks nothing.
+scenes of the first are then edited into those of the second, which makes nothing again that does
+not depend on the values, and leaks nothing.
 """
 
 from dataclasses import dataclass
