@@ -21,6 +21,9 @@ from reference.planning.premises import (
 )
 from reference.planning.shapes import ShapeFacts
 
+KNOWN_SURFACES = (NO_MEDIUM, OPAQUE, STILL, CONVEX, SEEN_FROM_OUTSIDE)
+"""What both rules rest on: light meets nothing but the outer sides of convex shapes."""
+
 FAR = 1e6
 """Where the shadow of a directional light begins, in multiples of the scene's size."""
 
@@ -74,11 +77,7 @@ NO_SHADOWS = Pruning(
     " BSDF returns nothing. A light that is flat, or convex and shines outwards, does not hide the"
     " side that shines.",
     premises=(
-        NO_MEDIUM,
-        OPAQUE,
-        STILL,
-        CONVEX,
-        SEEN_FROM_OUTSIDE,
+        *KNOWN_SURFACES,
         Premise(
             "No shape's box meets the box around a light and a shape that reflects, unless it lies"
             " behind that one's only reflecting side; no light hides itself.",
@@ -122,11 +121,7 @@ NO_SECOND_REFLECTION = Pruning(
     " different shapes do not where one of the shapes is flat, reflects on one side, and the other"
     " lies behind it. A shape that reflects nothing takes no part.",
     premises=(
-        NO_MEDIUM,
-        OPAQUE,
-        STILL,
-        CONVEX,
-        SEEN_FROM_OUTSIDE,
+        *KNOWN_SURFACES,
         Premise("No two shapes that reflect lie before each other's reflecting sides.", _facing),
     ),
 )

@@ -49,6 +49,10 @@ class Structure:
     lights: tuple[LightFacts, ...]
     camera: CameraFacts
 
+    def may_be_seen_from_inside(self, shape: ShapeFacts) -> bool:
+        """Tell whether a camera ray may begin inside a closed shape that reflects there."""
+        return shape.is_hollow and not self.camera.is_outside(shape.corners())
+
     def shape(self, name: str) -> ShapeFacts | None:
         """Return the shape of a name, None where there is none."""
         return next((shape for shape in self.shapes if shape.name == name), None)
@@ -94,6 +98,11 @@ class Facts:
     pair: Pair
     structure: Structure
     interpolation: Interpolation = Interpolation.PHONG
+
+    @cached_property
+    def rulings(self) -> dict:
+        """What rules of pruning were judged already: rulings by rule."""
+        return {}
 
     @cached_property
     def kernel(self) -> mi.Properties:

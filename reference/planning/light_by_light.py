@@ -15,7 +15,7 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
     structure = facts.structure
     for light in structure.lights:
         shape = structure.shape(light.shape) if light.shape is not None else None
-        if shape and shape.is_hollow and not structure.camera.is_outside(shape.corners()):
+        if shape and structure.may_be_seen_from_inside(shape):
             return f"{shape.name}: shines, and may be seen from inside"
     return None
 

@@ -49,7 +49,12 @@ class Pruning:
     premises: tuple[Premise, ...]
 
     def judge(self, facts: Facts) -> "Ruling":
-        """Check the premises."""
+        """Check the premises, once for all that ask: some compare every shape with every other."""
+        if self not in facts.rulings:
+            facts.rulings[self] = self._checked(facts)
+        return facts.rulings[self]
+
+    def _checked(self, facts: Facts) -> "Ruling":
         for premise in self.premises:
             if (evidence := premise.against(facts)) is not None:
                 return Ruling(self, premise, evidence)
@@ -102,9 +107,9 @@ STILL = Premise("The shutter opens for an instant, so that nothing moves.", _mov
 
 
 def _seen_from_inside(facts: Facts) -> str | None:
-    camera = facts.structure.camera
-    for shape in facts.structure.shapes:
-        if shape.is_hollow and not camera.is_outside(shape.corners()):
+    structure, camera = facts.structure, facts.structure.camera
+    for shape in structure.shapes:
+        if structure.may_be_seen_from_inside(shape):
             if camera.origins is None:
                 return f"{shape.name}: where the rays of {camera.plugin} begin is not known"
             return f"{shape.name}: a camera ray may begin inside"
