@@ -162,20 +162,12 @@ def _stages(planned, everything):
         whole = replace(plan, shadows=True, max_depth=plan.scene_depth, tabulate_environment=False)
     found = [planned.reference]
     for before, after in ((whole, plan), (everything.plan, whole)):
-        if _simulated(before) == _simulated(after):
+        if before.simulated == after.simulated:
             found.append(found[-1])
             continue
         integrator = physical_integrator(before, scene, planned.pair.hide_emitters)
         found.append(Renderer(scene, integrator, spp, "image of a step"))
     return [everything.reference, *reversed(found)]
-
-
-def _simulated(plan):
-    """Return what tells one plan's integrator from another's."""
-    own = (plan.shadows, plan.bsdf_samples, plan.tabulate_environment)
-    if plan.integrator != "direct_all":
-        own = (plan.rr_depth,)
-    return plan.integrator, plan.max_depth, *own
 
 
 class _Measured:

@@ -54,7 +54,8 @@ STOCK_RR_DEPTH = 5
 SPP, PASSES = 512, 8
 """64 samples per pass take half the time of 16 for the same noise (``./run bench samplers``)."""
 
-DETERMINISTIC_SPP, DETERMINISTIC_PASSES = 256, 4
+EXACT_SPP, EXACT_PASSES = 256, 4
+"""Of plans whose only random numbers are the places of camera rays."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +100,14 @@ class Plan:
     bsdf_samples: int = 1
     tabulate_environment: bool = False
     rulings: tuple[Ruling, ...] = ()
+
+    @property
+    def simulated(self) -> tuple:
+        """What tells its integrator from that of another plan for the same scene."""
+        own = (self.shadows, self.bsdf_samples, self.tabulate_environment)
+        if self.integrator != "direct_all":
+            own = (self.rr_depth,)
+        return self.integrator, self.max_depth, *own
 
     def calls_for(self, effect: Effect) -> bool:
         """Tell whether an effect is called for."""
@@ -226,8 +235,8 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
     return replace(
         stock.directly(),
         rr_depth=STOCK_RR_DEPTH,
-        spp=SPP if is_random else DETERMINISTIC_SPP,
-        passes=PASSES if is_random else DETERMINISTIC_PASSES,
+        spp=SPP if is_random else EXACT_SPP,
+        passes=PASSES if is_random else EXACT_PASSES,
         exact=not is_random,
         tabulate_environment=tabulated,
     )
