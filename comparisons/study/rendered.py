@@ -1,5 +1,6 @@
 """A point that is rendered: both halves with the same camera rays, and the steps between them."""
 
+from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import pairwise
 
@@ -69,13 +70,7 @@ def _guarded(part, chosen, physical, pair):
 
     Probed is the first point of a part in this process, for each way in which its plans prune.
     """
-    key = (
-        part.name,
-        chosen.integrator,
-        chosen.max_depth,
-        chosen.shadows,
-        chosen.tabulate_environment,
-    )
+    key = part.name, chosen.simulated
     if key not in _guards:
         width, height = image_size(physical)
         samples = part.spp * width * height
@@ -83,7 +78,8 @@ def _guarded(part, chosen, physical, pair):
     found = _guards[key]
     if found.state is not Verdict.DISAGREED:
         return chosen
-    return chosen.unpruned("guard", found.words)
+    # The scene's sampler is made already, and both halves need the same.
+    return replace(chosen.unpruned("guard", found.words), sampler=chosen.sampler)
 
 
 _guards = {}
