@@ -227,8 +227,8 @@ def _measure(estimates, surface, options, exact):
         "metrics": metrics,
         "log2_luminance": ratio,
         "significant": Significant(
-            fraction=_share(significant[counted] == marks.MARKED),
-            undetermined=_share(significant[counted] == marks.UNDETERMINED),
+            fraction=statistics.share(significant[counted] == marks.MARKED),
+            undetermined=statistics.share(significant[counted] == marks.UNDETERMINED),
             level=marks.LEVEL,
         ),
     }
@@ -238,10 +238,6 @@ def _measure(estimates, surface, options, exact):
 def leading_distance(viewing):
     """Return ``(test, reference) -> (N,)``: distances of colours (N, 3) in the leading metric."""
     return lambda test, reference: LEADING.against(reference, ..., viewing)(test)
-
-
-def _share(found):
-    return float(found.mean()) if found.size else 0.0
 
 
 class _Stages:

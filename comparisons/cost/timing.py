@@ -53,13 +53,6 @@ class Judge:
         self.floor = float(self._distance(reference.mean[counted] + reference.noise[counted]))
         """Mean ΔE2000 that the reference's noise alone gives."""
 
-    def map(self, image):
-        """Return the map (H, W) of ΔE2000, 0 where no pixel is counted."""
-        values = np.zeros(self.counted.shape)
-        here = self.metric.coordinates(np.asarray(image)[self.counted], self.viewing)
-        values[self.counted] = self.metric.difference(self.coordinates, here)
-        return values
-
     def errors(self, image):
         """Return mean ΔE2000, and the linear MSE without the reference's share (can be < 0)."""
         image = np.asarray(image, float)[self.counted]

@@ -78,7 +78,7 @@ def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
     mean, floor = metric.mean(values), metric.mean(noise)
     visible = {
         name: (float((values - noise > limit).mean()), float((values + noise > limit).mean()))
-        for name, limit in zip(_limits(metric), metric.visible, strict=True)
+        for name, limit in zip(metric.thresholds, metric.visible, strict=True)
     }
     clean = np.sqrt(max(mean**2 - floor**2, 0.0))
     return Debiased(float(clean), max(mean - MARGIN * floor, 0.0), mean + MARGIN * floor, visible)
@@ -120,7 +120,7 @@ def debiased(
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(measured[1:] - added[1:], half[1:], np.abs(added[1:]))
-    visible = dict(zip(_limits(metric), shares, strict=True))
+    visible = dict(zip(metric.thresholds, shares, strict=True))
     return Debiased(float(value), float(low), float(high), visible)
 
 
@@ -134,10 +134,6 @@ def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]
     low = (found - half).reshape(2, count).min(axis=0)
     high = (found + half).reshape(2, count).max(axis=0)
     return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
-
-
-def _limits(metric: Metric) -> tuple[str, ...]:
-    return tuple(f"{limit:g}" for limit in metric.visible)
 
 
 def _numbers(metric: Metric, distances: Array) -> Array:

@@ -97,6 +97,11 @@ class Metric:
         if not self.heading:
             object.__setattr__(self, "heading", f"{self.label}, mean")
 
+    @property
+    def thresholds(self) -> tuple[str, ...]:
+        """The thresholds of `visible` as records name them."""
+        return tuple(f"{limit:g}" for limit in self.visible)
+
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
     ) -> Array:

@@ -122,7 +122,8 @@ def summarise(
         after = _numbers(metric, np.concatenate(exposed))
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
-    visible = {f"{limit:g}": _share(values > limit) for limit in metric.visible}
+    shares = (share(values > limit) for limit in metric.visible)
+    visible = dict(zip(metric.thresholds, shares, strict=True))
     noise_alone = np.concatenate(noisy) if has_noise else np.zeros(0)
     clean = None
     if not noise_alone.any():
@@ -186,7 +187,8 @@ def _numbers(metric: Metric, values: Array) -> dict[str, float]:
     return {"mean": metric.mean(values), "p50": p50, "p95": p95, "max": float(values.max())}
 
 
-def _share(marked: Array) -> float:
+def share(marked: Array) -> float:
+    """The share of pixels that are marked; 0 of none."""
     return float(marked.mean()) if marked.size else 0.0
 
 

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
+from comparisons.departure.blocks import ratio
 from comparisons.departure.debiasing import contrasts, signed_root
-from reference.rendering.moments import BLOCK
+from reference.rendering.moments import block_numbers
 
 
 class Noiseless:
@@ -30,9 +31,7 @@ class Noiseless:
     def __init__(self, judge, groups):
         self.judge = judge
         self._groups = np.asarray(groups)[:, judge.counted].astype(float)
-        rows, columns = np.nonzero(judge.counted)
-        _, width = judge.counted.shape
-        _, self._blocks = np.unique(rows // BLOCK * width + columns // BLOCK, return_inverse=True)
+        _, self._blocks = np.unique(block_numbers(judge.counted), return_inverse=True)
 
     def errors(self, images):
         """Return the error of each counted pixel, (R + 1, N).
@@ -42,13 +41,9 @@ class Noiseless:
         images = np.asarray(images)[:, self.judge.counted].astype(float)
         found = []
         for chosen, references in self._references:
-            some = images[chosen]
-            weights = contrasts(np.ones(len(some)))
-            noise = np.tensordot(weights, some, 1)
-            shown = (some.mean(axis=0), *(some.mean(axis=0) + each for each in noise))
             plain, *noisy = (
-                self.judge.metric.difference(reference, self._coordinates(image))
-                for reference, image in zip(references, shown, strict=True)
+                self.judge.metric.difference(reference, shown)
+                for reference, shown in zip(references, self._noisier(images[chosen]), strict=True)
             )
             found.append(self._without_noise(plain, np.mean(noisy, axis=0)))
         return np.stack(found)
@@ -61,21 +56,17 @@ class Noiseless:
         """
         count = len(self._groups)
         sets = [np.arange(count), *(np.delete(np.arange(count), out) for out in range(count))]
-        found = []
-        for chosen in sets:
-            mean = self._groups[chosen].mean(axis=0)
-            noise = np.tensordot(contrasts(np.ones(len(chosen))), self._groups[chosen], 1)
-            # The other sign than an image's: the noise of both is independent.
-            images = (mean, *(mean - each for each in noise))
-            found.append((chosen, [self._coordinates(image) for image in images]))
-        return found
+        # The other sign than an image's: the noise of both is independent.
+        return [(chosen, self._noisier(self._groups[chosen], -1)) for chosen in sets]
 
-    def _coordinates(self, pixels):
-        return self.judge.metric.coordinates(pixels, self.judge.viewing)
+    def _noisier(self, images, sign=1):
+        """Return the coordinates of the mean of images (n, N, 3), and of that with more noise."""
+        mean, noise = images.mean(axis=0), np.tensordot(contrasts(np.ones(len(images))), images, 1)
+        shown = (mean, *(mean + sign * each for each in noise))
+        return [self.judge.metric.coordinates(pixels, self.judge.viewing) for pixels in shown]
 
     def _without_noise(self, plain, noisy):
         """Return distances (N,) without noise, from those measured and those with more of it."""
         before, after = (np.bincount(self._blocks, each) for each in (plain, noisy))
         clean = signed_root(2 * before**2 - after**2)
-        share = np.divide(clean, before, out=np.zeros_like(clean), where=before > 0)
-        return plain * share[self._blocks]
+        return plain * ratio(clean, before)[self._blocks]

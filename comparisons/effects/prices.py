@@ -68,9 +68,11 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
     def error(simulated):
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
-            all_of_them = effects and simulated == everything
-            # Not the reference itself: what the edits of the scene leave would not be seen.
-            found = lattice.of(lattice.grafted) if all_of_them else lattice.simulating(simulated)
+            if simulated == everything:
+                # Not the reference itself: what the edits of the scene leave would not be seen.
+                found = lattice.of(lattice.grafted)
+            else:
+                found = lattice.simulating(simulated)
             errors[simulated] = noiseless.errors(found.images)
         return errors[simulated]
 

@@ -129,6 +129,13 @@ class DifferenceSums(Accumulator):
         return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
 
 
+def block_numbers(counted):
+    """Return the number of the block of each counted pixel, (N,), in reading order."""
+    rows, columns = np.nonzero(counted)
+    across = -(-counted.shape[1] // BLOCK)
+    return rows // BLOCK * across + columns // BLOCK
+
+
 def sample(counted):
     """Draw blocks that hold counted pixels; the same ones for the same image.
 
@@ -137,13 +144,11 @@ def sample(counted):
     places, blocks, total
         Pixels in reading order and the block of each, as in :class:`Grouped`.
     """
-    rows, columns = np.nonzero(counted)
-    across = -(-counted.shape[1] // BLOCK)
-    own = rows // BLOCK * across + columns // BLOCK
+    own = block_numbers(counted)
     numbers = np.unique(own)
     # A random draw, not every n-th block: a stride would fall in step with the image.
     chosen = np.random.default_rng(0).permutation(len(numbers))[:BLOCKS]
     chosen = numbers[np.sort(chosen)]
     inside = np.isin(own, chosen)
-    places = rows[inside] * counted.shape[1] + columns[inside]
+    places = np.flatnonzero(counted)[inside]
     return places, np.searchsorted(chosen, own[inside]), len(numbers)
