@@ -12,6 +12,7 @@ import numpy as np
 
 from comparisons.compare import leading_distance, prepare
 from comparisons.departure import marks
+from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
@@ -77,6 +78,14 @@ class Pool:
         for start in range(0, len(self.passes) - passes + 1, passes):
             own = self.passes[start : start + passes].astype(np.float64)
             yield own, (total - own.sum(axis=0)) / (len(self.passes) - passes)
+
+
+def power(pool, passes):
+    """Return the share that a run marks of the pixels that depart by more than 3; 0 of none."""
+    test = pool.heuristic[:passes].mean(axis=0)
+    clearly = pool.counted & (LEADING(test, pool.passes.mean(axis=0, dtype=float)) > 3)
+    marked = found(pool.heuristic[:passes] - pool.passes[:passes], test, pool.counted)
+    return float((marked[clearly] == marks.MARKED).mean()) if clearly.any() else 0.0
 
 
 def render(name, samples, count, size=SIZE, make=None):
@@ -146,6 +155,18 @@ def _glossy():
     ball = {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.6, 0.3, 0.2)}}
     return _on_a_floor(floor, ball, (-3, 3, 5), 0.2, 400.0)
 
+
+RUNS = (
+    ("cornell", 4, 16),
+    ("cornell", 16, 16),
+    ("cornell", 64, 16),
+    ("cornell", 64, 4),
+    ("lights", 16, 16),
+    ("caustic", 16, 16),
+    ("caustic", 64, 4),
+    ("glossy", 16, 16),
+)
+"""Scene, samples per pass, and passes, of which marks are tried."""
 
 CASES = {
     "cornell": SCENES["cornell-box"].make,

@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
-from comparisons.departure.metrics import LEADING
 from reference.rendering.moments import sample
 from tests import noisy
 
@@ -141,15 +140,6 @@ def check(name, samples, passes, runs, size=noisy.SIZE):
     return pool
 
 
-def power(pool, passes):
-    """The share of the pixels that depart by more than 3 that a run of the pool marks."""
-    test = pool.heuristic[:passes].mean(axis=0)
-    clearly = pool.counted & (LEADING(test, pool.passes.mean(axis=0, dtype=float)) > 3)
-    differences = pool.heuristic[:passes] - pool.passes[:passes]
-    marked = noisy.found(differences, test, pool.counted) == MARKED
-    return marked[clearly].mean()
-
-
 @pytest.mark.guarantee(
     "marks",
     "On the Cornell box at 16 passes of 16 samples nine tenths of the pixels beyond a ΔE2000 "
@@ -157,7 +147,7 @@ def power(pool, passes):
 )
 def test_the_cornell_box_has_few_false_marks_and_most_true_ones(rgb):
     pool = check("cornell", 16, 16, 20, 24)
-    assert power(pool, 16) > 0.9
+    assert noisy.power(pool, 16) > 0.9
 
 
 @pytest.mark.guarantee(
@@ -168,18 +158,9 @@ def test_the_cornell_box_has_few_false_marks_and_most_true_ones(rgb):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "samples", "passes"),
-    [
-        ("cornell", 4, 16),
-        ("cornell", 16, 16),
-        ("cornell", 64, 16),
-        ("cornell", 64, 4),
-        ("lights", 16, 16),
-        ("caustic", 16, 16),
-        ("caustic", 64, 4),
-        ("glossy", 16, 16),
-    ],
+    noisy.RUNS,
 )
 def test_false_marks_are_as_rare_as_stated(rgb, name, samples, passes):
     pool = check(name, samples, passes, 200)
     if name == "cornell" and samples * passes >= 256:
-        assert power(pool, passes) > 0.9
+        assert noisy.power(pool, passes) > 0.9

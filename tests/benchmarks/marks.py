@@ -17,19 +17,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
-from comparisons.departure.metrics import LEADING
 from tests import noisy
-
-RUNS = (
-    ("cornell", 4, 16),
-    ("cornell", 16, 16),
-    ("cornell", 64, 16),
-    ("cornell", 64, 4),
-    ("lights", 16, 16),
-    ("caustic", 16, 16),
-    ("caustic", 64, 4),
-    ("glossy", 16, 16),
-)
 
 
 def run(rounds):
@@ -37,7 +25,7 @@ def run(rounds):
     backend.check()
     mi.set_variant("llvm_ad_rgb")
     heuristic.register()
-    rows = [_row(*case, rounds) for case in RUNS]
+    rows = [_row(*case, rounds) for case in noisy.RUNS]
     table = Table(*rows[0], title="Marks of significance")
     for row in rows:
         table.add_row(*(f"{v:.3g}" if isinstance(v, float) else str(v) for v in row.values()))
@@ -52,9 +40,6 @@ def _row(name, samples, passes, rounds):
         marks = noisy.found(truth - own, truth, pool.counted)[pool.counted]
         wrong += int((marks == MARKED).any())
         undetermined.append((marks == UNDETERMINED).mean())
-    test = pool.heuristic[:passes].mean(axis=0)
-    clearly = pool.counted & (LEADING(test, pool.passes.mean(axis=0, dtype=float)) > 3)
-    marks = noisy.found(pool.heuristic[:passes] - pool.passes[:passes], test, pool.counted)
     return {
         "scene": name,
         "passes": f"{passes} x {samples}",
@@ -62,5 +47,5 @@ def _row(name, samples, passes, rounds):
         "wrong": wrong,
         "chance at 5 %": float(stats.binomtest(wrong, rounds, LEVEL, "greater").pvalue),
         "undetermined": float(np.mean(undetermined)),
-        "found": float((marks[clearly] == MARKED).mean()) if clearly.any() else 0.0,
+        "found": noisy.power(pool, passes),
     }
