@@ -12,7 +12,7 @@ from pathlib import Path
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
-from matplotlib.figure import Figure
+from PIL import Image
 
 from comparisons import atomic
 from comparisons.case import Request, open_case
@@ -21,7 +21,7 @@ from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Measured
 from comparisons.departure.metrics import LEADING
 from comparisons.verification import Factor, verify
-from reports.charts import figures, vega
+from reports.charts import vega
 from reports.charts.error_over_time import error_over_time
 from reports.files import images
 from reports.terminal.tables import markdown
@@ -30,6 +30,8 @@ from tests.benchmarks import kernel, lights
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 COST_SCENE, PICTURED = "cornell-box", "plastic-spheres"
+GAP = 8
+"""White pixels between the panels of the picture."""
 ROUNDS = 30
 VERIFIED = ("fig-8-9", "fig-6-10", "cornell-box", "plastic-spheres", "narrow-band-lamp")
 CHAPTER_8 = (
@@ -147,18 +149,12 @@ def picture() -> None:
     """Draw both halves of a scene and ΔE2000, for the head of the README."""
     case = open_case(PICTURED, Request(resolution=(512, 300), spp=1024))
     found = compare(case.source, case.options).images
-    shown = (images.tonemap(found.heuristic), images.tonemap(found.reference))
-    columns, inch = 3, found.counted.shape[1] / 100
-    height = found.counted.shape[0] / 100
-    figure = Figure(figsize=(columns * inch, height))
-    axes = figure.subplots(1, columns)
-    figure.subplots_adjust(0, 0, 1, 1, wspace=0.02)
-    for place, image in zip(axes, shown, strict=False):
-        place.imshow(image, interpolation="none")
-    axes[-1].imshow(found.maps[LEADING.name], cmap="magma", vmin=0, vmax=20, interpolation="none")
-    for place in axes:
-        place.axis("off")
-    atomic.write(DOCS / "plastic-spheres.png", figures.drawn(figure, "png", 100))
+    error = images.error_map(found.maps[LEADING.name], LEADING.map_range[1])
+    panels = (images.tonemap(found.heuristic), images.tonemap(found.reference), error)
+    panels = [np.array(panel.convert("RGB")) for panel in panels]
+    gap = np.full((len(panels[0]), GAP, 3), 255, np.uint8)
+    joined = np.hstack([panels[0], gap, panels[1], gap, panels[2]])
+    atomic.write(DOCS / "plastic-spheres.png", images.png(Image.fromarray(joined)))
 
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:
