@@ -26,7 +26,7 @@ class Effort:
         Timed repeats of each rung, at least 2. From 6 on the median has a 95 % interval.
     largest
         Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
-        those the sampler is fastest.
+        those the sampler stratifies best.
     depths
         Depths of ``path`` that are rungs.
     reference_spp

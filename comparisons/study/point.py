@@ -72,7 +72,7 @@ def blocks(part):
 
 
 def check(part):
-    """See that a part's scene is there, and that paths into it lead to numbers.
+    """Ensure that a part's scene is there, and that paths into it lead to numbers.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def rows(table, part, where=None):
 
 
 def require(table, column):
-    """See that there is a column.
+    """Ensure that there is a column.
 
     Raises
     ------

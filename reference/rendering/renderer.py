@@ -143,7 +143,7 @@ class Renderer:
     integrator
         A Mitsuba integrator; None takes the scene's own.
     spp
-        Samples a pixel and pass. ``multijitter`` rounds it up to what it can lay out.
+        Samples per pixel and pass.
     label
         Name in error messages.
     """

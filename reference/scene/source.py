@@ -177,7 +177,7 @@ def _text(path: Path) -> str:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}. See that it can be read.") from error
+        raise InputError(f"{path}: {error.strerror}. Ensure that it can be read.") from error
     if b"\0" in content:
         raise InputError(f"{path}: it holds a NUL byte, which no XML file in UTF-8 has.")
     return COMMENT.sub("", content.decode("utf-8", errors="replace"))
