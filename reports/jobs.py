@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from comparisons.pool import Pool
 from heuristic.backend import VARIANTS
+from heuristic.errors import InputError, suggestion
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
@@ -41,9 +46,50 @@ def complete_scene(context, parameter, beginning):
     return found or [CompletionItem(beginning, type="file")]
 
 
-scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
+
+
+def require_known(context, parameter, given):
+    """Ensure, before anything is loaded, that there are such files, folders and built-in scenes.
+
+    Raises
+    ------
+    InputError
+        Naming what was probably meant.
+    """
+    from comparisons.gallery.builtin import builtin
+
+    for name in [given] if isinstance(given, str) else given:
+        path = Path(name)
+        if path.exists():
+            continue
+        if path.suffix in (".xml", ".py") or path.parent.name:
+            siblings = {str(path.with_name(one)) for one in _names_in(path.parent)}
+            raise InputError(
+                f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
+                " (.xml), a Python file that makes one (.py), a folder of such, or the name of a"
+                " built-in scene; `fotismos scenes` lists them."
+            )
+        builtin(name)
+    return given
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
+
+
+scene_argument = click.argument(
+    "scene", metavar="SCENE", shell_complete=complete_scene, callback=require_known
+)
 scenes_argument = click.argument(
-    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
+    "scenes",
+    nargs=-1,
+    required=True,
+    metavar="SCENE...",
+    shell_complete=complete_scene,
+    callback=require_known,
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
@@ -120,8 +166,31 @@ def _with(command, *options):
     return command
 
 
-def make_ready():
-    """Ensure that LLVM is usable, and keep standard output for results.
+timeout_option = click.option(
+    "--timeout",
+    default=1800.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="End a scene that makes no progress for so long.",
+)
+
+PROCESSES = 1
+"""Processes of a command that read and render scenes; with 0 it does so itself, as tests do."""
+
+
+def pool(timeout: float, processes: int | None = None) -> Pool:
+    """Return where scenes are read and rendered: apart from the process that the user sees.
+
+    A scene may run code of its own, and native code may crash or hang. ``timeout`` is the time in
+    seconds that a task may take without any progress.
+    """
+    count = PROCESSES if processes is None or not PROCESSES else processes
+    return Pool(count, partial(prepare, verbosity.level()), timeout)
+
+
+def prepare(level: int) -> None:
+    """Get a process ready to render: what Mitsuba says is heard where ``level`` is 1, verbose.
 
     Raises
     ------
@@ -131,7 +200,20 @@ def make_ready():
     from heuristic import backend
 
     backend.check()
-    verbosity.divert_mitsuba()
+    from reference.scene import messages
+
+    messages.divert(_print if level > 0 else _pass_over)
+    if level > 0:
+        logging.basicConfig(level=logging.INFO)
+    import comparisons.compare  # noqa: F401  part of start-up
+
+
+def _print(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def _pass_over(text: str) -> None:
+    """Records state what concerns them."""
 
 
 def expand(names: Iterable[str]) -> list[str]:

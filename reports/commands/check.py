@@ -66,7 +66,7 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
     _require_consistent(update, scenes, images, given)
-    jobs.make_ready()
+    jobs.prepare(verbosity.level())
     from comparisons.records import to_json
     from reports.ci import annotations, check_record, lines, suite
     from reports.ci.junit import document

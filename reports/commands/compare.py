@@ -12,6 +12,7 @@ from reports.terminal import verbosity
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option
+@jobs.timeout_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
@@ -26,7 +27,7 @@ from reports.terminal import verbosity
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, figures, fresh, with_cost, **rendering):
+def compare(scenes, output, figures, fresh, with_cost, timeout, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
@@ -47,6 +48,5 @@ def compare(scenes, output, figures, fresh, with_cost, **rendering):
       fotismos compare plastic-spheres --cost
       fotismos compare my_scenes/
     """  # noqa: D301 click reads the \b as: keep these lines
-    run = batch.start()
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh)
-    batch.finish(run, scenes, output, wanted)
+    batch.run(scenes, output, wanted, timeout)

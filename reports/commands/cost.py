@@ -2,7 +2,9 @@
 
 import click
 
+from comparisons.pool import Task
 from reports import jobs
+from reports.run import tasks
 from reports.terminal import verbosity
 
 
@@ -10,12 +12,14 @@ from reports.terminal import verbosity
 @jobs.scene_argument
 @jobs.output_option("out")
 @jobs.figures_option
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
+@verbosity.verbose_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @jobs.json_option
-def cost(scene, output, figures, rounds, as_json, **rendering):
+def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
@@ -28,31 +32,26 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.make_ready()
-    from comparisons.case import open_case
-    from comparisons.cost.cost import Effort, cost
-    from comparisons.records import to_json
-    from reports.charts.figures import write_cost
-    from reports.files import ownership
-    from reports.run import cost_files
-    from reports.run.output import FIGURES, TABLES, folder_name, prepare
-    from reports.terminal import cost_tables, progress, tables
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons.case import name_of
+        from comparisons.records import to_json
+        from reports.files import ownership
+        from reports.run.output import FIGURES, TABLES, folder_name, prepare
+        from reports.terminal import cost_tables, progress, tables
 
-    folder = prepare(output)
-    case = open_case(scene, jobs.request(rendering))
-    place = folder / folder_name(case.name, ())
-    for used in (place, folder / TABLES, *([folder / FIGURES] if figures else ())):
-        ownership.require_free_folder(used)
-    effort = Effort() if rounds is None else Effort(rounds=rounds)
-    words = case.command("cost", rounds=rounds)
-    with progress.shown() as bar:
-        study = cost(case.source, case.options, effort, bar.of(case.name), words)
-    cost_files.write(place, study)
-    tables.write_cost(folder / TABLES, place.name, study.record)
-    if figures:
-        write_cost(folder / FIGURES, place.name, study.record)
+        folder = prepare(output)
+        name = name_of(scene)
+        place = folder / folder_name(name, ())
+        for_print = folder / FIGURES if figures else None
+        for used in (place, folder / TABLES, *filter(None, [for_print])):
+            ownership.require_free_folder(used)
+        with progress.shown() as bar:
+            words = (scene, jobs.request(rendering), rounds, place, for_print)
+            record = pool.do(Task(name, tasks.priced, words, bar.of(name)))
+    tables.write_cost(folder / TABLES, place.name, record)
     if as_json:
-        click.echo(to_json(study.record), nl=False)
+        click.echo(to_json(record), nl=False)
         return
-    verbosity.tell(cost_tables.lines(study.record))
+    verbosity.tell(cost_tables.lines(record))
     verbosity.tell_where(place / "cost.svg")

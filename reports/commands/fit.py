@@ -5,7 +5,9 @@ from pathlib import Path
 
 import click
 
+from comparisons.pool import Task
 from reports import jobs
+from reports.run import tasks
 from reports.terminal import verbosity
 
 
@@ -40,10 +42,12 @@ from reports.terminal import verbosity
     metavar="FILE",
     help="Write the departures of all scenes as a table in Markdown, too.",
 )
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
-def fit(scenes, output, form, as_json, markdown, **words):
+@verbosity.verbose_option
+def fit(scenes, output, form, as_json, markdown, timeout, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
     What the best parameters remove of the loss is the parameter error, what they leave the model
@@ -55,33 +59,38 @@ def fit(scenes, output, form, as_json, markdown, **words):
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong --intensities
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.make_ready()
-    from comparisons import atomic
-    from comparisons.case import open_case
-    from comparisons.fit.fit import FitOptions, fit
-    from comparisons.records import plain
-    from heuristic.materials import FORMS
-    from reference.scene.graph import set_variant
-    from reports.files import ownership
-    from reports.run import fit_files
-    from reports.run.output import folder_name, prepare
-    from reports.terminal import progress
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons import atomic
+        from comparisons.case import name_of
+        from comparisons.fit.fit import FitOptions
+        from comparisons.records import plain
+        from heuristic.materials import FORMS
+        from reports.files import ownership
+        from reports.run import fit_files
+        from reports.run.output import folder_name, prepare
+        from reports.terminal import progress
 
-    fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
-    chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
-    folder = prepare(output)
-    wanted = [open_case(name, jobs.request(words)) for name in scenes]
-    records, places = [], []
-    for case in wanted:
-        places.append(folder_name(case.name, places))
-        ownership.require_free_folder(folder / places[-1])
-    with progress.shown() as bar:
-        for case in wanted:
-            set_variant(case.variant)
-            command = case.command("fit", **fitting_words, form=form)
-            result = fit(case.source, case.options, chosen, bar.of(case.name), command)
-            fit_files.write(folder / places.pop(0), result)
-            records.append(result.record)
+        fitting = {key: words.pop(key) for key in ("loss", "intensities")}
+        chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting)
+        request, told = jobs.request(words), fitting | {"form": form}
+        folder = prepare(output)
+        places = {}
+        for scene in scenes:
+            places[folder_name(name_of(scene), places)] = scene
+        for place in places:
+            ownership.require_free_folder(folder / place)
+        with progress.shown() as bar:
+            wanted = [
+                Task(
+                    scene,
+                    tasks.fitted,
+                    (scene, request, chosen, told, folder / place),
+                    bar.of(place),
+                )
+                for place, scene in places.items()
+            ]
+            records = [outcome.result() for _, outcome in pool.each(wanted)]
     if markdown:
         atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:

@@ -58,7 +58,7 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     given = [name for name in (processes, workers, scheduler) if name is not None]
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
-    jobs.make_ready()
+    jobs.prepare(verbosity.level())
     from comparisons.pool import cores
     from comparisons.study import cluster, design, running
     from reports.run import study_files

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 from msgspec import structs
 
-from reports import jobs
-from reports.run.stages import Stages
 
 if TYPE_CHECKING:
     from comparisons.case import Request
     from reports.page.scene_view import SceneView
+    from reports.run.stages import Stages
 
 
 @dataclass(frozen=True)
@@ -28,18 +27,6 @@ class Wanted:
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
-
-
-def load():
-    """Load what renders.
-
-    Raises
-    ------
-    InstallationError
-        When LLVM cannot be used.
-    """
-    jobs.make_ready()
-    import comparisons.compare  # noqa: F401  part of start-up
 
 
 def compare(
@@ -61,6 +48,7 @@ def compare(
     from comparisons.case import open_case
     from comparisons.compare import compare
     from reports.run import finished, kept, output
+    from reports.run.stages import Stages
 
     spent = Stages()
     case = open_case(name, wanted.request)
