@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import mitsuba as mi
+from msgspec import structs
 
 from comparisons import record, render
 from comparisons.comparison import (
@@ -25,6 +26,7 @@ from reference.planning.plan import Plan, plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.guard import Guard, Verdict, examine_plan
 from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.scene import messages
 from reference.scene.sampler import with_sampler
 
 LARGEST = 2**26
@@ -122,6 +124,15 @@ def compare(source, options=None, progress=None, command="", kept=None):
         When a rendering holds a NaN or an infinity.
     """
     options = options or Options()
+    said: list[str] = []
+    with messages.collected(said):
+        comparison = _compare(source, options, progress, command, kept)
+    told = messages.counted([*source.said, *said])
+    made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *told))
+    return replace(comparison, record=made)
+
+
+def _compare(source, options, progress, command, kept):
     stages = _Stages()
     ready = guarded(source, options)
     heuristic, reference = ready.heuristic, ready.reference

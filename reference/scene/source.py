@@ -10,6 +10,7 @@ from typing import Any
 import mitsuba as mi
 
 from heuristic.errors import InputError
+from reference.scene import messages
 from reference.scene.graph import Graph, files_from
 
 Parser = mi.parser
@@ -59,11 +60,17 @@ class Source:
         """
         variant = mi.variant()
         if variant not in self._read:
-            self._read[variant] = self._parsed(variant)
+            with messages.collected(self.said):
+                self._read[variant] = self._parsed(variant)
         graph = self._read[variant].copy()
         for edit in self.edits:
             edit(graph)
         return graph
+
+    @property
+    def said(self) -> list[str]:
+        """What Mitsuba said when it read the scene."""
+        return self._read.setdefault("said", [])
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
