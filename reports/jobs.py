@@ -46,9 +46,7 @@ def complete_scene(context, parameter, beginning):
     return found or [CompletionItem(beginning, type="file")]
 
 
-
-
-def require_known(context, parameter, given):
+def require_known(names: Iterable[str]) -> None:
     """Ensure, before anything is loaded, that there are such files, folders and built-in scenes.
 
     Raises
@@ -58,7 +56,7 @@ def require_known(context, parameter, given):
     """
     from comparisons.gallery.builtin import builtin
 
-    for name in [given] if isinstance(given, str) else given:
+    for name in names:
         path = Path(name)
         if path.exists():
             continue
@@ -70,7 +68,6 @@ def require_known(context, parameter, given):
                 " built-in scene; `fotismos scenes` lists them."
             )
         builtin(name)
-    return given
 
 
 def _names_in(folder: Path) -> list[str]:
@@ -80,16 +77,9 @@ def _names_in(folder: Path) -> list[str]:
         return []
 
 
-scene_argument = click.argument(
-    "scene", metavar="SCENE", shell_complete=complete_scene, callback=require_known
-)
+scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
 scenes_argument = click.argument(
-    "scenes",
-    nargs=-1,
-    required=True,
-    metavar="SCENE...",
-    shell_complete=complete_scene,
-    callback=require_known,
+    "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 

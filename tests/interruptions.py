@@ -251,7 +251,9 @@ def main(name: str, count: str, seed: str = "0") -> None:
     found = trials(name, int(count), int(seed))
     codes = Counter(trial.code for trial in found)
     faulty = [trial for trial in found if trial.faults]
-    print(f"{name}: {len(found)} interruptions, exit codes {dict(codes)}, {len(faulty)} with faults")
+    print(
+        f"{name}: {len(found)} interruptions, exit codes {dict(codes)}, {len(faulty)} with faults"
+    )
     for trial in faulty:
         print(f"  {signal.Signals(trial.number).name} after {trial.moment:.2f} s: {trial.faults}")
 

@@ -48,5 +48,6 @@ def compare(scenes, output, figures, fresh, with_cost, timeout, **rendering):
       fotismos compare plastic-spheres --cost
       fotismos compare my_scenes/
     """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.require_known(scenes)
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh)
     batch.run(scenes, output, wanted, timeout)

@@ -32,6 +32,7 @@ def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons.case import name_of

@@ -59,6 +59,7 @@ def fit(scenes, output, form, as_json, markdown, timeout, **words):
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong --intensities
     """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.require_known(scenes)
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons import atomic

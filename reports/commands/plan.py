@@ -24,6 +24,7 @@ def plan(scene, as_json, verify, timeout, **rendering):
       fotismos plan cornell-box
       fotismos plan --verify fig-8-9 --resolution 128x128
     """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons.records import to_json

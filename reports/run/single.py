@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from msgspec import structs
 
-
 if TYPE_CHECKING:
     from comparisons.case import Request
     from reports.page.scene_view import SceneView
