@@ -51,8 +51,8 @@ if __name__ == "__main__":
 """
 """The command line with two built-in scenes."""
 
-TIMES = {"command", "created", "machine", "stages", "time"}
-"""Keys under which records have times, and what says where a command wrote."""
+TIMES = {"command", "equal_error", "equal_time", "machine", "pareto", "stages", "time"}
+"""Keys under which records have times and what follows from them, and where a command wrote."""
 
 MESSAGES = ("Traceback", "Fatal", "Segmentation", "core dumped", "terminate called")
 
@@ -251,9 +251,7 @@ def main(name: str, count: str, seed: str = "0") -> None:
     found = trials(name, int(count), int(seed))
     codes = Counter(trial.code for trial in found)
     faulty = [trial for trial in found if trial.faults]
-    print(
-        f"{name}: {len(found)} interruptions, exit codes {dict(codes)}, {len(faulty)} with faults"
-    )
+    print(f"{name}: {len(found)} interruptions, exit codes {dict(codes)}, faults {len(faulty)}")
     for trial in faulty:
         print(f"  {signal.Signals(trial.number).name} after {trial.moment:.2f} s: {trial.faults}")
 
