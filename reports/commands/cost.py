@@ -19,9 +19,10 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
-    prices each effect in which textbook shading differs. Writes OUTPUT/SCENE/cost.json, cost.svg
-    and pictures, and OUTPUT/tables. Without --resolution the film is reduced to 128 pixels of
-    width; --spp gives the samples a pixel of the largest count, 64 where it is not given.
+    prices each effect in which textbook shading differs. Writes cost.json, cost.svg and
+    pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without --resolution the film is reduced
+    to 128 pixels of width; --spp gives the samples a pixel of the largest count, 64 where it is not
+    given.
 
     \b
     Examples:
@@ -33,26 +34,26 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
     from comparisons.cost.cost import Effort, cost
     from comparisons.records import to_json
     from reports.charts.figures import write_cost
-    from reports.files import ownership
     from reports.run import cost_files
-    from reports.run.output import FIGURES, TABLES, folder_name, prepare
+    from reports.run.output import below, held, require_free_folders
+    from reports.run.places import FIGURES, TABLES, places
     from reports.terminal import cost_tables, progress, tables
 
-    folder = prepare(output)
     case = open_case(scene, jobs.request(rendering))
-    place = folder / folder_name(case.name, ())
-    for used in (place, folder / TABLES, *([folder / FIGURES] if figures else ())):
-        ownership.require_free_folder(used)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     words = case.command("cost", rounds=rounds)
-    with progress.shown() as bar:
-        study = cost(case.source, case.options, effort, bar.of(case.name), words)
-    cost_files.write(place, study)
-    tables.write_cost(folder / TABLES, place.name, study.record)
-    if figures:
-        write_cost(folder / FIGURES, place.name, study.record)
+    with held(output, words) as held_folder:
+        folder = below(held_folder, "cost")
+        (place,) = places(folder, [scene])
+        require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
+        with progress.shown() as bar:
+            study = cost(case.source, case.options, effort, bar.of(case.name), words)
+        cost_files.write(folder / place, study)
+        tables.write_cost(folder / TABLES, place, study.record)
+        if figures:
+            write_cost(folder / FIGURES, place, study.record)
     if as_json:
         click.echo(to_json(study.record), nl=False)
         return
     verbosity.tell(cost_tables.lines(study.record))
-    verbosity.tell_where(place / "cost.svg")
+    verbosity.tell_where(folder / place / "cost.svg")

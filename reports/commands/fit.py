@@ -1,6 +1,7 @@
 """``fotismos fit``: the best heuristic parameters, and what they leave."""
 
 import json
+import shlex
 from pathlib import Path
 
 import click
@@ -11,7 +12,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @jobs.scenes_argument
-@jobs.output_option("out/fit")
+@jobs.output_option("out")
 @click.option(
     "--loss",
     default="perceptual",
@@ -47,8 +48,9 @@ def fit(scenes, output, form, as_json, markdown, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
     What the best parameters remove of the loss is the parameter error, what they leave the model
-    error: no parameters remove it. Writes OUTPUT/SCENE/fit.json and fit.png (before, reference,
-    after, residual). Unless told otherwise it renders 96x96 pixels with 64 samples each.
+    error: no parameters remove it. Writes fit.json and fit.png (before, reference, after,
+    residual) to OUTPUT/fit/SCENE. Unless told otherwise it renders 96x96 pixels with 64 samples
+    each.
 
     \b
     Examples:
@@ -62,26 +64,26 @@ def fit(scenes, output, form, as_json, markdown, **words):
     from comparisons.records import plain
     from heuristic.materials import FORMS
     from reference.scene.graph import set_variant
-    from reports.files import ownership
     from reports.run import fit_files
-    from reports.run.output import folder_name, prepare
+    from reports.run.output import below, held, require_free_folders
+    from reports.run.places import places
     from reports.terminal import progress
 
     fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
     chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
-    folder = prepare(output)
     wanted = [open_case(name, jobs.request(words)) for name in scenes]
-    records, places = [], []
-    for case in wanted:
-        places.append(folder_name(case.name, places))
-        ownership.require_free_folder(folder / places[-1])
-    with progress.shown() as bar:
-        for case in wanted:
-            set_variant(case.variant)
-            command = case.command("fit", **fitting_words, form=form)
-            result = fit(case.source, case.options, chosen, bar.of(case.name), command)
-            fit_files.write(folder / places.pop(0), result)
-            records.append(result.record)
+    records = []
+    with held(output, shlex.join(["fotismos", "fit", *scenes])) as held_folder:
+        folder = below(held_folder, "fit")
+        found = places(folder, scenes)
+        require_free_folders(folder, *found)
+        with progress.shown() as bar:
+            for place, case in zip(found, wanted, strict=True):
+                set_variant(case.variant)
+                command = case.command("fit", **fitting_words, form=form)
+                result = fit(case.source, case.options, chosen, bar.of(case.name), command)
+                fit_files.write(folder / place, result)
+                records.append(result.record)
     if markdown:
         atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:
