@@ -1,6 +1,5 @@
 """What the user gave: the one door through which every command, test and notebook opens a scene."""
 
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
@@ -9,6 +8,7 @@ from typing import Any
 
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
+from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
@@ -133,7 +133,7 @@ class Case:
 
     def command(self, verb: str = "compare", **more: Any) -> str:
         """Return the command that repeats what is done with the scene."""
-        words = ["fotismos", verb, self.word]
+        words = [verb, self.word]
         for name, value in self.request.define.items():
             words += ["-D", f"{name}={value}"]
         stated = {key: value for key, value in asdict(self.request).items() if key != "define"}
@@ -144,7 +144,7 @@ class Case:
             elif value not in (None, False):
                 text = "x".join(map(str, value)) if key == "resolution" else str(value)
                 words += [option, text]
-        return shlex.join(words)
+        return program.command(*words)
 
 
 def open_case(scene: Scene, request: Request | None = None, name: str | None = None) -> Case:
@@ -207,7 +207,7 @@ def file_of(scene: str | Path) -> Path | None:
         raise InputError(
             f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
             " that makes one (.py), a folder of such, or the name of a built-in scene;"
-            " `fotismos scenes` lists them."
+            f" `{program.command('scenes')}` lists them."
         )
     return path
 

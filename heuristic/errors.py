@@ -4,6 +4,7 @@
 
     FotismosError
     ├── InputError         a scene, value or option that cannot be used     exit code 2
+    ├── OutputError        a place that cannot be written to                exit code 2
     ├── InstallationError  something that must be on the machine is not     exit code 2
     ├── NonFiniteError     a NaN or an infinity in an image                 exit code 1
     └── LostProcessError   a process that work was given to is gone         exit code 1
@@ -24,6 +25,12 @@ class FotismosError(Exception):
 
 class InputError(FotismosError):
     """A scene, a value or an option that cannot be used as it was given."""
+
+    exit_code = 2
+
+
+class OutputError(FotismosError):
+    """A place that results cannot be written to: a full disk, missing rights, a name in use."""
 
     exit_code = 2
 

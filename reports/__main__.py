@@ -1,13 +1,18 @@
 """``python -m reports`` is ``fotismos``."""
 
+import os
 import sys
+from pathlib import Path
 
 from comparisons import interruption
+from heuristic.program import VARIABLE
 
 
 def main() -> None:
     """Run the command line, which signals may end at any moment."""
     interruption.listen()
+    if Path(sys.argv[0]).name == "__main__.py":
+        os.environ.setdefault(VARIABLE, "python -m reports")
     try:
         from reports import cli  # within reach of the signals
 

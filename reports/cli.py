@@ -5,6 +5,7 @@ SIGTERM and SIGHUP. A mistake of the user's gets one message on standard error, 
 """
 
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Iterator, Mapping
@@ -16,6 +17,7 @@ import click
 import reports.commands
 from comparisons import interruption
 from heuristic.errors import FotismosError, suggestion
+from heuristic.program import program
 from heuristic.version import __version__
 
 
@@ -73,7 +75,7 @@ def cli():
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        code = cli(prog_name="fotismos", standalone_mode=False)
+        code = cli(prog_name=shlex.join(program()), standalone_mode=False)
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
         click.echo(
             "fotismos: interrupted; finished scenes are kept, and the same command goes on.",

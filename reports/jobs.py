@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
@@ -13,6 +14,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from comparisons.pool import Pool
+from heuristic import program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, suggestion
 from reports.terminal import verbosity
@@ -65,7 +67,7 @@ def require_known(names: Iterable[str]) -> None:
             raise InputError(
                 f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
                 " (.xml), a Python file that makes one (.py), a folder of such, or the name of a"
-                " built-in scene; `fotismos scenes` lists them."
+                f" built-in scene; `{program.command('scenes')}` lists them."
             )
         builtin(name)
 
@@ -204,6 +206,11 @@ def _print(text: str) -> None:
 
 def _pass_over(text: str) -> None:
     """Records state what concerns them."""
+
+
+def command_line() -> str:
+    """Return the command that the user gave, as a shell takes it."""
+    return program.command(*sys.argv[1:])
 
 
 def expand(names: Iterable[str]) -> list[str]:

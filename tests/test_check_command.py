@@ -78,7 +78,7 @@ def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):
     kinds = ("", "-change", "-p", "-error")
     pictures = {f"{half}{kind}.png" for half in ("heuristic", "reference") for kind in kinds}
     assert names == {".fotismos", "check.json", *pictures}
-    assert {path.name for path in out.iterdir()} == {".fotismos", "fig-8-6b"}
+    assert {path.name for path in out.iterdir()} == {".fotismos", ".fotismos-lock", "fig-8-6b"}
     # The block that moved is the one that stands out of its map.
     shown = np.asarray(Image.open(out / "fig-8-6b/reference-p.png").convert("RGB"), float)
     height, width = shown.shape[:2]

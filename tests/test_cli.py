@@ -110,7 +110,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_rendering(run, tmp_pa
     (tmp_path / "file").write_text("")
     code, _, messages = run("compare", "fig-8-9", "-o", tmp_path / "file" / "out")
     assert code == 2
-    assert "output folder" in messages
+    assert f"{tmp_path / 'file' / 'out'}: Not a directory" in messages
 
 
 def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypatch):
@@ -126,7 +126,7 @@ def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypat
         run("compare", scene_file, "-o", out, "--spp", 4, "--seed", 1)
     assert (out / "my-scene/comparison.json").read_bytes() == before
     names = sorted(path.name for path in out.iterdir())
-    assert names == [".fotismos", "index.html", "my-scene", "run.json", "tables"]
+    assert names == [".fotismos", ".fotismos-lock", "index.html", "my-scene", "run.json", "tables"]
 
 
 def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):

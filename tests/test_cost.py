@@ -360,7 +360,7 @@ def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["fotismos", *words])
     cli.main()
     printed = capsys.readouterr().out
-    place = tmp_path / "fig-8-9"
+    place = tmp_path / "cost/fig-8-9"
     record = json.loads((place / "cost.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(record)
     assert "Price of an effect" in printed
@@ -369,7 +369,7 @@ def test_the_command_writes_and_prints(rgb, tmp_path, monkeypatch, capsys):
     assert {"cost.svg", "cost-reference.png", "cost-rung-phong-kernel.png"} <= {
         path.name for path in place.iterdir()
     }
-    assert not list(place.glob("*.partial"))
+    assert not list(tmp_path.rglob("*-partial"))
 
 
 CORPUS = Path(__file__).parent / "corpus"

@@ -227,6 +227,6 @@ def test_all_three_are_in_json_tables_page_and_chart(all_three, run, scene_file,
         assert "Phong kernel: Flat &lt;tone&gt;" in text
     assert "Blurred &lt;difference&gt;" in page
     assert run("cost", scene_file, "-o", out, "--rounds", 2, *words[:2], *words[4:])[0] == 0
-    table = (out / "tables/my-scene-cost.csv").read_text(encoding="utf-8")
+    table = (out / "cost/tables/my-scene-cost.csv").read_text(encoding="utf-8")
     assert "no <shadows>" in table
     assert "Phong kernel: Flat <tone>" in table

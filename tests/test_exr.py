@@ -5,7 +5,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from heuristic.errors import InputError
+from heuristic.errors import InputError, OutputError
 from reports.files import exr
 
 CONTRACT = {
@@ -125,5 +125,5 @@ def test_an_earlier_file_survives_a_failure(tmp_path, layers):
     with pytest.raises(InputError):
         exr.write(path, {"a": np.zeros((2, 2, 4))}, {})
     assert path.read_bytes() == before
-    with pytest.raises(OSError, match="absent"):
+    with pytest.raises(OutputError, match="absent"):
         exr.write(tmp_path / "absent" / "out.exr", layers, {})

@@ -22,7 +22,7 @@ def test_fit_writes_a_record_that_its_schema_accepts_and_a_picture(run, tmp_path
     code, printed, messages = run("fit", *words)
     assert (code, messages) == (0, "")
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
-    data = json.loads((tmp_path / "fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    data = json.loads((tmp_path / "fit/fig-8-6a/fit.json").read_text(encoding="utf-8"))
     jsonschema.validate(data, SCHEMA)
     assert [(fit["form"], fit["normalised"]) for fit in data["fits"]] == [
         (form, normalised) for form in ("phong", "blinn") for normalised in (False, True)
@@ -33,17 +33,17 @@ def test_fit_writes_a_record_that_its_schema_accepts_and_a_picture(run, tmp_path
     for word in ("paired", "blinn (normalised)", "noise floor", "parameter error", "model error"):
         assert word in printed
     assert "light 1" in printed
-    picture = np.array(Image.open(BytesIO((tmp_path / "fig-8-6a/fit.png").read_bytes())))
+    picture = np.array(Image.open(BytesIO((tmp_path / "fit/fig-8-6a/fit.png").read_bytes())))
     tiles = np.split(picture[-200:-20, 8:], 4, axis=1)
     assert len(np.unique([tile.mean() for tile in tiles])) == 4
 
 
 def test_the_recorded_command_repeats_the_fit(run, tmp_path):
     run("fit", "fig-8-6a", "-o", tmp_path / "a", "--form", "blinn", "--loss", "linear", *SMALL)
-    first = json.loads((tmp_path / "a/fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    first = json.loads((tmp_path / "a/fit/fig-8-6a/fit.json").read_text(encoding="utf-8"))
     code, _, _ = run(*shlex.split(first["command"])[1:], "-o", tmp_path / "b")
     assert code == 0
-    second = json.loads((tmp_path / "b/fig-8-6a/fit.json").read_text(encoding="utf-8"))
+    second = json.loads((tmp_path / "b/fit/fig-8-6a/fit.json").read_text(encoding="utf-8"))
     assert first["fits"] == second["fits"]
 
 
@@ -104,6 +104,6 @@ def test_materials_of_an_instanced_group_have_names(run, tmp_path):
     scene = tmp_path / "group.xml"
     scene.write_text(text.replace(mask, '<bsdf type="diffuse"/>'), encoding="utf-8")
     assert run("fit", scene, "-o", tmp_path, "--form", "phong", *SMALL)[0] == 0
-    record = json.loads((tmp_path / "group/fit.json").read_text(encoding="utf-8"))
+    record = json.loads((tmp_path / "fit/group/fit.json").read_text(encoding="utf-8"))
     names = [material["name"] for material in record["fits"][0]["materials"]]
     assert "material 3" in names

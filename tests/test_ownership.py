@@ -11,7 +11,7 @@ import pytest
 from comparisons import atomic
 from heuristic.errors import InputError
 from reports.ci.checks import FILES
-from reports.files import ownership
+from reports.files import listing, ownership
 from reports.run import output
 
 SMALL = ("--spp", 2, "--resolution", "12x12")
@@ -59,8 +59,9 @@ def test_compare_refuses_to_replace_what_it_did_not_make(run, scene_file, name):
 @pytest.mark.parametrize("command", ["cost", "fit"])
 def test_other_commands_refuse_it_too(run, scene_file, command):
     folder = scene_file.parent
-    (folder / "my-scene").mkdir()
-    (folder / "my-scene/note.txt").write_text("mine", encoding="utf-8")
+    place = folder / command / "my-scene"
+    place.mkdir(parents=True)
+    (place / "note.txt").write_text("mine", encoding="utf-8")
     before = contents(folder)
     code, _, messages = run(command, scene_file, "-o", folder, "--resolution", "12x12")
     assert code == 2
@@ -102,7 +103,8 @@ def test_hidden_entries_of_others_are_left_as_they_are(tmp_path, dead):
     partial(tmp_path, "a", dead, "another-machine").mkdir()
     partial(tmp_path, "b", dead, kind="old").mkdir()  # no mark in it: nobody's result
     before = contents(tmp_path)
-    output.prepare(tmp_path)
+    with output.held(tmp_path, "test"):
+        pass
     assert contents(tmp_path) == before
 
 
@@ -112,25 +114,28 @@ def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
     for name in ("a", "b"):
         old = partial(tmp_path, name, dead, kind="old")
         old.mkdir()
-        ownership.claim(old)
+        listing.confirm(old)
         (old / "comparison.json").write_text(f"old {name}")
     (tmp_path / "b").mkdir()
     (tmp_path / "b/comparison.json").write_text("b")
-    output.prepare(tmp_path)
+    with output.held(tmp_path, "test"):
+        pass
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
     assert (tmp_path / "a/comparison.json").read_text() == "old a"
     assert (tmp_path / "b/comparison.json").read_text() == "b"
 
 
 def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
-    ownership.folder(tmp_path / "a")
+    place = tmp_path / "a"
+    ownership.folder(place)
     for name in ("check.json", "heuristic.png"):
-        ownership.write(tmp_path / "a" / name, b"ours")
-    (tmp_path / "a/reference.png").write_bytes(b"mine")
-    ownership.clear(tmp_path / "a", FILES)
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["reference.png"]
-    (tmp_path / "a/reference.png").unlink()
-    ownership.clear(tmp_path / "a", FILES)
+        ownership.write(place / name, b"ours")
+    (place / "reference.png").write_bytes(b"mine")
+    with output.held(tmp_path, "test"):
+        ownership.clear(place, FILES)
+        assert [path.name for path in place.iterdir()] == ["reference.png"]
+        (place / "reference.png").unlink()
+        ownership.clear(place, FILES)
     assert not list(tmp_path.iterdir())
 
 

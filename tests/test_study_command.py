@@ -39,10 +39,11 @@ def test_study_writes_dataset_figures_and_findings(run, file, tmp_path):
     out, page = tmp_path / "out", tmp_path / "page.md"
     code, printed, messages = run("study", file, "-o", out, "--findings", page)
     assert (code, messages) == (0, "")
-    table = dataset.read(out / "small.parquet")
+    place = out / "study/small"
+    table = dataset.read(place / "small.parquet")
     assert table.num_rows == 4
     assert dataset.read(tmp_path / "small.parquet").equals(table)
-    assert "<svg" in (out / "figures/lobe.svg").read_text(encoding="utf-8")
+    assert "<svg" in (place / "figures/lobe.svg").read_text(encoding="utf-8")
     mean = sum(table["albedo_reference"].to_pylist()) / 4
     assert page.read_text(encoding="utf-8") == f"A small study: {mean:.3f}\n"
     assert str(page) in printed
@@ -105,7 +106,7 @@ def free_port():
 
 def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_path):
     file.write_text(STUDY.replace("[0, 60]", "{from = 0, to = 80, steps = 8}"), encoding="utf-8")
-    kept, processes = tmp_path / "out/points", []
+    kept, processes = tmp_path / "out/study/small/points", []
 
     def cluster():
         port = free_port()
@@ -144,7 +145,7 @@ def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_
         assert code == 0, messages
         assert f"{len(done)} points were at hand" in printed
         assert all(path.stat().st_mtime_ns == when for path, when in done.items())
-        assert dataset.read(tmp_path / "out/small.parquet").num_rows == 16
+        assert dataset.read(tmp_path / "out/study/small/small.parquet").num_rows == 16
     finally:
         for process in processes:
             process.kill()

@@ -10,7 +10,6 @@ from msgspec import structs
 
 from comparisons.cost.cost_record import Price
 from comparisons.records import Estimated, plain
-from reports.run import output
 from reports.terminal import tables
 from tests import cost_records, records
 
@@ -44,11 +43,6 @@ def test_markdown_is_a_table_with_a_row_a_scene():
     assert page.count("<tr>") == 3
     assert "a &quot;b&quot;, c | d" in page
     assert "4.33 (3.07; 0.0532)" in page
-
-
-def test_a_scene_takes_no_name_of_a_folder_of_the_run():
-    assert output.folder_name("tables", {}) == "tables-2"
-    assert output.folder_name("figures", {"figures-2"}) == "figures-3"
 
 
 def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):

@@ -46,9 +46,21 @@ def table(study, rows):
 
 
 def write(path, data):
-    """Write a table to a Parquet file, atomically."""
-    with atomic.replacing(Path(path)) as partial:
-        pq.write_table(data, partial, compression="zstd")
+    """Write a table to a Parquet file, atomically.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be written.
+    """
+    atomic.write(Path(path), file_of(data))
+
+
+def file_of(data):
+    """Return the Parquet file of a table as bytes."""
+    stream = pa.BufferOutputStream()
+    pq.write_table(data, stream, compression="zstd")
+    return stream.getvalue().to_pybytes()
 
 
 def read(path):

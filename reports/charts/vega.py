@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from comparisons.store import Entry
+from heuristic.errors import OutputError
 from reports.charts import theme
 
 if TYPE_CHECKING:
@@ -70,10 +71,11 @@ def bundle() -> str:
     """
     import vl_convert
 
-    with suppress(OSError, RuntimeError):  # no home, or none that can be written to
+    # There may be no home, or none that can be written to.
+    with suppress(OSError, RuntimeError, OutputError):
         kept = Entry(_cache() / "vega.json", vl_convert.__version__)
-        found = kept.load()
-        if found is None:
+        found = kept.load() or {}
+        if "script" not in found:
             found = {"script": _bundled()}
             kept.path.parent.mkdir(parents=True, exist_ok=True)
             kept.save(found)

@@ -70,12 +70,13 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     from comparisons.records import to_json
     from reports.ci import annotations, check_record, lines, suite
     from reports.ci.junit import document
-    from reports.run.output import prepare
+    from reports.run.output import held
 
     if update:
         results = suite.update(baseline, scenes, images, significance, given)
     else:
-        results = suite.examine(baseline, significance, given.get("seed"), prepare(output))
+        with held(output, f"fotismos check {baseline}") as folder:
+            results = suite.examine(baseline, significance, given.get("seed"), folder)
     for result in results:
         if result.status == "error":
             click.echo(f"fotismos: error: {result.message}", err=True)

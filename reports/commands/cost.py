@@ -23,9 +23,10 @@ def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
-    prices each effect in which textbook shading differs. Writes OUTPUT/SCENE/cost.json, cost.svg
-    and pictures, and OUTPUT/tables. Without --resolution the film is reduced to 128 pixels of
-    width; --spp gives the samples a pixel of the largest count, 64 where it is not given.
+    prices each effect in which textbook shading differs. Writes cost.json, cost.svg and
+    pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without --resolution the film is reduced
+    to 128 pixels of width; --spp gives the samples a pixel of the largest count, 64 where it is not
+    given.
 
     \b
     Examples:
@@ -35,24 +36,22 @@ def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons.case import name_of
         from comparisons.records import to_json
-        from reports.files import ownership
-        from reports.run.output import FIGURES, TABLES, folder_name, prepare
+        from reports.run.output import below, held, require_free_folders
+        from reports.run.places import FIGURES, TABLES, places
         from reports.terminal import cost_tables, progress, tables
 
-        folder = prepare(output)
-        name = name_of(scene)
-        place = folder / folder_name(name, ())
-        for_print = folder / FIGURES if figures else None
-        for used in (place, folder / TABLES, *filter(None, [for_print])):
-            ownership.require_free_folder(used)
-        with progress.shown() as bar:
-            words = (scene, jobs.request(rendering), rounds, place, for_print)
-            record = pool.do(Task(name, tasks.priced, words, bar.of(name)))
-    tables.write_cost(folder / TABLES, place.name, record)
+        with held(output, jobs.command_line()) as held_folder:
+            folder = below(held_folder, "cost")
+            (place,) = places(folder, [scene])
+            require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
+            for_print = folder / FIGURES if figures else None
+            with progress.shown() as bar:
+                words = (scene, jobs.request(rendering), rounds, folder / place, for_print)
+                record = pool.do(Task(place, tasks.priced, words, bar.of(place)))
+            tables.write_cost(folder / TABLES, place, record)
     if as_json:
         click.echo(to_json(record), nl=False)
         return
     verbosity.tell(cost_tables.lines(record))
-    verbosity.tell_where(place / "cost.svg")
+    verbosity.tell_where(folder / place / "cost.svg")

@@ -13,7 +13,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @jobs.scenes_argument
-@jobs.output_option("out/fit")
+@jobs.output_option("out")
 @click.option(
     "--loss",
     default="perceptual",
@@ -51,8 +51,9 @@ def fit(scenes, output, form, as_json, markdown, timeout, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
     What the best parameters remove of the loss is the parameter error, what they leave the model
-    error: no parameters remove it. Writes OUTPUT/SCENE/fit.json and fit.png (before, reference,
-    after, residual). Unless told otherwise it renders 96x96 pixels with 64 samples each.
+    error: no parameters remove it. Writes fit.json and fit.png (before, reference, after,
+    residual) to OUTPUT/fit/SCENE. Unless told otherwise it renders 96x96 pixels with 64 samples
+    each.
 
     \b
     Examples:
@@ -63,35 +64,27 @@ def fit(scenes, output, form, as_json, markdown, timeout, **words):
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons import atomic
-        from comparisons.case import name_of
         from comparisons.fit.fit import FitOptions
         from comparisons.records import plain
         from heuristic.materials import FORMS
-        from reports.files import ownership
         from reports.run import fit_files
-        from reports.run.output import folder_name, prepare
+        from reports.run.output import below, held, require_free_folders
+        from reports.run.places import places
         from reports.terminal import progress
 
         fitting = {key: words.pop(key) for key in ("loss", "intensities")}
         chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting)
-        request, told = jobs.request(words), fitting | {"form": form}
-        folder = prepare(output)
-        places = {}
-        for scene in scenes:
-            places[folder_name(name_of(scene), places)] = scene
-        for place in places:
-            ownership.require_free_folder(folder / place)
-        with progress.shown() as bar:
-            wanted = [
-                Task(
-                    scene,
-                    tasks.fitted,
-                    (scene, request, chosen, told, folder / place),
-                    bar.of(place),
-                )
-                for place, scene in places.items()
-            ]
-            records = [outcome.result() for _, outcome in pool.each(wanted)]
+        told = (jobs.request(words), chosen, fitting | {"form": form})
+        with held(output, jobs.command_line()) as held_folder:
+            folder = below(held_folder, "fit")
+            found = places(folder, scenes)
+            require_free_folders(folder, *found)
+            with progress.shown() as bar:
+                wanted = [
+                    Task(place, tasks.fitted, (scene, *told, folder / place), bar.of(place))
+                    for place, scene in found.items()
+                ]
+                records = [outcome.result() for _, outcome in pool.each(wanted)]
     if markdown:
         atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:

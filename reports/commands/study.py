@@ -11,12 +11,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="Folder for the results. [default: out/<name of the file>]",
-)
+@jobs.output_option("out")
 @click.option(
     "--processes",
     type=click.IntRange(min=1),
@@ -45,9 +40,9 @@ from reports.terminal import verbosity
 def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
-    FILE.toml says which parameters of which scenes vary. Writes OUTPUT/<name>.parquet and
-    OUTPUT/figures/*.svg. Points that are finished are kept: a study that ends early goes on where
-    it ended when the same command is given again.
+    FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and
+    figures/*.svg to OUTPUT/study/NAME. Points that are finished are kept: a study that ends early
+    goes on where it ended when the same command is given again.
 
     \b
     Examples:
@@ -62,22 +57,25 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     from comparisons.pool import cores
     from comparisons.study import cluster, design, running
     from reports.run import study_files
-    from reports.run.output import prepare
+    from reports.run.output import below, held
+    from reports.run.places import assigned
     from reports.terminal import progress
 
     wanted = design.read(file)
     page = study_files.page(wanted, file, findings)
-    folder = prepare(output or Path("out", wanted.name))
-    study_files.require_free(wanted, folder)
-    if scheduler:
-        spreading = cluster.connected(scheduler)
-    elif workers:
-        spreading = cluster.local(workers)
-    else:
-        spreading = nullcontext(running.processes(processes or cores()))
-    with spreading as spread, progress.shown("points") as bar:
-        outcome = running.run(wanted, folder, spread, bar.of(wanted.name))
-    places = list(study_files.write(wanted, outcome, folder, page))
+    with held(output, jobs.command_line()) as held_folder:
+        studies = below(held_folder, "study")
+        (place,) = assigned(studies, [(wanted.name, file)])
+        folder = study_files.prepare(wanted, studies / place)
+        if scheduler:
+            spreading = cluster.connected(scheduler)
+        elif workers:
+            spreading = cluster.local(workers)
+        else:
+            spreading = nullcontext(running.processes(processes or cores()))
+        with spreading as spread, progress.shown("points") as bar:
+            outcome = running.run(wanted, folder, spread, bar.of(wanted.name))
+        places = list(study_files.write(wanted, outcome, folder, page))
     verbosity.tell([*study_files.summary(wanted, outcome), ""])
     for place in places:
         click.echo(place)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -36,7 +38,7 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         Metadata as strings, e.g. seed, samples and versions. BT.709's chromaticities are added.
 
     The file is written atomically (:mod:`comparisons.atomic`).
-    Raises `InputError` if layers differ in size or have another number of channels, `OSError`
+    Raises `InputError` if layers differ in size or have another number of channels, `OutputError`
     if the place cannot be written.
     """
     import OpenEXR
@@ -52,7 +54,10 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         # The bindings report an unwritable place as a RuntimeError; opening it says why.
         partial.touch()
         with OpenEXR.File(attributes, channels(layers)) as file:
-            file.write(str(partial))
+            try:
+                file.write(str(partial))
+            except RuntimeError as error:
+                raise _of_the_system(error) from error
 
 
 def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -71,6 +76,13 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
             plane = np.ascontiguousarray(planes[..., index], precision)
             result[f"{name}.{suffix}"] = plane
     return result
+
+
+def _of_the_system(error: RuntimeError) -> OSError:
+    """Return the error of the system that the bindings tell in words."""
+    words = str(error)
+    code = next((code for code in errno.errorcode if os.strerror(code) in words), errno.EIO)
+    return OSError(code, words)
 
 
 def _suffixes(name: str, image: np.ndarray) -> str:

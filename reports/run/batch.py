@@ -7,8 +7,6 @@ of them may kill.
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,38 +49,31 @@ def run(
     """
     with jobs.pool(timeout) as pool:
         pool.start()
+        from reports.files import ownership
         from reports.run import output, stages
+        from reports.run.places import places
 
-        places = _places(names)
-        folder = output.prepare(folder)
-        output.require_free(folder, places, wanted.figures)
-        record = stages.Run(shlex.join(["fotismos", *sys.argv[1:]]))
-        shown = more(pool, record) if more else {}
-        views, failures = {}, {}
-        try:
-            _compare(pool, record, places, folder, wanted, views, failures)
-        except KeyboardInterrupt:
-            pool.end()  # before the page, which lists what is finished
-            output.prepare(folder)
-            if views or failures:
-                _write(record, folder, views, failures, wanted.figures, shown)
-            raise
-    _write(record, folder, views, failures, wanted.figures, shown)
+        scenes = jobs.expand(names)
+        command = jobs.command_line()
+        with output.held(folder, command) as folder:
+            found = places(folder, scenes)
+            output.require_free(folder, found, wanted.figures)
+            record = stages.Run(command)
+            shown = more(pool, record) if more else {}
+            views, failures = {}, {}
+            try:
+                _compare(pool, record, found, folder, wanted, views, failures)
+            except KeyboardInterrupt:
+                pool.end()  # before its half written files are cleared away
+                ownership.recover(folder)
+                if views or failures:
+                    _write(record, folder, views, failures, wanted.figures, shown)
+                raise
+            _write(record, folder, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
-        count = f"{len(failures)} of {len(places)} scenes failed, "
+        count = f"{len(failures)} of {len(found)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
-
-
-def _places(names):
-    """Return the names of the scenes' folders, with the words that name the scenes."""
-    from comparisons.case import name_of
-    from reports.run import output
-
-    places = {}
-    for name in jobs.expand(names):
-        places[output.folder_name(name_of(name), places)] = name
-    return places
 
 
 def _compare(pool, record, places, folder, wanted, views, failures):
@@ -120,14 +111,20 @@ def _write(run, folder, views, failures, with_figures, shown):
 
     run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]
     run.begin_page()
-    output.write_page(folder, list(views.values()), failures=run.failures, run=run, **shown)
-    output.write_run(folder, run.record())
+    records = [view.record for view in views.values()]
+    steps = [
+        lambda: output.write_page(
+            folder, list(views.values()), failures=run.failures, run=run, **shown
+        ),
+        lambda: output.write_run(folder, run.record()),
+    ]
     if views:
-        records = [view.record for view in views.values()]
-        tables.write(folder / output.TABLES, records)
-        if with_figures:
-            from reports.charts import figures
+        steps.append(lambda: tables.write(folder / output.TABLES, records))
+    if views and with_figures:
+        from reports.charts import figures
 
-            figures.write_run(folder / output.FIGURES, records)
+        steps.append(lambda: figures.write_run(folder / output.FIGURES, records))
+    output.as_far_as_possible(*steps)
+    if views:
         verbosity.tell(progress.summary(records))
     verbosity.tell_where(folder / "index.html")

@@ -1,45 +1,56 @@
 """Writing the results of a run atomically, and never at the cost of an earlier result."""
 
-import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from comparisons import atomic
 from comparisons.departure.metrics import drawn
 from comparisons.records import to_json
-from heuristic.errors import InputError
-from reports.files import exr, images, ownership
+from heuristic.errors import OutputError
+from reports.files import exr, holding, images, ownership
 from reports.page import embedding, page
 from reports.page.scene_view import SceneView
 from reports.run import finished
+from reports.run.places import FIGURES, PAGE, RUN, TABLES
 
 LONGEST_IN_PAGE = 1024
 """Pixels; longer pictures are reduced inside the page, never in the files."""
 
-COST_FILES = "cost*"
-"""What `fotismos cost` writes."""
-TABLES, FIGURES = "tables", "figures"
-"""Folders of a run beside those of its scenes, which take no such name."""
 
+@contextmanager
+def held(folder: str | Path, command: str) -> Iterator[Path]:
+    """Make the output folder, keep other commands out of it, and clear away what killed ones left.
 
-def prepare(folder):
-    """Make the output folder, clear away what killed runs left, and ensure it can be written to.
+    ``command`` is what other commands are told.
 
     Raises
     ------
-    InputError
-        When it cannot.
+    OutputError
+        When it cannot be written to, or another command writes there.
     """
     folder = Path(folder)
-    try:
+    with atomic.explained(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".fotismos-{os.getpid()}"
-        probe.touch()
-        probe.unlink()
-        ownership.recover(folder)
-    except OSError as error:
-        raise InputError(
-            f"output folder {folder}: {error.strerror or error}. Choose another one with -o."
-        ) from error
-    return folder
+    with holding.held(folder, command):
+        with atomic.explained(folder):
+            ownership.recover(folder)
+        try:
+            yield folder
+        finally:
+            with suppress(OSError):
+                ownership.leave_empty(folder)
+
+
+def below(folder: Path, command: str) -> Path:
+    """Return the folder for the results of one command in a folder that is held.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be made.
+    """
+    return ownership.folder(folder / command)
 
 
 def require_free(folder, places, with_figures=False):
@@ -50,16 +61,45 @@ def require_free(folder, places, with_figures=False):
     InputError
         Naming what is not fotismos's.
     """
-    for name in ("index.html", "run.json"):
+    for name in (PAGE, RUN):
         ownership.require_free(folder / name)
-    for name in (*places, TABLES, *([FIGURES] if with_figures else ())):
+    require_free_folders(folder, *places, TABLES, *([FIGURES] if with_figures else ()))
+
+
+def require_free_folders(folder: Path, *names: str) -> None:
+    """Ensure that a command will replace nothing but earlier results in folders of these names.
+
+    Raises
+    ------
+    InputError
+        Naming what is not fotismos's.
+    """
+    for name in names:
         ownership.require_free_folder(folder / name)
+
+
+def as_far_as_possible(*steps: Callable[[], object]) -> None:
+    """Take each step, whether or not the others can be written.
+
+    Raises
+    ------
+    OutputError
+        The first one, at the end.
+    """
+    errors = []
+    for step in steps:
+        try:
+            step()
+        except OutputError as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
 
 
 def write_scene(folder, name, comparison, study=None, key=None):
     """Write the files of one comparison to ``folder/name``, in place of an earlier result.
 
-    With a study of cost its files are written as well; without one, those of an earlier study stay.
+    With a study of cost its files are written as well.
     With a key, `reports.run.finished.load` finds the result again by it.
 
     Returns
@@ -85,7 +125,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         charts=tuple(cost_files.figures(study.record)) if study else (),
         cost=cost_files.view(study, priced) if study else None,
     )
-    with ownership.replacing_folder(folder / name, keep=None if study else COST_FILES) as place:
+    with ownership.replacing_folder(folder / name) as place:
         for png_name, png in pictured.items():
             (place / f"{png_name}.png").write_bytes(png)
         exr.write(place / "comparison.exr", layers, _header(record))
@@ -99,22 +139,12 @@ def write_scene(folder, name, comparison, study=None, key=None):
 
 def write_page(folder, views, **shown):
     """Write ``index.html`` for the scenes of a run, and what else `page.render` shows."""
-    ownership.write(folder / "index.html", page.render(views, **shown))
+    ownership.write(folder / PAGE, page.render(views, **shown))
 
 
 def write_run(folder, record):
     """Write ``run.json``: the command, where its time went, machine and versions."""
-    ownership.write(folder / "run.json", to_json(record))
-
-
-def folder_name(name, taken):
-    """Return a name for a scene's folder: plain characters, and not taken yet."""
-    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name).strip(".") or "scene"
-    chosen, number = plain, 1
-    while chosen in taken or chosen in (TABLES, FIGURES):
-        number += 1
-        chosen = f"{plain}-{number}"
-    return chosen
+    ownership.write(folder / RUN, to_json(record))
 
 
 def _layers(shown):

@@ -51,33 +51,38 @@ def page(study, file, findings):
 def write(study, outcome, folder, page=None):
     """Write dataset, figures, and the page of findings if there is one; yields where they are."""
     place, figures = folder / f"{study.name}.parquet", folder / FIGURES
-    ownership.claim(folder, place.name)
-    dataset.write(place, outcome.table)
+    ownership.write(place, dataset.file_of(outcome.table))
     for name, svg in drawn(study, outcome.table):
         ownership.write(ownership.folder(figures) / name, svg)
     yield str(place)
     yield str(figures)
     if page is not None:
         dataset.write(page.dataset, outcome.table)
-        page.file.with_suffix("").mkdir(exist_ok=True)
+        with atomic.explained(page.file):
+            page.file.with_suffix("").mkdir(exist_ok=True)
         for name, svg in drawn(study, outcome.table):
             atomic.write(page.file.with_suffix("") / name, svg)
         atomic.write(page.file, findings(study, outcome.table, page))
         yield str(page.file)
 
 
-def require_free(study, folder):
-    """Ensure, before anything is rendered, that a study will replace nothing but its own results.
+def prepare(study, folder):
+    """Make a study's folder, and ensure that it will replace nothing but its own results.
 
     Raises
     ------
     InputError
-        Naming what is not fotismos's.
+        Before anything is rendered, naming what is not fotismos's.
+    OutputError
+        When the folder cannot be made.
     """
+    ownership.require_free_folder(folder)
+    ownership.folder(folder)
     ownership.require_free(folder / f"{study.name}.parquet")
     for name in (FIGURES, POINTS):
         ownership.require_free_folder(folder / name)
     ownership.folder(folder / POINTS)
+    return folder
 
 
 def drawn(study, table):

@@ -45,7 +45,9 @@ def study(scene, rounds):
         subprocess.run(
             [sys.executable, "-m", "reports", *words], check=True, stdout=subprocess.DEVNULL
         )
-        record = json.loads((Path(folder) / scene / "cost.json").read_text(encoding="utf-8"))
+        record = json.loads(
+            (Path(folder) / "cost" / scene / "cost.json").read_text(encoding="utf-8")
+        )
     return {f"{point['rung']}, {point['spp']} spp": point for point in record["points"]}
 
 

@@ -17,7 +17,7 @@ from comparisons.departure.regions import Region
 from comparisons.departure.statistics import histogram
 from comparisons.record import Comparison
 from comparisons.records import Pixels, plain
-from reports.run import output
+from reports.run import output, places
 from reports.run.stages import Failure, Run
 from tests import cost_records, records
 
@@ -45,7 +45,7 @@ def report(tmp_path_factory):
     views = []
     study = cost_records.study(NOISY)
     for name, comparison, priced in ((NOISY, noisy(), study), (EXACT, exact(), None)):
-        place = output.folder_name(name, ())
+        place = places.folder_name(name)
         views.append(output.write_scene(folder, place, comparison, priced))
         found.records[name] = plain(comparison.record)
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:

@@ -1,0 +1,75 @@
+"""One command at a time in an output folder: a lock that the system gives up with its process."""
+
+import errno
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from comparisons import atomic
+from heuristic.errors import OutputError
+from reports.files import listing
+
+LOCK = ".fotismos-lock"
+
+PATIENCE_S = 0.5
+"""Seconds to wait for a command that is just ending."""
+
+WITHOUT_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
+"""Errors of file systems that have no locks; there, nobody is kept out."""
+
+
+@contextmanager
+def held(folder: Path, command: str) -> Iterator[None]:
+    """Keep other commands out of a folder while the block runs.
+
+    ``command`` is what they are told of this one. Where nothing was made in the folder, nothing of
+    the lock is left.
+
+    Raises
+    ------
+    OutputError
+        Saying which process holds the folder, or why it cannot be written to.
+    """
+    path = folder / LOCK
+    lock = FileLock(path, PATIENCE_S, fallback_to_soft=False, preserve_lock_file=True)
+    with atomic.explained(path):
+        if os.path.lexists(path) and not path.is_file():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+        try:
+            lock.acquire()
+        except Timeout:
+            raise OutputError(_held_by_another(folder)) from None
+        except OSError as error:
+            if error.errno not in WITHOUT_LOCKS:
+                raise
+    try:
+        with atomic.explained(path):
+            path.write_text(_holder(command), encoding="utf-8")
+        yield
+    finally:
+        if not listing.read(folder).made:
+            for name in (listing.MARK, LOCK):
+                (folder / name).unlink(missing_ok=True)
+        lock.release()
+
+
+def _holder(command: str) -> str:
+    since = datetime.now().astimezone().isoformat(" ", "seconds")
+    return json.dumps({"pid": os.getpid(), "host": atomic.HOST, "since": since, "command": command})
+
+
+def _held_by_another(folder: Path) -> str:
+    try:
+        holder = json.loads((folder / LOCK).read_text(encoding="utf-8"))
+        who = "process {pid} on {host}, since {since}: {command}".format(**holder)
+    except (OSError, ValueError, KeyError, TypeError):
+        who = "which did not say what it is"
+    return (
+        f"{atomic.printable(folder)}: another command writes there ({who}). Wait until it ends, or"
+        " choose another output folder with -o."
+    )
