@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from comparisons.store import Entry
+from heuristic.errors import InputError
 from reports.charts import theme
 
 if TYPE_CHECKING:
@@ -70,14 +71,14 @@ def bundle() -> str:
     """
     import vl_convert
 
-    with suppress(OSError, RuntimeError):  # no home, or none that can be written to
+    with suppress(OSError, RuntimeError, InputError):  # no home, or none that can be written to
         kept = Entry(_cache() / "vega.json", vl_convert.__version__)
-        found = kept.load()
-        if found is None:
-            found = {"script": _bundled()}
+        script = (kept.load() or {}).get("script")
+        if not isinstance(script, str):
+            script = _bundled()
             kept.path.parent.mkdir(parents=True, exist_ok=True)
-            kept.save(found)
-        return found["script"]
+            kept.save({"script": script})
+        return script
     return _bundled()
 
 
