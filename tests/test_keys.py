@@ -56,10 +56,10 @@ def part(path, value):
     )
 
 
-TEXTURE = '<texture type="bitmap" name="reflectance">%s</texture>' % NAMED
+TEXTURE = f'<texture type="bitmap" name="reflectance">{NAMED}</texture>'
 MEDIUM = (
     '<shape type="cube"><bsdf type="null"/><medium type="heterogeneous" name="interior">'
-    '<volume type="gridvolume" name="sigma_t">%s</volume></medium></shape>' % NAMED
+    f'<volume type="gridvolume" name="sigma_t">{NAMED}</volume></medium></shape>'
 )
 KINDS = {
     "texture": ("t.exr", picture, BALL % TEXTURE),

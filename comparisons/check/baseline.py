@@ -118,6 +118,7 @@ def parse(text: str, name: str) -> Baseline:
         msgspec.convert(baseline.options, Request)
         _require_metrics(baseline.metrics)
         _require_moderate(baseline)
+        baseline.text()  # what cannot be written, such as a NaN among the options, is none either
     # Numbers too long for Python, and lists within lists without end, are not `ValueError` alone.
     except (InputError, ValueError, OverflowError, RecursionError) as error:
         where = "" if str(error).startswith(name) else f"{name}: "
