@@ -19,6 +19,9 @@ from reference.scene.source import Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
 
+SUFFIXES = (".xml", ".py")
+"""Of the files that a scene is in: Mitsuba's, and Python's."""
+
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 
 
@@ -201,7 +204,7 @@ def file_of(scene: str | Path) -> Path | None:
         When the file is not there.
     """
     path = Path(scene)
-    if path.suffix not in (".xml", ".py") and not path.exists():
+    if path.suffix not in SUFFIXES and not path.exists():
         return None
     if not path.is_file():
         raise InputError(

@@ -64,8 +64,11 @@ def run(study, folder, spread=None, progress=None):
     kept.mkdir(parents=True, exist_ok=True)
     blocks = [block for part in study.parts for block in point.blocks(part)]
     entries = {block.key: Entry(kept / f"{block.key}.json", block.key) for block in blocks}
-    stored = {key: (entry.load() or {}).get("rows") for key, entry in entries.items()}
-    found = {key: rows for key, rows in stored.items() if rows and not _failed(rows)}
+    found = {}
+    for block in blocks:
+        rows = (entries[block.key].load() or {}).get("rows")
+        if dataset.fits(rows, block.points) and not _failed(rows):
+            found[block.key] = rows
     # Parts may share points; these are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)

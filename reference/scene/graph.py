@@ -51,14 +51,14 @@ class Graph:
         self.state = state
         self.folders = []  # temporary ones with files that nodes refer to
         self.kinds = {}  # of plugins written in Python
-        self.folder = None  # where relative names of files begin
+        self.resolver = None  # where relative names of files begin, if not as Mitsuba has it
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
         copy.kinds = self.kinds
-        copy.folder = self.folder
+        copy.resolver = self.resolver
         return copy
 
     def instantiate(self, index=0):
@@ -80,7 +80,7 @@ class Graph:
         # wait for ever for another that waits for Python.
         self.config.parallel = not any(map(_is_python, state.nodes))
         try:
-            with files_from(self.folder):
+            with resolving(self.resolver):
                 made = Parser.instantiate(self.config, state)
         except RuntimeError as error:
             raise InputError(f"{self.name}: {_message(error)}") from error
@@ -175,16 +175,21 @@ class Graph:
         return sorted(seen)
 
 
-@contextmanager
 def files_from(folder):
-    """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
-    if folder is None:
+    """Return what looks for files in a scene's own folder first, as Mitsuba's own command does."""
+    widened = mi.FileResolver(mi.file_resolver())
+    widened.prepend(str(folder))
+    return widened
+
+
+@contextmanager
+def resolving(resolver):
+    """Let Mitsuba look for files with a resolver, to which a ``<path>`` in a scene adds places."""
+    if resolver is None:
         yield
         return
     before = mi.file_resolver()
-    widened = mi.FileResolver(before)
-    widened.prepend(str(folder))
-    mi.set_file_resolver(widened)
+    mi.set_file_resolver(resolver)
     try:
         yield
     finally:

@@ -6,10 +6,11 @@ import re
 import runpy
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from heuristic.errors import InputError
+from reference.scene.opened import noted
 from reference.scene.source import INCLUDE
 
 NAME = "scene"
@@ -20,9 +21,14 @@ ROOT = re.compile(r"<scene\b")
 
 @dataclass(frozen=True)
 class Script:
-    """A function that runs a Python file and returns its scene, a dictionary."""
+    """A function that runs a Python file and returns its scene, a dictionary.
+
+    ``files`` are those that the last run read: the file itself, modules of the user's own, and what
+    they opened through Python (:func:`reference.scene.opened.noted`).
+    """
 
     path: Path
+    files: set[Path] = field(default_factory=set, compare=False, repr=False)
 
     def __call__(self):
         """Run the file.
@@ -35,12 +41,15 @@ class Script:
         before = list(sys.path)
         sys.path.insert(0, str(self.path.resolve().parent))
         try:
-            scene = runpy.run_path(str(self.path)).get(NAME)
-            made = scene() if callable(scene) else scene
+            with noted() as read:
+                scene = runpy.run_path(str(self.path)).get(NAME)
+                made = scene() if callable(scene) else scene
         except (Exception, SystemExit) as error:  # whatever a user's own code raises
             raise InputError(f"{self.path}: {type(error).__name__}: {error}") from error
         finally:
             sys.path[:] = before
+        self.files.clear()
+        self.files.update({self.path.resolve()} | read)
         if not isinstance(made, Mapping):
             raise InputError(
                 f"{self.path}: `{NAME}` is {type(made).__name__}. It has to be a dictionary as"

@@ -11,7 +11,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from reference.scene import messages
-from reference.scene.graph import Graph, files_from
+from reference.scene.graph import Graph, files_from, resolving
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -75,13 +75,15 @@ class Source:
     def files(self) -> tuple[Path, ...]:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
 
-        These are the scene's own file, what it includes, and every file that an element names.
+        These are the scene's own file, what it includes, every file that an element names, and what
+        a script read as it ran (:class:`reference.scene.script.Script`). The
+        tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
-        found = set()
+        found = set(getattr(self.content, "files", ()))
         if isinstance(self.content, (str, PathLike)):
-            found |= set(included(Path(self.content)))
-        with files_from(graph.folder):
+            found |= {Path(str(file)).resolve() for file in graph.state.files}
+        with resolving(graph.resolver):
             resolver = mi.file_resolver()
             for index in graph.nodes_in_use():
                 for _, value in graph.props(index).items():
@@ -98,15 +100,16 @@ class Source:
 
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
-        content, folder = self._content(), None
+        content, resolver = self._content(), None
         try:
             if isinstance(content, Mapping):
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
                 included(path)
-                state = Parser.parse_file(config, str(path), **self.parameters)
-                folder = path.resolve().parent
+                resolver = files_from(path.resolve().parent)
+                with resolving(resolver):
+                    state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
         except RuntimeError as error:
@@ -116,7 +119,7 @@ class Source:
                 f"{self.name}: this is not a scene. Its outermost element must be a scene."
             )
         graph = Graph(self.name, config, state)
-        graph.folder = folder
+        graph.resolver = resolver
         return graph
 
 

@@ -1,7 +1,5 @@
 """All baselines of one command: checked, or written."""
 
-from pathlib import Path
-
 from comparisons.case import Request, open_case
 from comparisons.check.moved import level_of_each
 from comparisons.gallery.builtin import SCENES
@@ -22,13 +20,34 @@ def examine(path, significance, seed, folder):
     """
     paths = baselines.find(path)
     level = level_of_each(significance, len(paths))
-
-    def examine_one(path):
-        file = baselines.read(path)
-        return checks.examine(file, file.open(seed), level, folder / path.stem, bar.of(path.stem))
-
     with progress.shown() as bar:
-        return [checks.guarded(examine_one, one) for one in paths]
+        return [examine_one(one, level, seed, folder / one.stem, bar.of(one.stem)) for one in paths]
+
+
+def examine_one(path, level, seed, folder, progress=None):
+    """Check one baseline; whatever fails is told in its result, which can be pickled.
+
+    Parameters
+    ----------
+    level
+        Chance of an alarm though nothing changed, of this baseline alone.
+    seed
+        In place of the baseline's own, unless it is None.
+    folder
+        For the pictures of a failure.
+    progress
+        As of :func:`comparisons.compare.compare`.
+
+    Returns
+    -------
+    reports.ci.checks.Result
+    """
+    return checks.guarded(_examine, path, level, seed, folder, progress)
+
+
+def _examine(path, level, seed, folder, progress):
+    file = baselines.read(path)
+    return checks.examine(file, file.open(seed), level, folder, progress)
 
 
 def update(path, scenes, images, significance, given):
@@ -50,23 +69,28 @@ def update(path, scenes, images, significance, given):
     """
     with progress.shown() as bar:
         return [
-            checks.guarded(_update_one, one, scene, images, significance, given, bar)
+            update_one(one, scene, images, significance, given, bar.of(one.stem))
             for one, scene in _targets(path, scenes)
         ]
 
 
-def _update_one(path, scene, images, significance, given, bar):
+def update_one(path, scene, images, significance, given, progress=None):
+    """Write one baseline, as :func:`update`; ``scene`` is None where the file says it."""
+    return checks.guarded(_update, path, scene, images, significance, given, progress)
+
+
+def _update(path, scene, images, significance, given, progress):
     file = _readable(path, scene)
     if file is not None:
         old = file.baseline
         if scene is None or baselines.scene_for(scene, path) == old.scene:
             scene, given = baselines.scene_from(old.scene, path), dict(old.options) | given
             if Request.of(given).stated() == old.options:
-                return checks.update(file, file.open(), significance, images, bar.of(path.stem))
+                return checks.update(file, file.open(), significance, images, progress)
         images = images or bool(old.images)
     case = open_case(scene, Request.of(given))
     named = baselines.scene_for(scene, path)
-    return checks.create(path, named, case, images, bar.of(path.stem))
+    return checks.create(path, named, case, images, progress)
 
 
 def _readable(path, scene):
@@ -92,12 +116,8 @@ def _targets(path, scenes):
             scenes = (path.stem,)
         return [(path, scenes[0] if scenes else None)]
     if scenes:
-        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
+        named = {path / f"{baselines.name_of(scene)}.json": scene for scene in scenes}
         if len(named) < len(scenes):
             raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
         return list(named.items())
     return [(one, None) for one in baselines.find(path)]
-
-
-def _stem(scene):
-    return Path(scene).stem if Path(scene).suffix == ".xml" else scene

@@ -52,7 +52,10 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
     again with the options in its baseline, the seed included; --seed takes another. If something
-    moved, the exit code is 1, and OUTPUT holds pictures of where.
+    moved, the exit code is 1, and OUTPUT holds pictures of where. If one could not be checked, it
+    is 2; the others are checked all the same.
+
+    A scene in Python is code, and so is a baseline that names one: it is executed.
 
     \b
     Examples:
@@ -80,9 +83,9 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     for result in results:
         if result.status == "error":
             click.echo(f"fotismos: error: {result.message}", err=True)
-    notes = annotations.annotate(results, output, significance)
     if junit is not None:
         _write(junit, document(results))
+    notes = annotations.annotate(results, output, significance)
     if as_json:
         click.echo(to_json(check_record.of_all(results, significance)), nl=False)
     elif not verbosity.is_quiet():
