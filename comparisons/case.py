@@ -50,6 +50,7 @@ class Request:
     pairing: str = "matched"
     define: Mapping[str, str] = field(default_factory=dict)
     sensor: int | None = None
+    allow_empty: bool = False
 
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
@@ -128,6 +129,7 @@ class Case:
             tessellation=asked.tessellation,
             everything=asked.everything,
             sensor=asked.sensor or 0,
+            allow_empty=asked.allow_empty,
         )
 
     def asking(self, **changes: Any) -> "Case":

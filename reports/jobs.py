@@ -138,6 +138,8 @@ def rendering_options(command):
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
+        click.option("--allow-empty", is_flag=True,
+                     help="Take pictures in which no pixel sees a surface."),
     )  # fmt: skip
 
 

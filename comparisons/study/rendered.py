@@ -36,6 +36,8 @@ def row(part, point, identity):
     pair = halves.pair(_source(part, point, identity), part.convention, part.resolution)
     kept = _kept(part.scene, identity)
     physical = kept[1].scene(with_sampler(pair.physical, sampler()))
+    surface = gbuffer(physical, *image_size(physical))
+    surface.require_surface(part.scene)
     chosen = _guarded(part, identity, plan(pair, physical), physical, pair)
     heuristic = kept[0].scene(with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES
@@ -45,7 +47,7 @@ def row(part, point, identity):
         integrator = physical_integrator(stage, physical, pair.hide_emitters)
         renderers.append(Renderer(physical, integrator, spp, "reference image"))
     images, noise = _render(renderers, part.seed)
-    counted = gbuffer(physical, *image_size(physical)).hit
+    counted = surface.hit
     result = measure(images[0], images[-1], counted, noise)
     result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
     result["miss"] = largest_miss(pair.misses)
