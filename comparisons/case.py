@@ -8,6 +8,7 @@ from typing import Any
 
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
+from comparisons.pool import end_after_task
 from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG
@@ -180,6 +181,8 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
         content = path
         if path.suffix == ".py":
             from reference.scene.script import Script
+
+            end_after_task()  # whatever the script does to this process
 
             content = Script(path)
         return _opened(Source(name or path.stem, content, asked.define), asked, str(path))

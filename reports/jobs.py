@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,6 +161,9 @@ def _with(command, *options):
     return command
 
 
+scripts_option = click.option(
+    "--scripts", is_flag=True, help="Run the Python scripts in folders too, which are code."
+)
 timeout_option = click.option(
     "--timeout",
     default=1800.0,
@@ -215,18 +219,59 @@ def command_line() -> str:
     return program.command(*sys.argv[1:])
 
 
-def expand(names: Iterable[str]) -> list[str]:
-    """Return the names of scenes, with the scenes in it in place of each folder."""
-    return [scene for name in names for scene in _within(Path(name)) or [name]]
+def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
+    """Return the names of scenes, with the scenes in it in place of each folder.
+
+    Scripts in a folder are run only ``with_scripts``; one that is named is always.
+
+    Raises
+    ------
+    InputError
+        For a folder without a scene.
+    """
+    return [scene for name in names for scene in _within(Path(name), with_scripts) or [name]]
 
 
-def _within(folder: Path) -> list[str]:
+def _within(folder: Path, with_scripts: bool) -> list[str]:
     """Return the scenes in a folder; none for what is not one."""
     if not folder.is_dir():
         return []
-    from reference.scene.script import scenes_in
+    from reference.scene.folders import scenes_in
 
-    return list(map(str, scenes_in(folder)))
+    found = scenes_in(folder)
+    if with_scripts:
+        return list(map(str, sorted((*found.written, *found.scripts))))
+    if found.scripts:
+        scripts = ", ".join(str(path.relative_to(folder)) for path in found.scripts)
+        told = f"{folder}: {scripts}: scripts are code, which only --scripts runs"
+        if not found.written:
+            raise InputError(f"{told}. There is no other scene.")
+        click.echo(f"fotismos: {told}.", err=True)
+    return list(map(str, found.written))
+
+
+def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
+    """Return what is asked for about each of some scenes: values for the placeholders it has.
+
+    Raises
+    ------
+    InputError
+        For a value that no scene has a placeholder for.
+    """
+    if len(scenes) == 1 or not whole.define:
+        return [whole] * len(scenes)
+    from reference.scene.source import placeholders
+
+    own = [
+        {key: value for key, value in whole.define.items() if key in placeholders(Path(scene))}
+        for scene in scenes
+    ]
+    if unused := set(whole.define) - {key for each in own for key in each}:
+        raise InputError(
+            f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
+            " scene file, or leave the option out."
+        )
+    return [replace(whole, define=define) for define in own]
 
 
 def request(words: Mapping[str, Any]) -> Request:

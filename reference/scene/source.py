@@ -139,6 +139,7 @@ DEEPEST = 100
 
 TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'<>])*?(/?)>""")
 INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
+PLACEHOLDER = re.compile(r"\$(\w+)")
 COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 
 
@@ -156,6 +157,13 @@ def included(path: Path) -> list[Path]:
     found: list[Path] = []
     _check(path, (), found)
     return found
+
+
+def placeholders(path: Path) -> set[str]:
+    """Return the names of the placeholders in a scene file and what it includes; none in others."""
+    if path.suffix != ".xml" or not path.is_file():
+        return set()
+    return {name for each in included(path) for name in PLACEHOLDER.findall(_text(each))}
 
 
 def _check(path: Path, outer: tuple[Path, ...], found: list[Path]) -> None:

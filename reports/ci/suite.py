@@ -3,13 +3,14 @@
 from comparisons.case import Request, open_case
 from comparisons.check.moved import level_of_each
 from comparisons.gallery.builtin import SCENES
+from comparisons.pool import Pool, Task
 from heuristic.errors import InputError
 from reports.ci import baselines, checks
 from reports.terminal import progress
 
 
-def examine(path, significance, seed, folder):
-    """Check one baseline or a folder of them; the significance is shared.
+def examine(pool: Pool, path, significance, seed, folder):
+    """Check one baseline or a folder of them in a pool; the significance is shared.
 
     ``seed`` replaces the baselines' own unless it is None; ``folder`` is for pictures of failures.
 
@@ -20,8 +21,21 @@ def examine(path, significance, seed, folder):
     """
     paths = baselines.find(path)
     level = level_of_each(significance, len(paths))
+    given = [(one, level, seed, folder / one.stem) for one in paths]
+    return _each(pool, examine_one, given)
+
+
+def _each(pool, function, given):
+    """Return the result of each baseline, in order; ``given`` has the arguments, its path first."""
+    paths = [arguments[0] for arguments in given]
     with progress.shown() as bar:
-        return [examine_one(one, level, seed, folder / one.stem, bar.of(one.stem)) for one in paths]
+        tasks = [Task(each[0].name, function, each, bar.of(each[0].stem)) for each in given]
+        found = {}
+        for task, outcome in pool.each(tasks):
+            path = task.arguments[0]
+            error = outcome.exception()
+            found[path] = checks.failed(path, error) if error else outcome.result()
+    return [found[path] for path in paths]
 
 
 def examine_one(path, level, seed, folder, progress=None):
@@ -50,7 +64,7 @@ def _examine(path, level, seed, folder, progress):
     return checks.examine(file, file.open(seed), level, folder, progress)
 
 
-def update(path, scenes, images, significance, given):
+def update(pool: Pool, path, scenes, images, significance, given):
     """Write one baseline or several, unless they are there with the same options and nothing moved.
 
     Parameters
@@ -67,11 +81,10 @@ def update(path, scenes, images, significance, given):
     InputError
         When a baseline cannot be told from another, or has no scene.
     """
-    with progress.shown() as bar:
-        return [
-            update_one(one, scene, images, significance, given, bar.of(one.stem))
-            for one, scene in _targets(path, scenes)
-        ]
+    targets = _targets(path, scenes)
+    return _each(
+        pool, update_one, [(one, scene, images, significance, given) for one, scene in targets]
+    )
 
 
 def update_one(path, scene, images, significance, given, progress=None):

@@ -8,6 +8,7 @@ of them may kill.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +54,8 @@ def run(
         from reports.run import output, stages
         from reports.run.places import places
 
-        scenes = jobs.expand(names)
+        scenes = jobs.expand(names, wanted.with_scripts)
+        requests = dict(zip(scenes, jobs.requests(wanted.request, scenes), strict=True))
         command = jobs.command_line()
         with output.held(folder, command) as folder:
             found = places(folder, scenes)
@@ -62,7 +64,7 @@ def run(
             shown = more(pool, record) if more else {}
             views, failures = {}, {}
             try:
-                _compare(pool, record, found, folder, wanted, views, failures)
+                _compare(pool, record, found, folder, wanted, requests, views, failures)
             except KeyboardInterrupt:
                 pool.end()  # before its half written files are cleared away
                 ownership.recover(folder)
@@ -76,7 +78,7 @@ def run(
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _compare(pool, record, places, folder, wanted, views, failures):
+def _compare(pool, record, places, folder, wanted, requests, views, failures):
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from comparisons.case import name_of
     from reports.terminal import progress
@@ -84,7 +86,12 @@ def _compare(pool, record, places, folder, wanted, views, failures):
     alone = len(places) == 1
     with progress.shown() as bar:
         tasks = (
-            Task(place, single.compare, (name, folder, place, wanted), bar.of(name_of(name)))
+            Task(
+                place,
+                single.compare,
+                (name, folder, place, replace(wanted, request=requests[name])),
+                bar.of(name_of(name)),
+            )
             for place, name in places.items()
         )
         for task, outcome in pool.each(tasks):

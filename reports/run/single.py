@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 class Wanted:
     """What a command wants of each of its scenes.
 
-    ``request`` says how; ``fresh`` renders what is finished, too.
+    ``request`` says how; ``fresh`` renders what is finished, too; ``with_scripts`` runs the scripts
+    that are found in folders.
     """
 
     request: Request
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
+    with_scripts: bool = False
 
 
 def compare(
