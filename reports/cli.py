@@ -19,6 +19,7 @@ from comparisons import interruption
 from heuristic.errors import FotismosError, suggestion
 from heuristic.program import program
 from heuristic.version import __version__
+from reports.commands.completion import VARIABLE
 
 
 class Commands(Mapping[str, click.Command]):
@@ -75,7 +76,11 @@ def cli():
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        code = cli(prog_name=shlex.join(program()), standalone_mode=False)
+        code = cli(
+            prog_name=shlex.join(program()),
+            complete_var=VARIABLE,
+            standalone_mode=False,
+        )
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
         click.echo(
             "fotismos: interrupted; finished scenes are kept, and the same command goes on.",

@@ -127,7 +127,7 @@ def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder,
         SCENE.replace("</scene>", '<include filename="part.xml"/></scene>')
     )
     out = tmp_path / "out"
-    words = ("compare", folder, "-o", out, "--spp", 2, "--resolution", "16x16")
+    words = ("compare", folder, "-o", out, "--spp", 2, "--resolution", "16x16", "--scripts")
     code, _, messages = run(*words)
     assert code == 1
     assert "1 of 4 scenes failed" in messages
@@ -212,7 +212,7 @@ def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
 
 
 def _start(folder, out):
-    words = [sys.executable, "-m", "reports", "compare", folder, "-o", out]
+    words = [sys.executable, "-m", "reports", "compare", folder, "-o", out, "--scripts"]
     words += ["--spp", "8", "--resolution", "16x16"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
@@ -226,6 +226,7 @@ def _results(out):
     for path in sorted(out.glob("?/*")):
         if path.suffix == ".json":
             record = json.loads(path.read_text(encoding="utf-8"))
+            record = record.get("content", record)
             record = record.get("view", record)
             record = record.get("record", record)
             found[path.relative_to(out)] = {

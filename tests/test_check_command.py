@@ -17,6 +17,7 @@ from comparisons.check.moved import Move
 from reports import cli
 from reports.ci import annotations, junit
 from tests.schemas import schema
+from tests.small_scene import SCENE
 
 SCHEMA = schema("baseline")
 FAST = ("--spp", 32, "--resolution", "16x12")
@@ -74,11 +75,11 @@ def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):
     assert "1 of 2 moved" in printed
     assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", printed)
     assert f"fotismos check {folder / 'fig-8-6b.json'} --update" in printed
-    names = {path.name for path in (out / "fig-8-6b").iterdir()}
+    names = {path.name for path in (out / "check/fig-8-6b").iterdir()}
     kinds = ("", "-change", "-p", "-error")
     pictures = {f"{half}{kind}.png" for half in ("heuristic", "reference") for kind in kinds}
     assert names == {".fotismos", "check.json", *pictures}
-    assert {path.name for path in out.iterdir()} == {".fotismos", ".fotismos-lock", "fig-8-6b"}
+    assert {path.name for path in out.iterdir()} == {".fotismos", ".fotismos-lock", "check"}
     # The block that moved is the one that stands out of its map.
     shown = np.asarray(Image.open(out / "fig-8-6b/reference-p.png").convert("RGB"), float)
     height, width = shown.shape[:2]
@@ -132,7 +133,10 @@ def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):
 )
 def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "empty").mkdir()
+    for name in ("empty", "a", "b"):
+        (tmp_path / name).mkdir()
+    for name in ("a/x.xml", "b/x.xml"):
+        (tmp_path / name).write_text(SCENE, encoding="utf-8")
     code, _, messages = run("check", *words)
     assert code == 2
     assert re.search(expected, messages)
@@ -140,7 +144,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):
 
 
 def test_files_of_others_in_the_output_folder_stay(run, folder, tmp_path):
-    own = tmp_path / "out/fig-8-6b/mine.txt"
+    own = tmp_path / "out/check/fig-8-6b/mine.txt"
     own.parent.mkdir(parents=True)
     own.write_text("mine")
     change(folder / "fig-8-6b.json")

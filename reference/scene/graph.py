@@ -175,7 +175,7 @@ class Graph:
         name = props.get(FILENAME, None)
         if not isinstance(name, str) or "\0" in name:
             return None
-        with files_from(self.folder):
+        with resolving(self.resolver):
             path = Path(str(mi.file_resolver().resolve(name)))
         try:
             return path if path.exists() else None

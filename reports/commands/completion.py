@@ -3,6 +3,9 @@
 import click
 from click.shell_completion import get_completion_class
 
+VARIABLE = "_FOTISMOS_COMPLETE"
+"""Environment variable by which a shell asks the program for words."""
+
 SHELLS = ("bash", "zsh", "fish")
 
 
@@ -20,8 +23,6 @@ def completion(context, shell):
     In bash, for the run script of a copy of the project, from its folder:
       source <(./run completion bash); complete -o nosort -F _fotismos_completion ./run
     """  # noqa: D301 click reads the \b as: keep these lines
-    program = get_completion_class(shell)(
-        context.find_root().command, {}, "fotismos", "_FOTISMOS_COMPLETE"
-    )
+    program = get_completion_class(shell)(context.find_root().command, {}, "fotismos", VARIABLE)
     # Not .source(), which starts a bash to look at its version.
     click.echo(program.source_template % program.source_vars())

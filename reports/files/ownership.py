@@ -75,6 +75,8 @@ def folder(path: Path) -> Path:
 
 def clear(path: Path, names: Iterable[str]) -> None:
     """Delete those of some files that fotismos made, and their folder once it is empty."""
+    if not path.is_dir():
+        return
     with atomic.explained(path):
         ours = made(path) & set(names)
         for name in ours:
