@@ -81,7 +81,7 @@ def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):
     assert names == {".fotismos", "check.json", *pictures}
     assert {path.name for path in out.iterdir()} == {".fotismos", ".fotismos-lock", "check"}
     # The block that moved is the one that stands out of its map.
-    shown = np.asarray(Image.open(out / "fig-8-6b/reference-p.png").convert("RGB"), float)
+    shown = np.asarray(Image.open(out / "check/fig-8-6b/reference-p.png").convert("RGB"), float)
     height, width = shown.shape[:2]
     blocks = shown.reshape(4, height // 4, 4, width // 4, 3).mean(axis=(1, 3, 4))
     assert np.unravel_index(blocks.argmax(), blocks.shape) == (1, 2)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.pool import Pool, Task
+from comparisons.pool import Pool, Task, end_after_task
 from heuristic.errors import InputError, LostProcessError
 
 ROOT = Path(__file__).parents[1]
@@ -158,7 +158,7 @@ def test_what_is_under_way_ends_with_the_pool(tmp_path):
 PARENT = """
 import sys
 from pathlib import Path
-from comparisons.pool import Pool, Task
+from comparisons.pool import Pool, Task, end_after_task
 from tests.test_pool import leave_behind
 
 if __name__ == "__main__":
@@ -186,3 +186,83 @@ def test_a_process_group_ends_with_the_process_that_asked(number, tmp_path):
     finally:
         parent.kill()
         parent.wait()
+
+
+def beat(times, pause, progress):
+    for done in range(times):
+        time.sleep(pause)
+        progress("beating", done, times)
+    return "alive"
+
+
+@pytest.mark.guarantee("runs", "What makes progress goes on; what makes none is ended.")
+def test_progress_is_a_sign_of_life():
+    with Pool(1, limit_s=3.0) as pool:
+        pool.start()
+        found = do(
+            pool,
+            Task("slow", beat, (8, 0.7), lambda *_: None),
+            Task("silent", time.sleep, (1000,)),
+        )
+    assert found["slow"] == "alive"
+    assert str(found["silent"]) == "silent: it took 3 s without any progress, and was ended."
+
+
+def fork_and(answer):
+    """Fork; both return."""
+    return f"{answer} of the parent" if os.fork() else f"{answer} of the child"
+
+
+def fork_and_leave():
+    """Leave behind a child that has all that this process has open, and end."""
+    if os.fork() == 0:
+        time.sleep(1000)
+    os._exit(5)
+
+
+def test_only_the_process_that_was_asked_answers():
+    with Pool(1) as pool:
+        found = do(pool, *(Task(name, fork_and, (name,)) for name in "abc"))
+    assert found == {name: f"{name} of the parent" for name in "abc"}
+
+
+def test_a_fork_does_not_hide_the_end_of_its_parent():
+    with Pool(1) as pool:
+        begin = time.monotonic()
+        found = do(pool, Task("forking", fork_and_leave, ()), Task("sum", add, (1, 2)))
+        assert time.monotonic() - begin < 60
+    assert str(found["forking"]) == "forking: its process ended with exit code 5."
+    assert found["sum"] == 3
+
+
+def unready():
+    raise InputError("nothing is ready")
+
+
+def give_what_cannot_be_sent():
+    return lambda: None
+
+
+def spend():
+    end_after_task()
+    return os.getpid()
+
+
+def test_a_process_that_cannot_be_prepared_says_why_each_time():
+    with Pool(1, unready) as pool:
+        found = do(pool, Task("a", process, ()), Task("b", process, ()))
+    assert {str(error) for error in found.values()} == {"nothing is ready"}
+
+
+def test_a_result_that_cannot_be_sent_is_a_message():
+    with Pool(1) as pool:
+        found = do(pool, Task("odd", give_what_cannot_be_sent, ()), Task("sum", add, (1, 2)))
+    assert isinstance(found["odd"], LostProcessError)
+    assert "cannot be sent" in str(found["odd"])
+    assert found["sum"] == 3
+
+
+def test_a_spent_process_does_no_other_task():
+    with Pool(1) as pool:
+        found = do(pool, Task("a", spend, ()), Task("b", spend, ()), Task("c", process, ()))
+    assert len(set(found.values())) == 3
