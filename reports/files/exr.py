@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +59,7 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
                 file.write(str(partial))
             except RuntimeError as error:
                 raise _of_the_system(error) from error
+        _require_whole(partial)
 
 
 def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -76,6 +78,43 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
             plane = np.ascontiguousarray(planes[..., index], precision)
             result[f"{name}.{suffix}"] = plane
     return result
+
+
+def _require_whole(path: Path) -> None:
+    """Ensure that a file has its end, of which the bindings do not say that it was not written.
+
+    A header of name, type, size and value of each attribute, then the places of the chunks, the
+    first of which follows; a chunk is its line, its size and so many bytes.
+    """
+    with path.open("rb") as file:
+        end = file.seek(0, os.SEEK_END)
+        file.seek(8)
+        try:
+            while _text(file):
+                _text(file)
+                file.seek(_integer(file, 4), os.SEEK_CUR)
+            first = _integer(file, 8)
+            places = [first, *(_integer(file, 8) for _ in range((first - file.tell()) // 8))]
+            file.seek(max(places) + 4)
+            is_whole = min(places) > 0 and file.tell() + 4 + _integer(file, 4) == end
+        except EOFError:
+            is_whole = False
+    if not is_whole:
+        with path.open("ab") as file:
+            file.write(bytes(2**16))  # says why
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+
+def _text(file: BinaryIO) -> bytes:
+    """Return the bytes up to the next zero."""
+    return b"".join(iter(lambda: file.read(1).rstrip(b"\0"), b""))
+
+
+def _integer(file: BinaryIO, size: int) -> int:
+    content = file.read(size)
+    if len(content) < size:
+        raise EOFError
+    return int.from_bytes(content, "little")
 
 
 def _of_the_system(error: RuntimeError) -> OSError:
