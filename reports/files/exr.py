@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,15 +48,10 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         "compression": OpenEXR.ZIP_COMPRESSION,
         "chromaticities": BT709,
     }
-    with atomic.replacing(path) as partial:
-        # The bindings report an unwritable place as a RuntimeError; opening it says why.
-        partial.touch()
-        with OpenEXR.File(attributes, channels(layers)) as file:
-            try:
-                file.write(str(partial))
-            except RuntimeError as error:
-                raise _of_the_system(error) from error
-        _require_whole(partial)
+    file = OpenEXR.File(attributes, channels(layers))
+    # Given a path, the bindings do not say when its end could not be written.
+    with file, atomic.replacing(path) as partial, partial.open("wb") as stream:
+        file.write(stream)
 
 
 def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -78,50 +70,6 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
             plane = np.ascontiguousarray(planes[..., index], precision)
             result[f"{name}.{suffix}"] = plane
     return result
-
-
-def _require_whole(path: Path) -> None:
-    """Ensure that a file has its end, of which the bindings do not say that it was not written.
-
-    A header of name, type, size and value of each attribute, then the places of the chunks, the
-    first of which follows; a chunk is its line, its size and so many bytes.
-    """
-    with path.open("rb") as file:
-        end = file.seek(0, os.SEEK_END)
-        file.seek(8)
-        try:
-            while _text(file):
-                _text(file)
-                file.seek(_integer(file, 4), os.SEEK_CUR)
-            first = _integer(file, 8)
-            places = [first, *(_integer(file, 8) for _ in range((first - file.tell()) // 8))]
-            file.seek(max(places) + 4)
-            is_whole = min(places) > 0 and file.tell() + 4 + _integer(file, 4) == end
-        except EOFError:
-            is_whole = False
-    if not is_whole:
-        with path.open("ab") as file:
-            file.write(bytes(2**16))  # says why
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-
-def _text(file: BinaryIO) -> bytes:
-    """Return the bytes up to the next zero."""
-    return b"".join(iter(lambda: file.read(1).rstrip(b"\0"), b""))
-
-
-def _integer(file: BinaryIO, size: int) -> int:
-    content = file.read(size)
-    if len(content) < size:
-        raise EOFError
-    return int.from_bytes(content, "little")
-
-
-def _of_the_system(error: RuntimeError) -> OSError:
-    """Return the error of the system that the bindings tell in words."""
-    words = str(error)
-    code = next((code for code in errno.errorcode if os.strerror(code) in words), errno.EIO)
-    return OSError(code, words)
 
 
 def _suffixes(name: str, image: np.ndarray) -> str:
