@@ -1,6 +1,5 @@
 """What the user gave: the one door through which every command, test and notebook opens a scene."""
 
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
@@ -9,6 +8,8 @@ from typing import Any
 
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
+from comparisons.pool import end_after_task
+from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
@@ -18,6 +19,9 @@ from reference.scene.graph import VARIANTS, set_variant
 from reference.scene.source import Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
+
+SUFFIXES = (".xml", ".py")
+"""Of the files that a scene is in: Mitsuba's, and Python's."""
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 
@@ -47,6 +51,7 @@ class Request:
     pairing: str = "matched"
     define: Mapping[str, str] = field(default_factory=dict)
     sensor: int | None = None
+    allow_empty: bool = False
 
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
@@ -125,6 +130,7 @@ class Case:
             tessellation=asked.tessellation,
             everything=asked.everything,
             sensor=asked.sensor or 0,
+            allow_empty=asked.allow_empty,
         )
 
     def asking(self, **changes: Any) -> "Case":
@@ -133,7 +139,7 @@ class Case:
 
     def command(self, verb: str = "compare", **more: Any) -> str:
         """Return the command that repeats what is done with the scene."""
-        words = ["fotismos", verb, self.word]
+        words = [verb, self.word]
         for name, value in self.request.define.items():
             words += ["-D", f"{name}={value}"]
         stated = {key: value for key, value in asdict(self.request).items() if key != "define"}
@@ -144,7 +150,7 @@ class Case:
             elif value not in (None, False):
                 text = "x".join(map(str, value)) if key == "resolution" else str(value)
                 words += [option, text]
-        return shlex.join(words)
+        return program.command(*words)
 
 
 def open_case(scene: Scene, request: Request | None = None, name: str | None = None) -> Case:
@@ -176,6 +182,8 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
         if path.suffix == ".py":
             from reference.scene.script import Script
 
+            end_after_task()  # whatever the script does to this process
+
             content = Script(path)
         return _opened(Source(name or path.stem, content, asked.define), asked, str(path))
     known = builtin(str(scene))
@@ -201,13 +209,13 @@ def file_of(scene: str | Path) -> Path | None:
         When the file is not there.
     """
     path = Path(scene)
-    if path.suffix not in (".xml", ".py") and not path.exists():
+    if path.suffix not in SUFFIXES and not path.exists():
         return None
     if not path.is_file():
         raise InputError(
             f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
             " that makes one (.py), a folder of such, or the name of a built-in scene;"
-            " `fotismos scenes` lists them."
+            f" `{program.command('scenes')}` lists them."
         )
     return path
 

@@ -3,9 +3,11 @@
 import gc
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 
 import mitsuba as mi
+from msgspec import structs
 
 from comparisons import record, render
 from comparisons.comparison import (
@@ -22,9 +24,10 @@ from comparisons.records import Pixels
 from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
-from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.gbuffer import GBuffer, gbuffer, image_size
 from reference.rendering.guard import Guard, Verdict, examine_plan
 from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.scene import messages
 from reference.scene.sampler import with_sampler
 
 LARGEST = 2**26
@@ -45,6 +48,11 @@ class Prepared:
     passes: int
     planning_seconds: float
     guard: Guard | None = None
+
+    @cached_property
+    def surface(self) -> GBuffer:
+        """What each pixel sees; the pixels that count are those that see a surface."""
+        return gbuffer(self.scene, *image_size(self.scene))
 
 
 def prepare(source, options=None):
@@ -80,8 +88,20 @@ def guarded(source, options=None):
     """Prepare a scene as :func:`prepare` does, and probe it before anything relies on its plan.
 
     Where the probe disagrees with the plan, everything is simulated.
+
+    Raises
+    ------
+    InputError
+        As :func:`prepare`, and where no pixel sees a surface, unless the options allow that.
     """
     options = options or Options()
+    ready = _probed(source, options)
+    if not options.allow_empty:
+        ready.surface.require_surface(source.name)
+    return ready
+
+
+def _probed(source, options):
     ready = prepare(source, options)
     width, height = image_size(ready.scene)
     samples = ready.reference.spp * ready.passes * width * height
@@ -117,19 +137,27 @@ def compare(source, options=None, progress=None, command="", kept=None):
     Raises
     ------
     InputError
-        When the scene cannot be read or paired.
+        When the scene cannot be read or paired, or no pixel of it sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
     options = options or Options()
+    said: list[str] = []
+    with messages.collected(said):
+        comparison = _compare(source, options, progress, command, kept)
+    told = messages.counted([*source.said, *said])
+    made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *told))
+    return replace(comparison, record=made)
+
+
+def _compare(source, options, progress, command, kept):
     stages = _Stages()
     ready = guarded(source, options)
     heuristic, reference = ready.heuristic, ready.reference
     stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
     stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
     width, height = image_size(ready.scene)
-    surface = gbuffer(ready.scene, width, height)
-    stages.done("geometry")
+    surface = ready.surface
     estimates = render.render(ready, options, surface.hit, progress, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])

@@ -43,6 +43,8 @@ class Options:
         Switch off all pruning, in the kernel and in the reference.
     sensor
         Number of the sensor, of several, from 0.
+    allow_empty
+        Take a picture in which no pixel sees a surface, which is refused otherwise.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Options:
     heuristic_variant: str | None = None
     everything: bool = False
     sensor: int = 0
+    allow_empty: bool = False
 
     def __post_init__(self):
         heuristics.named(self.heuristic)

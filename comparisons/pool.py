@@ -1,25 +1,27 @@
 """Processes that work is given to, so that a task which kills its process takes no other along.
 
 A process does task after task, so that its start-up is paid once; a new one takes the place of one
-that died. Each leads a process group of its own, which ends as a whole: with the process, when its
-time is over, and when the process that asked for the work ends, in whatever way.
+that died, or that ran code of a user's (:func:`end_after_task`). Each leads a process group of its
+own, which ends as a whole: with the process, when its time is over, and when the process that asked
+for the work ends, in whatever way.
 """
 
+import logging
 import os
 import signal
 import subprocess
-import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process
 from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
 
+from comparisons.interruption import SIGNALS
 from heuristic.errors import FotismosError, LostProcessError
 
 FIRST_VICTIM = Path("/proc/self/oom_score_adj")
@@ -31,12 +33,27 @@ GUARD = ("/bin/sh", "-c", "read _; kill -9 0")
 GRACE_S = 1.0
 """Seconds in which a process may end by itself."""
 
+LOOK_S = 1.0
+"""Seconds between looks at whether a process lives: what it forked may hold its pipe open."""
+
+LOGGER = logging.getLogger(__name__)
+"""Told where an unexpected error came from."""
+
+_numbers = count()
+_is_spent = False
+
 
 def cores() -> int:
     """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def end_after_task() -> None:
+    """End this process of a pool once its task is done: other tasks are to find a clean one."""
+    global _is_spent
+    _is_spent = True
 
 
 @dataclass(frozen=True)
@@ -62,9 +79,9 @@ class Pool:
         Processes at the same time, at most. With 0 the tasks are done in this process, one after
         another and without a limit.
     prepare
-        Called once in each new process.
+        Called once in each process, before its first task.
     limit_s
-        Seconds that a task may take, start-up included.
+        Seconds that a task may take without a sign of progress, start-up included.
     """
 
     def __init__(
@@ -78,12 +95,17 @@ class Pool:
         return self
 
     def __exit__(self, *_: object) -> None:
-        workers = self._idle + self._busy
-        for worker in workers:
-            worker.pipe.close()
-        until = monotonic() + GRACE_S
-        for worker in workers:
-            worker.end(max(0.0, until - monotonic()))
+        self.end()
+
+    def start(self) -> None:
+        """Start the processes now, so that they get ready while this one does other things."""
+        while len(self._idle) + len(self._busy) < self._count:
+            self._idle.append(_Worker(self._prepare))
+
+    def do(self, task: Task) -> Any:
+        """Do one task, and return what it returned, or raise what it raised."""
+        ((_, outcome),) = self.each([task])
+        return outcome.result()
 
     def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
         """Do tasks; yields each as it is finished, with its outcome.
@@ -93,6 +115,7 @@ class Pool:
         process that ended, and when the time is over.
         """
         if self._count == 0:
+            self._prepare()
             for task in tasks:
                 yield task, _done_here(task)
             return
@@ -103,29 +126,44 @@ class Pool:
             self._fill(waiting)  # so that no process waits for what is done with the results
             yield from finished
 
+    def end(self) -> None:
+        """End the processes, whatever they do."""
+        workers, self._idle, self._busy = self._idle + self._busy, [], []
+        for worker in workers:
+            worker.pipe.close()
+        until = monotonic() + GRACE_S
+        for worker in workers:
+            worker.end(max(0.0, until - monotonic()))
+
     def _fill(self, waiting: Iterator[Task]) -> None:
         """Give tasks to idle and new processes."""
         self._idle = [worker for worker in self._idle if worker.process.is_alive()]
         for task in islice(waiting, self._count - len(self._busy)):
             worker = self._idle.pop() if self._idle else _Worker(self._prepare)
-            worker.give(task, self._limit_s)
             self._busy.append(worker)
+            worker.give(task, self._limit_s)
 
     def _finished(self) -> list[tuple[Task, Future[Any]]]:
         """Wait for messages, or the end of somebody's time; return the tasks that are over."""
         first = min(worker.deadline for worker in self._busy)
         ready = connection.wait(
             [worker.pipe for worker in self._busy],
-            None if first == inf else max(0.0, first - monotonic()),
+            max(0.0, min(LOOK_S, first - monotonic())),
         )
         for worker in self._busy:
             if worker.pipe in ready:
-                worker.receive()
+                worker.receive(self._limit_s)
+            elif not worker.process.is_alive():
+                worker.gone()
             elif worker.deadline <= monotonic():
-                worker.lose(f"it took longer than {self._limit_s:g} s, and was ended.")
+                worker.lose(f"it took {self._limit_s:g} s without any progress, and was ended.")
         over = [worker for worker in self._busy if worker.outcome.done()]
         self._busy = [worker for worker in self._busy if worker not in over]
-        self._idle += over
+        for worker in over:
+            if worker.is_spent:
+                worker.end()
+            else:
+                self._idle.append(worker)
         return [(worker.task, worker.outcome) for worker in over]
 
 
@@ -135,33 +173,50 @@ class _Worker:
     task: Task
     outcome: Future[Any]
     deadline: float
+    number: int
 
     def __init__(self, prepare: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
+        self.is_spent = False
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
-        self.process.start()
+        with _deaf():
+            self.process.start()
         theirs.close()  # so that the end of the process is the end of the pipe
         self._send(prepare)
 
     def give(self, task: Task, limit_s: float) -> None:
-        self.task, self.outcome, self.deadline = task, Future(), monotonic() + limit_s
-        self._send((task.name, task.function, task.arguments, task.progress is not None))
+        self.task, self.outcome, self.number = task, Future(), next(_numbers)
+        self.deadline = monotonic() + limit_s
+        self._send((self.number, task.function, task.arguments, task.progress is not None))
 
-    def receive(self) -> None:
+    def receive(self, limit_s: float) -> None:
         """Take one message, which may be the outcome of the task."""
         try:
-            kind, content = self.pipe.recv()
+            number, kind, content, self.is_spent = self.pipe.recv()
         except (EOFError, OSError):
-            self.lose(_reason(self.end()))
+            self.gone()
+            return
+        except Exception as error:  # whatever cannot be unpickled here
+            self.lose(f"its answer cannot be read: {type(error).__name__}: {error}")
+            return
+        if number != self.number:  # an answer to nothing that was asked
+            return
+        self.deadline = monotonic() + limit_s
+        if kind == "progress":
+            self.task.progress(*content)
+        elif kind == "unexpected":
+            self.outcome.set_exception(LostProcessError(f"{self.task.name}: {content}"))
         else:
-            if kind == "progress":
-                self.task.progress(*content)
-            else:
-                getattr(self.outcome, kind)(content)
+            getattr(self.outcome, kind)(content)
+
+    def gone(self) -> None:
+        """Say as the outcome of the task that the process ended."""
+        self.lose(_reason(self.end()))
 
     def lose(self, reason: str) -> None:
         """End the process, and say why as the outcome of its task."""
+        self.is_spent = True
         self.end()
         self.outcome.set_exception(LostProcessError(f"{self.task.name}: {reason}"))
 
@@ -178,6 +233,16 @@ class _Worker:
     def _send(self, message: object) -> None:
         with suppress(ConnectionError):  # a process that is gone is noticed in `receive`
             self.pipe.send(message)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Hold back signals, which a process that is started meanwhile never hears."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _done_here(task: Task) -> Future[Any]:
@@ -200,39 +265,58 @@ def _reason(code: int | None) -> str:
 
 def _work(pipe: Any) -> NoReturn:
     """Do what comes through the pipe, until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
-    os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
     os.setpgid(0, 0)
+    os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
+    os.register_at_fork(after_in_child=pipe.close)  # only this process answers
     os.dup2(2, 1)  # standard output is for the results of the process that asked
     guard = subprocess.Popen(GUARD, stdin=parent_process().sentinel)  # noqa: F841  lives as long
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     if FIRST_VICTIM.exists():
         FIRST_VICTIM.write_text("1000")
-    with suppress(EOFError, ConnectionError):
-        pipe.recv()()  # prepares
-        while True:
-            _tell(pipe, *_answer(pipe, *pipe.recv()))
-    os._exit(0)  # nobody is listening any more
+    waiting = [_asked(pipe)]  # what prepares, until it has
+    while True:
+        number, *call = _asked(pipe)
+        _tell(pipe, number, *_answer(pipe, number, waiting, *call))
+
+
+def _asked(pipe: Any) -> Any:
+    try:
+        return pipe.recv()
+    except (EOFError, OSError):
+        os._exit(0)  # nobody is there any more
 
 
 def _answer(
-    pipe: Any, name: str, function: Callable[..., Any], arguments: tuple, with_progress: bool
+    pipe: Any,
+    number: int,
+    waiting: list[Callable[[], object]],
+    function: Callable[..., Any],
+    arguments: tuple,
+    with_progress: bool,
 ) -> tuple[str, Any]:
-    """Return how a task ended: the method of its outcome to call, and the argument."""
+    """Return how a task ended, and what of it: the method of its outcome to call, and with what."""
 
     def progress(*told: Any) -> None:
-        _tell(pipe, "progress", told)
+        _tell(pipe, number, "progress", told)
 
     try:
+        while waiting:
+            waiting[0]()
+            waiting.pop()
         return "set_result", function(*arguments, *([progress] if with_progress else []))
     except FotismosError as error:
         return "set_exception", error
     except Exception as error:  # whatever a task brings about is its own failure
-        traceback.print_exc()
-        return "set_exception", LostProcessError(f"{name}: {type(error).__name__}: {error}")
+        LOGGER.info("a task failed", exc_info=True)
+        return "unexpected", f"{type(error).__name__}: {error}"
 
 
-def _tell(pipe: Any, kind: str, content: Any) -> None:
+def _tell(pipe: Any, number: int, kind: str, content: Any) -> None:
     try:
-        pipe.send((kind, content))
-    except ConnectionError:
+        pipe.send((number, kind, content, _is_spent))
+    except OSError:  # nobody listens, or this is the fork of a process that answers
         os._exit(0)
+    except Exception as error:  # what cannot be pickled
+        told = f"its result cannot be sent: {type(error).__name__}: {error}"
+        pipe.send((number, "unexpected", told, _is_spent))

@@ -104,7 +104,10 @@ def render(ready, options, counted, progress, kept=None):
     """
     halves = (ready.heuristic, ready.reference)
     sums = [Mean(), Accumulator(), DifferenceSums(counted)]
-    done = before = _restore(kept.load() if kept else None, sums, halves)
+    state = kept.load() if kept else None
+    if not _fits(state or {}, sums, halves, counted.shape, ready.passes):
+        state = None
+    done = before = _restore(state, sums, halves)
     reached = None
     loop = passes(halves, options.seed, ready.passes, first=before, progress=progress)
     for one in loop:
@@ -167,6 +170,25 @@ def _state(sums, halves):
         state[f"times{number}"] = np.array(half.times)
         state[f"compilation{number}"] = np.array(half.compilation)
     return state
+
+
+def _fits(state, sums, halves, size, passes):
+    """Tell whether a state is one of these sums of images (H, W), of at most so many passes."""
+    count = state.get("sum0_count")
+    if count is None or count.shape or count.dtype.kind != "i" or not 1 <= count <= passes:
+        return False
+    shapes = {}
+    for number, total in enumerate(sums):
+        shapes |= {f"sum{number}_{name}": shape for name, shape in total.shapes(size).items()}
+    for number in range(len(halves)):
+        shapes |= {f"times{number}": (int(count),), f"compilation{number}": ()}
+    if {name: array.shape for name, array in state.items()} != shapes:
+        return False
+    counts = {name for name in shapes if name.endswith("_count")}
+    if any(state[name] != count for name in counts):
+        return False
+    doubles = [array for name, array in state.items() if name not in counts]
+    return all(array.dtype == float and np.isfinite(array).all() for array in doubles)
 
 
 def _restore(state, sums, halves):

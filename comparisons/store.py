@@ -1,21 +1,41 @@
 """What was computed once, kept in a file, and found again by a key of all that it depends on.
 
 A file holds a mapping: as JSON, or as arrays where its name ends in ``.npz``. The key stands in it
-as well, so that what belongs to another scene, other options or another version is not used.
+as well, so that what belongs to another scene, other options or another version is not used. A
+checksum (that of ZIP for arrays) tells what was damaged, which is computed again.
 """
 
 import json
+import os
+import stat
 from collections.abc import Mapping
+from hashlib import sha256
+from math import prod
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
+from typing import Any, BinaryIO
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 
 from comparisons import atomic
+from heuristic.errors import InputError
 
 KEY = "key"
 """What the file calls the key."""
+
+LARGEST = 2**30
+"""Bytes of the largest file that is read at once: far beyond any that is written."""
+
+
+def content(path: str | Path, largest: int = LARGEST) -> bytes:
+    """Return what is in a regular file.
+
+    Raises ``OSError``, without opening it, for what is not a regular file (opening a FIFO waits for
+    ever) or has more than ``largest`` bytes.
+    """
+    require_regular(path, largest)
+    with Path(path).open("rb") as file:
+        return file.read(largest)
 
 
 class Entry:
@@ -33,32 +53,94 @@ class Entry:
         self.path, self.key = Path(path), key
 
     def load(self) -> dict[str, Any] | None:
-        """Return the result; None where there is none, a damaged one, or one of another key."""
+        """Return the result; None where there is none, a damaged one, or one of another key.
+
+        Arrays are never of objects. Whether the mapping holds what it should is the caller's to
+        check.
+        """
         try:
-            content = self._read()
-            return content if str(content.pop(KEY)) == self.key else None
-        except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, AttributeError):
+            return self._arrays() if self._is_arrays() else self._json()
+        # What is wrong with a damaged file shows in many ways; the answer to all is the same.
+        except Exception:
             return None
 
     def save(self, content: Mapping[str, Any]) -> None:
-        """Put a result in place of what is there."""
-        content = {**content, KEY: self.key}
-        with atomic.replacing(self.path) as partial:
-            if self._is_arrays():
-                with partial.open("wb") as file:
-                    np.savez(file, **content)
-            else:
-                partial.write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
+        """Put a result in place of what is there.
+
+        Raises
+        ------
+        InputError
+            When the place cannot be written to, or holds something other than a file.
+        """
+        try:
+            if self.path.exists():
+                require_regular(self.path)
+            with atomic.replacing(self.path) as partial:
+                if self._is_arrays():
+                    with partial.open("wb") as file:
+                        np.savez(file, **content, **{KEY: self.key})
+                else:
+                    body = json.dumps(content, ensure_ascii=False).encode()
+                    partial.write_bytes(self._head(body) + body + b"}")
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: {error.strerror or error}. Results are kept there: make room,"
+                " or choose another output folder with -o."
+            ) from error
 
     def remove(self) -> None:
-        """Delete the file."""
-        self.path.unlink(missing_ok=True)
+        """Delete the file; what is not a file stays."""
+        if self.path.is_file():
+            self.path.unlink(missing_ok=True)
 
     def _is_arrays(self) -> bool:
         return self.path.suffix == ".npz"
 
-    def _read(self) -> dict[str, Any]:
-        if not self._is_arrays():
-            return json.loads(self.path.read_text(encoding="utf-8"))
-        with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+    def _head(self, body: bytes) -> bytes:
+        """Return what stands before the content: the key, and the content's checksum."""
+        key = json.dumps(self.key, ensure_ascii=False)
+        return f'{{"{KEY}": {key}, "sha256": "{sha256(body).hexdigest()}", "content": '.encode()
+
+    def _json(self) -> dict[str, Any] | None:
+        text = content(self.path)
+        body = text[len(self._head(b"")) : -1]
+        found = json.loads(body) if text == self._head(body) + body + b"}" else None
+        return found if isinstance(found, dict) else None
+
+    def _arrays(self) -> dict[str, Any] | None:
+        require_regular(self.path)
+        with self.path.open("rb") as stream, ZipFile(stream) as archive:
+            members = archive.infolist()
+            size = sum(member.file_size for member in members)
+            # Only what is not compressed is bounded by the size of the file.
+            stored = all(member.compress_type == ZIP_STORED for member in members)
+            if not stored or size > self.path.stat().st_size:
+                return None
+            found = {}
+            for member in members:
+                with archive.open(member) as file:
+                    found[member.filename.removesuffix(".npy")] = _array(file)
+        return found if str(found.pop(KEY)) == self.key else None
+
+
+def _array(file: BinaryIO) -> np.ndarray:
+    """Read one array in NumPy's format, whose header must tell the size of what follows."""
+    version = np.lib.format.read_magic(file)
+    if version != (1, 0):
+        raise ValueError("another version of the format")
+    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file)
+    if dtype.hasobject:
+        raise ValueError("an array of objects")
+    content = file.read()
+    if len(content) != prod(shape) * dtype.itemsize:
+        raise ValueError("an array of another size")
+    return np.ndarray(shape, dtype, content, order="F" if is_fortran else "C")
+
+
+def require_regular(path: str | Path, largest: int | None = None) -> None:
+    """Raise ``OSError`` for what is not a regular file, or has more than ``largest`` bytes."""
+    found = os.stat(path)
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(None, "it is not a regular file")
+    if largest is not None and found.st_size > largest:
+        raise OSError(None, f"it has {found.st_size} bytes, and at most {largest} are read")

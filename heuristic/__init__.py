@@ -1,13 +1,26 @@
 """The heuristic side: the textbook illumination model as a Dr.Jit kernel and as Mitsuba plugins."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from heuristic import backend
+from heuristic.version import __version__
 
-backend.configure()  # Dr.Jit looks for LLVM once, at its first import, which comes below
+if TYPE_CHECKING:
+    from heuristic.lights import DirectionalLight, PointLight, SpotLight
+    from heuristic.materials import Material
+    from heuristic.shading import shade
 
-from heuristic.lights import DirectionalLight, PointLight, SpotLight  # noqa: E402
-from heuristic.materials import Material  # noqa: E402
-from heuristic.shading import shade  # noqa: E402
-from heuristic.version import __version__  # noqa: E402
+backend.configure()  # Dr.Jit looks for LLVM once, at its first import
+
+HOMES = {
+    "DirectionalLight": "heuristic.lights",
+    "Material": "heuristic.materials",
+    "PointLight": "heuristic.lights",
+    "SpotLight": "heuristic.lights",
+    "shade": "heuristic.shading",
+}
+"""Where names come from when they are asked for: errors and options need no Dr.Jit."""
 
 __all__ = [
     "DirectionalLight",
@@ -20,7 +33,13 @@ __all__ = [
 ]
 
 
-def register():
+def __getattr__(name: str) -> object:
+    if name not in HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(HOMES[name]), name)
+
+
+def register() -> None:
     """Make the Mitsuba plugins known for the current variant (:mod:`heuristic.plugins`)."""
     from heuristic import plugins  # the kernel alone needs no Mitsuba
 

@@ -1,6 +1,25 @@
 """``python -m reports`` is ``fotismos``."""
 
-from reports.cli import main
+import os
+import sys
+from pathlib import Path
+
+from comparisons import interruption
+from heuristic.program import VARIABLE
+
+
+def main() -> None:
+    """Run the command line, which signals may end at any moment."""
+    interruption.listen()
+    if Path(sys.argv[0]).name == "__main__.py":
+        os.environ.setdefault(VARIABLE, "python -m reports")
+    try:
+        from reports import cli  # within reach of the signals
+
+        cli.main()
+    except KeyboardInterrupt as error:
+        sys.exit(interruption.code_of(error))
+
 
 if __name__ == "__main__":
     main()

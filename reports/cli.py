@@ -1,9 +1,12 @@
 """The command line.
 
-Exit codes: 0 done; 1 a check failed; 2 bad input or installation. A mistake of the user's gets one
-message on standard error, never a traceback.
+Exit codes: 0 done; 1 a check failed; 2 bad input or installation; 130, 143 and 129 after Ctrl-C,
+SIGTERM and SIGHUP. A mistake of the user's gets one message on standard error, never a traceback.
 """
 
+import os
+import shlex
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -12,7 +15,9 @@ from pkgutil import iter_modules
 import click
 
 import reports.commands
-from heuristic.errors import FotismosError
+from comparisons import interruption
+from heuristic.errors import FotismosError, suggestion
+from heuristic.program import program
 from heuristic.version import __version__
 
 
@@ -31,7 +36,22 @@ class Commands(Mapping[str, click.Command]):
         return sum(1 for _ in self)
 
 
+class Group(click.Group):
+    """A group that knows what a mistyped command was meant to be."""
+
+    def resolve_command(self, context: click.Context, words: list[str]):
+        """Find the command that the first word names."""
+        word = words[0]
+        if self.get_command(context, word) is None and not word.startswith("-"):
+            near = suggestion(word, self.commands)
+            context.fail(
+                f"{word!r} is not a command{near}: choose one of {', '.join(self.commands)}."
+            )
+        return super().resolve_command(context, words)
+
+
 @click.group(
+    cls=Group,
     commands=Commands(),
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
@@ -55,19 +75,22 @@ def cli():
 def main():
     """Run the command line; the exit code says how it went."""
     try:
-        code = cli(prog_name="fotismos", standalone_mode=False)
-    except (click.exceptions.Abort, KeyboardInterrupt):
+        code = cli(prog_name=shlex.join(program()), standalone_mode=False)
+    except (click.exceptions.Abort, KeyboardInterrupt) as error:
         click.echo(
             "fotismos: interrupted; finished scenes are kept, and the same command goes on.",
             err=True,
         )
-        sys.exit(130)
+        sys.exit(interruption.code_of(error.__cause__ or error))
     except click.ClickException as error:
         error.show()
         sys.exit(2)
     except FotismosError as error:
         click.echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
+    except BrokenPipeError:  # who read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(128 + signal.SIGPIPE)
     else:
         if code:  # what a command left with, which is None where it said nothing
             sys.exit(code)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import logging
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from comparisons.pool import Pool
+from heuristic import program
 from heuristic.backend import VARIANTS
+from heuristic.errors import InputError, suggestion
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
@@ -39,6 +47,37 @@ def complete_scene(context, parameter, beginning):
     named = [name for name in SCENES if name.startswith(beginning)]
     found = [CompletionItem(name, help=SCENES[name].title) for name in named]
     return found or [CompletionItem(beginning, type="file")]
+
+
+def require_known(names: Iterable[str]) -> None:
+    """Ensure, before anything is loaded, that there are such files, folders and built-in scenes.
+
+    Raises
+    ------
+    InputError
+        Naming what was probably meant.
+    """
+    from comparisons.gallery.builtin import builtin
+
+    for name in names:
+        path = Path(name)
+        if path.exists():
+            continue
+        if path.suffix in (".xml", ".py") or path.parent.name:
+            siblings = {str(path.with_name(one)) for one in _names_in(path.parent)}
+            raise InputError(
+                f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
+                " (.xml), a Python file that makes one (.py), a folder of such, or the name of a"
+                f" built-in scene; `{program.command('scenes')}` lists them."
+            )
+        builtin(name)
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
 
 
 scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
@@ -100,6 +139,8 @@ def rendering_options(command):
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
+        click.option("--allow-empty", is_flag=True,
+                     help="Take pictures in which no pixel sees a surface."),
     )  # fmt: skip
 
 
@@ -120,8 +161,34 @@ def _with(command, *options):
     return command
 
 
-def make_ready():
-    """Ensure that LLVM is usable, and keep standard output for results.
+scripts_option = click.option(
+    "--scripts", is_flag=True, help="Run the Python scripts in folders too, which are code."
+)
+timeout_option = click.option(
+    "--timeout",
+    default=1800.0,
+    show_default=True,
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="End a scene that makes no progress for so long.",
+)
+
+PROCESSES = 1
+"""Processes of a command that read and render scenes; with 0 it does so itself, as tests do."""
+
+
+def pool(timeout: float, processes: int | None = None) -> Pool:
+    """Return where scenes are read and rendered: apart from the process that the user sees.
+
+    A scene may run code of its own, and native code may crash or hang. ``timeout`` is the time in
+    seconds that a task may take without any progress.
+    """
+    count = PROCESSES if processes is None or not PROCESSES else processes
+    return Pool(count, partial(prepare, verbosity.level()), timeout)
+
+
+def prepare(level: int) -> None:
+    """Get a process ready to render: what Mitsuba says is heard where ``level`` is 1, verbose.
 
     Raises
     ------
@@ -131,21 +198,80 @@ def make_ready():
     from heuristic import backend
 
     backend.check()
-    verbosity.divert_mitsuba()
+    from reference.scene import messages
+
+    messages.divert(_print if level > 0 else _pass_over)
+    if level > 0:
+        logging.basicConfig(level=logging.INFO)
+    import comparisons.compare  # noqa: F401  part of start-up
 
 
-def expand(names: Iterable[str]) -> list[str]:
-    """Return the names of scenes, with the scenes in it in place of each folder."""
-    return [scene for name in names for scene in _within(Path(name)) or [name]]
+def _print(text: str) -> None:
+    click.echo(text, err=True)
 
 
-def _within(folder: Path) -> list[str]:
+def _pass_over(text: str) -> None:
+    """Records state what concerns them."""
+
+
+def command_line() -> str:
+    """Return the command that the user gave, as a shell takes it."""
+    return program.command(*sys.argv[1:])
+
+
+def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
+    """Return the names of scenes, with the scenes in it in place of each folder.
+
+    Scripts in a folder are run only ``with_scripts``; one that is named is always.
+
+    Raises
+    ------
+    InputError
+        For a folder without a scene.
+    """
+    return [scene for name in names for scene in _within(Path(name), with_scripts) or [name]]
+
+
+def _within(folder: Path, with_scripts: bool) -> list[str]:
     """Return the scenes in a folder; none for what is not one."""
     if not folder.is_dir():
         return []
-    from reference.scene.script import scenes_in
+    from reference.scene.folders import scenes_in
 
-    return list(map(str, scenes_in(folder)))
+    found = scenes_in(folder)
+    if with_scripts:
+        return list(map(str, sorted((*found.written, *found.scripts))))
+    if found.scripts:
+        scripts = ", ".join(str(path.relative_to(folder)) for path in found.scripts)
+        told = f"{folder}: {scripts}: scripts are code, which only --scripts runs"
+        if not found.written:
+            raise InputError(f"{told}. There is no other scene.")
+        click.echo(f"fotismos: {told}.", err=True)
+    return list(map(str, found.written))
+
+
+def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
+    """Return what is asked for about each of some scenes: values for the placeholders it has.
+
+    Raises
+    ------
+    InputError
+        For a value that no scene has a placeholder for.
+    """
+    if len(scenes) == 1 or not whole.define:
+        return [whole] * len(scenes)
+    from reference.scene.source import placeholders
+
+    own = [
+        {key: value for key, value in whole.define.items() if key in placeholders(Path(scene))}
+        for scene in scenes
+    ]
+    if unused := set(whole.define) - {key for each in own for key in each}:
+        raise InputError(
+            f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
+            " scene file, or leave the option out."
+        )
+    return [replace(whole, define=define) for define in own]
 
 
 def request(words: Mapping[str, Any]) -> Request:

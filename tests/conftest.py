@@ -12,6 +12,7 @@ import pytest
 
 from heuristic import plugins
 from reference.rendering import direct
+from reports import jobs
 from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
@@ -37,9 +38,21 @@ def spectral():
     yield from in_variant("llvm_ad_spectral")
 
 
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    """Let commands render in this process, which has loaded all that they need."""
+    monkeypatch.setattr(jobs, "PROCESSES", 0)
+
+
+@pytest.fixture
+def apart(monkeypatch, in_this_process):
+    """Let commands render in a process apart, as they do for their users."""
+    monkeypatch.setattr(jobs, "PROCESSES", 1)
+
+
 @pytest.fixture
 def run(monkeypatch, capsys):
-    """Run the command line in this process; returns exit code, output and messages."""
+    """Run the command line, all in this process; returns exit code, output and messages."""
 
     from reports.cli import main
 

@@ -118,7 +118,7 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
 
 
 @pytest.mark.guarantee("runs", "A scene that kills its process takes no other along.")
-def test_a_scene_that_kills_its_process_takes_no_other_along(run, folder, tmp_path):
+def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
     (folder / "c.py").write_text(GOOD)
     (folder / "notes.py").write_text("raise SystemExit('this is no scene')")

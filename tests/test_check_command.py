@@ -262,7 +262,7 @@ def test_github_gets_errors_and_a_summary(tmp_path):
     first, second = annotations.annotate(results, tmp_path, 0.01, environment)
     place = f"{Path.cwd().name}/a%25b%2Cc%3Ad.json"
     assert first.startswith(f"::error file={place},title=fotismos check%3A a%25b%2Cc%3Ad::dE2000")
-    assert second.endswith("::line 1%0Aline | 2 <b>")
+    assert second.endswith("title=fotismos check%3A second not checked::line 1%0Aline | 2 <b>")
     text = summary.read_text(encoding="utf-8")
     assert text.startswith("before\n### fotismos check\n")
     assert "| a%b,c:d | failed | dE2000 (1 in all) | 2 | 3 | +9.0 | 1e-07 |" in text
@@ -282,7 +282,7 @@ def test_gitlab_gets_a_code_quality_report(tmp_path):
 
 def test_azure_gets_issues_and_a_summary(tmp_path):
     issue, summary = annotations.annotate([failure("a;b]")], tmp_path, 0.01, {"TF_BUILD": "True"})
-    assert issue.startswith("##vso[task.logissue type=error;sourcepath=a%3Bb%5D.json]a;b]: dE2000")
+    assert issue.startswith("##vso[task.logissue type=error;sourcepath=a%3Bb%5D.json]fotismos")
     assert summary == f"##vso[task.uploadsummary]{tmp_path / 'summary.md'}"
     assert "fotismos check" in (tmp_path / "summary.md").read_text(encoding="utf-8")
 
@@ -291,7 +291,8 @@ def test_teamcity_gets_problems(tmp_path):
     result = failure("it's [Δ]", "one\ntwo")
     (line,) = annotations.annotate([result], tmp_path, 0.01, {"TEAMCITY_VERSION": "2024.1"})
     assert line == (
-        "##teamcity[buildProblem description='fotismos check: it|'s |[|0x0394|]: one|ntwo']"
+        "##teamcity[buildProblem description="
+        "'fotismos check: it|'s |[|0x0394|] not checked: one|ntwo']"
     )
 
 

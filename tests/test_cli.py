@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import jsonschema
-import mitsuba as mi
 import pytest
 
 from reports import cli
@@ -162,16 +161,25 @@ def test_plan_prints_a_table_and_json(run):
     assert all(effect["called_for"] for effect in data["effects"])
 
 
-def test_what_mitsuba_says_is_no_part_of_the_json(monkeypatch, capfd):
+def test_what_mitsuba_says_is_for_those_who_ask(apart, monkeypatch, capfd):
     """As the process prints it: Mitsuba writes past Python."""
     words = ["fotismos", "plan", "narrow-band-lamp", "--json", "--resolution", "16x16"]
-    monkeypatch.setattr(sys, "argv", words)
-    cli.main()
-    printed, messages = capfd.readouterr()
-    assert json.loads(printed)["effects"]
-    assert "out-of-gamut" in messages
-    mi.Log(mi.LogLevel.Warn, "after the command")
-    assert "after the command" in capfd.readouterr().out
+    for more, is_told in (([], False), (["-v"], True)):
+        monkeypatch.setattr(sys, "argv", [*words, *more])
+        cli.main()
+        printed, messages = capfd.readouterr()
+        assert json.loads(printed)["effects"]
+        assert ("out-of-gamut" in messages) == is_told
+
+
+def test_what_mitsuba_says_stands_in_the_record_once(run, tmp_path):
+    out = tmp_path / "out"
+    words = ("compare", "narrow-band-lamp", "--resolution", "16x16", "--spp", 8, "-o", out)
+    assert run(*words)[2] == ""
+    record = json.loads((out / "narrow-band-lamp/comparison.json").read_text(encoding="utf-8"))
+    told = [warning for warning in record["warnings"] if warning.startswith("Mitsuba: ")]
+    assert len(told) == len(set(told)) > 0
+    assert all("\x1b" not in warning for warning in told)
 
 
 def test_plan_names_the_premise_that_fails(run):

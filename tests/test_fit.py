@@ -374,7 +374,7 @@ def test_what_cannot_be_fitted_is_refused(rgb):
         FitOptions(forms=())
     away = builtin("fig-8-6a").make()
     away["sensor"]["to_world"] = mi.ScalarTransform4f().look_at((0, -8, 3), (0, -9, 3), (0, 0, 1))
-    with pytest.raises(InputError, match="sees no surface"):
+    with pytest.raises(InputError, match="no pixel sees a surface"):
         fit(Source("away", away), Options(resolution=(8, 8), spp=4))
 
 

@@ -17,7 +17,8 @@ MOST = 131
 
 COMPARE = """
 import sys
-from reports import cli
+from reports import cli, jobs
+jobs.PROCESSES = 0
 sys.argv = ["fotismos", "compare", "fig-8-9", "--resolution", "16x16", "-o", sys.argv[1], "-q"]
 cli.main()
 print(*sorted(sys.modules))

@@ -99,7 +99,7 @@ def test_one_process_does_task_after_task_once_it_is_prepared(tmp_path):
     assert path.read_text() == "once\n"
 
 
-def test_a_task_that_kills_its_process_takes_no_other_along(capfd):
+def test_a_task_that_kills_its_process_takes_no_other_along():
     with Pool(1) as pool:
         found = do(
             pool,
@@ -116,7 +116,6 @@ def test_a_task_that_kills_its_process_takes_no_other_along(capfd):
     assert messages["killed"].startswith("killed: its process was killed (SIGKILL)")
     assert messages["leaving"] == "leaving: its process ended with exit code 7."
     assert messages["dividing"].startswith("dividing: ZeroDivisionError: ")
-    assert "Traceback" in capfd.readouterr().err
 
 
 def test_what_a_task_prints_is_no_result(capfd):
@@ -139,7 +138,7 @@ def test_a_task_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
         pids = (tmp_path / "pids").read_text().split()
         assert ends(*pids)
     assert found["sum"] == 3
-    assert str(found["slow"]) == "slow: it took longer than 3 s, and was ended."
+    assert str(found["slow"]) == "slow: it took 3 s without any progress, and was ended."
 
 
 def test_what_is_under_way_ends_with_the_pool(tmp_path):

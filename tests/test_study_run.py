@@ -48,7 +48,8 @@ def test_a_point_after_the_first_compiles_nothing_and_makes_no_scene(
 
     monkeypatch.setattr(dr, "kernel_history", noted)
     rendered._kept.cache_clear()
-    for block in blocks(study(parameters, scene)):
+    wanted = blocks(study(parameters, scene))
+    for block in wanted:
         launched.append([])
         point.rows(block)
     first, *others = launched
@@ -57,7 +58,7 @@ def test_a_point_after_the_first_compiles_nothing_and_makes_no_scene(
         # By their hashes, since a cache on disk would hide what is compiled elsewhere.
         assert [kernel["hash"] for kernel in kernels] == [kernel["hash"] for kernel in first]
         assert all(kernel["cache_hit"] for kernel in kernels)
-    assert [kept.made for kept in rendered._kept(scene)] == [1, 1]
+    assert [kept.made for kept in rendered._kept(scene, block.identity)] == [1, 1]
 
 
 @pytest.mark.parametrize("scene", ["sphere", "enclosure"])

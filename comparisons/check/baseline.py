@@ -9,14 +9,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 from msgspec import Meta, structs
 
 from comparisons import record, records
+from comparisons.case import Request
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
 from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
 from comparisons.records import VERSION, Amount, Record, Versions, laid_out
 from heuristic.errors import InputError
+
+MOST_PASSES = 1024
+"""Far more than a t-test needs; their images are in memory together."""
+
+LARGEST = float(np.finfo(np.float32).max)
+"""Of the numbers: images are in single precision, and squares of errors must not overflow."""
 
 FORMAT_0_1 = '"format": "fotismos baseline 1"'
 """The first line of a baseline of fotismos 0.1; the others are as they were."""
@@ -46,7 +54,8 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
     Attributes
     ----------
     scene
-        A built-in name, or the path of a Mitsuba file, relative to the baseline's own folder.
+        A built-in name, or the path of a Mitsuba or a Python file, relative to the baseline's own
+        folder.
     options
         Rendering options by the names of the command line's; those at rest are left out.
     versions
@@ -61,7 +70,7 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
     record_version: int
     scene: str
     options: dict[str, Any]
-    passes: Annotated[int, Meta(ge=2)]
+    passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
     versions: Versions
     images: str | None = None
     metrics: dict[str, Metric]
@@ -105,14 +114,25 @@ def parse(text: str, name: str) -> Baseline:
     text = text.replace(FORMAT_0_1, f'"record_version": {VERSION}', 1)
     try:
         baseline = records.read(Baseline, text, name)
+        _require_scene(baseline.scene)
+        msgspec.convert(baseline.options, Request)
         _require_metrics(baseline.metrics)
-        _require_finite(baseline.measured())
-    except (InputError, ValueError) as error:
-        where = "" if isinstance(error, InputError) else f"{name}: "
+        _require_moderate(baseline)
+        baseline.text()  # what cannot be written, such as a NaN among the options, is none either
+    # Numbers too long for Python, and lists within lists without end, are not `ValueError` alone.
+    except (InputError, ValueError, OverflowError, RecursionError) as error:
+        where = "" if str(error).startswith(name) else f"{name}: "
         raise InputError(
             f"{where}{error} `fotismos check BASELINE --update --scene SCENE` writes it."
         ) from error
     return baseline
+
+
+def _require_scene(scene):
+    if not scene or not scene.isprintable():
+        raise ValueError(
+            f"the scene is {scene!r}: a built-in name or the path of a file is allowed."
+        )
 
 
 def _require_metrics(metrics):
@@ -124,11 +144,16 @@ def _require_metrics(metrics):
             raise ValueError(f"the metric {name!r} is missing.")
 
 
-def _require_finite(measured):
-    numbers = [*(metric.value for metric in measured.metrics.values())]
-    numbers += [c.mean() for one in measured.colours.values() for c in (one.whole, one.blocks)]
-    if not np.isfinite(numbers).all():
-        raise ValueError("a value is not finite.")
+def _require_moderate(baseline):
+    for metric in baseline.metrics.values():
+        _require_numbers(metric.value, metric.error, metric.noise_floor or 0.0)
+    for colours in baseline.measured().colours.values():
+        _require_numbers(*(values.ravel() for values in vars(colours).values()))
+
+
+def _require_numbers(*values):
+    if not (np.abs(np.hstack(values)) <= LARGEST).all():
+        raise ValueError(f"a number is not finite, or larger than {LARGEST:.2g}.")
 
 
 def _colours(half):

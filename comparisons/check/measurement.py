@@ -16,7 +16,6 @@ from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
 from comparisons.records import Amount, Record
-from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import passes
 
 PASSES = 16
@@ -138,9 +137,7 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
     """
     loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)
-    height, width = images.shape[2:4]
-    counted = gbuffer(ready.scene, width, height).hit
-    measured = measurement(images, counted, viewing)
+    measured = measurement(images, ready.surface.hit, viewing)
     return measured, Pictures(*images.mean(axis=0))
 
 

@@ -19,7 +19,7 @@ from comparisons.effects.prices import prices
 from comparisons.effects.split import split
 from comparisons.options import Options
 from comparisons.records import Machine, Pixels
-from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.gbuffer import image_size
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Accumulator, Mean, Renderer
 
@@ -79,7 +79,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     Raises
     ------
     InputError
-        When the scene cannot be read or paired.
+        When the scene cannot be read or paired, or no pixel of it sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -89,9 +89,9 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         options = replace(options, resolution=reduced(source, options, WIDTH))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
-    ready = guarded(source, replace(options, spp=None))
+    ready = guarded(source, replace(options, spp=None, allow_empty=False))
     width, height = image_size(ready.scene)
-    counted = gbuffer(ready.scene, width, height).hit
+    counted = ready.surface.hit
     reference, groups = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)
 

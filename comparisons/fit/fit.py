@@ -89,19 +89,17 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     ------
     InputError
         When the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
-        Phong interpolation, something can be seen through or has a texture for ``n``, or the camera
-        sees no surface.
+        Phong interpolation, something can be seen through or has a texture for ``n``, or no pixel
+        sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
     begin = perf_counter()
     chosen = chosen or FitOptions()
-    options = _completed(options or Options())
+    options = replace(_completed(options or Options()), allow_empty=False)
     ready = guarded(source.edited(filter_by_box), options)
     rendered = render(ready, options, progress or (lambda *_: None))
     rendering = perf_counter() - begin
-    if not rendered.counted.any():
-        raise InputError(f"{source.name}: the camera sees no surface, so that nothing can be fit.")
     attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
     fits, maps = _judged(ready, rendered, attempts, options.viewing, chosen.intensities)

@@ -7,7 +7,6 @@ import numpy as np
 
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
-from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.passes import passes
 from reference.rendering.renderer import Accumulator, add_difference, variant
 from reference.scene.graph import properties
@@ -54,6 +53,5 @@ def render(ready, options, progress):
         add_difference(sums, one.images)
         recorder.render(one.seed)
     before, reference, difference = (total.estimate() for total in sums)
-    seen = gbuffer(ready.scene, *image_size(ready.scene))
     with variant(VARIANT):
-        return Rendered(before.mean, reference, difference, recorder.surface(), seen.hit)
+        return Rendered(before.mean, reference, difference, recorder.surface(), ready.surface.hit)

@@ -4,14 +4,17 @@ A scene is a dictionary as ``mitsuba.load_dict`` takes it. The figures give ever
 field of view and the up vector; one camera that frames the sphere serves them all.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-
-import mitsuba as mi
+from typing import TYPE_CHECKING
 
 from heuristic.errors import InputError, suggestion
-from reference.scene.source import Source
+
+if TYPE_CHECKING:  # names are known at once, without Mitsuba
+    from reference.scene.source import Source
 
 RESOLUTION = 512
 FIELD_OF_VIEW = 40.0
@@ -43,8 +46,10 @@ class Scene:
     interpolation: str = "phong"
     tessellation: int | None = None
 
-    def source(self):
+    def source(self) -> Source:
         """Return the scene for :func:`reference.pair`."""
+        from reference.scene.source import Source
+
         return Source(self.name, self.make)
 
 
@@ -65,6 +70,8 @@ def builtin(name):
 
 
 def _camera(viewer):
+    import mitsuba as mi
+
     return {
         "type": "perspective",
         "fov": FIELD_OF_VIEW,
@@ -156,6 +163,8 @@ def _chapter_six():
 
 
 def _cornell_box():
+    import mitsuba as mi
+
     scene = mi.cornell_box()
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
     return scene
@@ -181,6 +190,8 @@ def _lambert_sphere():
 
 def _plastic_spheres():
     """Three rough plastic spheres, from sharp to dull, on a floor under a small square lamp."""
+    import mitsuba as mi
+
     scene = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 8},

@@ -18,44 +18,64 @@ of highlights holds where they exceed a thousandth."""
 
 
 @dataclass(frozen=True)
-class HardCase:
-    """A case: its name and group, what is hard about it, and the bound on the relative error.
-
-    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
-    """
+class Description:
+    """A case in words: its name and group, what is hard, and the bound on the relative error."""
 
     name: str
     group: str
     hard: str
     bound: float
+
+
+@dataclass(frozen=True)
+class HardCase(Description):
+    """A case, which can be evaluated.
+
+    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
+    """
+
     naive: Callable
     ours: Callable
     exact: Callable
     setting: Setting | None = None
 
+    def described(self):
+        """Return the words without the code, which cannot be sent to another process."""
+        return Description(self.name, self.group, self.hard, self.bound)
+
 
 @dataclass(frozen=True)
-class Convention:
-    """What is laid down where nothing is exact: no formula breaks, but somebody must decide.
-
-    ``ours`` takes nothing and returns what is to equal ``stated``, which ``text`` says in words.
-    """
+class Statement:
+    """What is laid down where nothing is exact: no formula breaks, but somebody must decide."""
 
     name: str
     text: str
     stated: object
+
+
+@dataclass(frozen=True)
+class Convention(Statement):
+    """A statement that can be tested.
+
+    ``ours`` takes nothing and returns what is to equal ``stated``, which ``text`` says in words.
+    """
+
     ours: Callable
 
     def holds(self):
         """Tell whether what is done is what is stated, to single precision."""
         return bool(np.allclose(self.ours(), self.stated, rtol=1e-6, atol=0))
 
+    def described(self):
+        """Return the words without the code."""
+        return Statement(self.name, self.text, self.stated)
+
 
 @dataclass(frozen=True)
 class Outcome:
     """A case and its two errors; infinite for a NaN, an infinity, or light where there is none."""
 
-    case: HardCase
+    case: Description
     naive_error: float
     our_error: float
 
@@ -68,7 +88,7 @@ class Outcome:
 def evaluate(case):
     """Return the :class:`Outcome` of a case."""
     exact = np.asarray(case.exact(), np.longdouble)
-    return Outcome(case, error(case.naive(), exact), error(case.ours(), exact))
+    return Outcome(case.described(), error(case.naive(), exact), error(case.ours(), exact))
 
 
 def error(found, exact):

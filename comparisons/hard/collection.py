@@ -16,7 +16,7 @@ from comparisons.hard import (
     samplers,
     surfaces,
 )
-from comparisons.hard.cases import Convention, Outcome, evaluate
+from comparisons.hard.cases import Outcome, Statement, evaluate
 from comparisons.hard.conventions import CONVENTIONS
 from comparisons.hard.furnace import Furnace
 from comparisons.hard.textbook import NAIVE, Setting, shade
@@ -44,12 +44,12 @@ class Picture:
 class HardCases:
     """All cases with their errors, what is laid down, pictures of some, and the models' energy.
 
-    ``conventions`` are pairs of a :class:`Convention` and whether it holds; ``furnaces`` have the
+    ``conventions`` are pairs of a :class:`Statement` and whether it holds; ``furnaces`` have the
     models' albedo under light from each of ``angles``, in degrees, and their asymmetry.
     """
 
     outcomes: tuple[Outcome, ...]
-    conventions: tuple[tuple[Convention, bool], ...]
+    conventions: tuple[tuple[Statement, bool], ...]
     pictures: tuple[Picture, ...]
     furnaces: tuple[Furnace, ...]
     angles: tuple[float, ...] = furnace.ANGLES
@@ -63,7 +63,9 @@ def collect():
     """Evaluate everything, in the current Mitsuba variant; a few seconds."""
     return HardCases(
         outcomes=tuple(map(evaluate, CASES)),
-        conventions=tuple((convention, convention.holds()) for convention in CONVENTIONS),
+        conventions=tuple(
+            (convention.described(), convention.holds()) for convention in CONVENTIONS
+        ),
         pictures=(
             _picture("A highlight of n = 1e6, 0.4 degrees wide", _highlight(1e6, 0.0035)),
             _picture("A highlight of n = 1e7, 0.13 degrees wide", _highlight(1e7, 0.00115)),

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 
 from comparisons import atomic
 from comparisons.record import versions
+from comparisons.store import require_regular
 from comparisons.study.columns import IDENTITY, PARAMETERS, Column, results
 from heuristic.errors import InputError
 
@@ -45,6 +46,28 @@ def table(study, rows):
     return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in rows], schema)
 
 
+def fits(rows, points):
+    """Tell whether something read from a file is rows of these points, as :func:`table` takes."""
+    if not isinstance(rows, list) or len(rows) != len(points):
+        return False
+    known = IDENTITY | PARAMETERS | results()
+    for row, point in zip(rows, points, strict=True):
+        if not isinstance(row, dict) or not {*IDENTITY, *point, "error"} <= row.keys():
+            return False
+        columns = known | dict.fromkeys(point, Column("", "a parameter"))
+        if any(row[name] != value for name, value in point.items()):
+            return False
+        if not all(name in columns and _is_of(columns[name], row[name]) for name in row):
+            return False
+    return True
+
+
+def _is_of(column, value):
+    if column.kind is float and type(value) is int:
+        return abs(value) < 2**53
+    return value is None or type(value) is column.kind
+
+
 def write(path, data):
     """Write a table to a Parquet file, atomically.
 
@@ -72,8 +95,14 @@ def read(path):
         When it is missing, or no Parquet file.
     """
     try:
-        return pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
+        require_regular(path)
+        found = pq.read_table(path)
+        found.validate(full=True)
+        missing = {"part", "point", "error"} - set(found.column_names)
+        if missing:
+            raise pa.ArrowInvalid(f"it has no column {', '.join(sorted(missing))}")
+        return found
+    except (OSError, pa.ArrowException) as error:
         raise InputError(
             f"{path} cannot be read as a dataset: {error}. Run the study again."
         ) from error

@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+from comparisons.case import SUFFIXES
 from comparisons.study.levels import Fixed, Span, values
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED
 from heuristic.errors import InputError, unknown
@@ -164,7 +165,7 @@ def _part(table, folder):
         spans[key] = values(raw, parameter, design == "grid", f"{where}: {key}")
     part = Part(
         name=name,
-        scene=str(folder / scene) if scene.endswith(".xml") else scene,
+        scene=str(folder / scene) if Path(scene).suffix in SUFFIXES else scene,
         spans=spans,
         design=design,
         count=_whole(table, "points", 0, where),

@@ -1,21 +1,24 @@
 """One block of points to rows: a pure function, the same in any process."""
 
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from itertools import groupby
 from json import dumps
-from pathlib import Path
 
 import numpy as np
 
+from comparisons import record
 from comparisons.study import rendered, surface
 from comparisons.study.design import Part
+from comparisons.study.editing import set_values
 from comparisons.study.measure import largest_miss, measure, measure_each
 from comparisons.study.scenes import SCENES
-from heuristic import __version__, plugins
+from heuristic import plugins
 from heuristic.errors import FotismosError, InputError
 from reference.rendering import direct
 from reference.scene.graph import set_variant
+from reference.scene.identity import digest
 
 VARIANT = "llvm_ad_rgb"
 PEAK_STEP = 0.05
@@ -26,32 +29,46 @@ LARGEST_BLOCK = 4096
 
 @dataclass(frozen=True)
 class Block:
-    """Points of one part that are evaluated together: ``first`` is the number of the first."""
+    """Points of one part that are evaluated together.
+
+    Attributes
+    ----------
+    first
+        Number of the first.
+    identity
+        Digest of the part's scene with every file that it reads, and of the versions in use.
+    """
 
     part: Part
     first: int
     points: tuple[dict, ...]
+    identity: str
 
     @property
     def key(self):
         """A name made out of all that the rows depend on, so that equal blocks are done once."""
         part = self.part
         content = {
-            "version": __version__,
             "scene": part.scene,
+            "identity": self.identity,
             "pairing": part.convention.value,
             "seed": part.seed,
             "resolution": part.resolution,
             "spp": part.spp,
             "points": self.points,
         }
-        if part.scene.endswith(".xml") and Path(part.scene).is_file():
-            content["file"] = sha256(Path(part.scene).read_bytes()).hexdigest()
         return sha256(dumps(content).encode()).hexdigest()[:32]
 
 
 def blocks(part):
-    """Return the blocks of a part: single points, or those that differ in directions alone."""
+    """Return the blocks of a part: single points, or those that differ in directions alone.
+
+    Raises
+    ------
+    InputError
+        When the part's scene cannot be read.
+    """
+    identity = _identity(part)
     scene = SCENES.get(part.scene)
     together = scene.together if scene else ()
 
@@ -66,9 +83,15 @@ def blocks(part):
         points = [point for _, point in group]
         for begin in range(0, len(points), LARGEST_BLOCK):
             some = tuple(points[begin : begin + LARGEST_BLOCK])
-            found.append(Block(part, first, some))
+            found.append(Block(part, first, some, identity))
             first += len(some)
     return found
+
+
+def _identity(part):
+    _prepare()
+    own = "" if part.scene in SCENES else digest(rendered.opened(part.scene))
+    return sha256(dumps([own, record.versions()], sort_keys=True).encode()).hexdigest()
 
 
 def check(part):
@@ -82,7 +105,8 @@ def check(part):
     if part.scene not in SCENES:
         _prepare()
         try:
-            rendered.source(part, next(iter(part.points()))).parse()
+            source = rendered.opened(part.scene)
+            source.edited(partial(set_values, values=next(iter(part.points())))).parse()
         except InputError as error:
             raise InputError(f"part {part.name!r}: {error}") from error
 
@@ -95,7 +119,7 @@ def rows(block):
     _prepare()
     part = block.part
     try:
-        results = _results(part, block.points)
+        results = _results(part, block)
         error = None
     # Whatever went wrong with one point must not end a study of thousands.
     except Exception as failure:
@@ -113,12 +137,12 @@ def _prepare():
     direct.register()
 
 
-def _results(part, points):
+def _results(part, block):
     if part.scene == "patch":
-        return _patch(part, points)
+        return _patch(part, block.points)
     if part.scene == "lobe":
-        return [_lobe(part, point) for point in points]
-    return [rendered.row(part, point) for point in points]
+        return [_lobe(part, point) for point in block.points]
+    return [rendered.row(part, point, block.identity) for point in block.points]
 
 
 def _patch(part, points):

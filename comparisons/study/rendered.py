@@ -27,16 +27,18 @@ PASSES = 4
 stratified. Four are enough to see what noise is left."""
 
 
-def row(part, point):
-    """Render a point and return its columns.
+def row(part, point, identity):
+    """Render a point and return its columns; the identity is that of :class:`point.Block`.
 
     Under the names of :data:`comparisons.study.columns.STEPS` are the root mean square changes of
     the image as each of them is simulated too; ``dominant`` names the largest.
     """
-    pair = halves.pair(source(part, point), part.convention, part.resolution)
-    kept = _kept(part.scene)
+    pair = halves.pair(_source(part, point, identity), part.convention, part.resolution)
+    kept = _kept(part.scene, identity)
     physical = kept[1].scene(with_sampler(pair.physical, sampler()))
-    chosen = _guarded(part, plan(pair, physical), physical, pair)
+    surface = gbuffer(physical, *image_size(physical))
+    surface.require_surface(part.scene)
+    chosen = _guarded(part, identity, plan(pair, physical), physical, pair)
     heuristic = kept[0].scene(with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES
     plans = _plans(chosen)
@@ -45,32 +47,39 @@ def row(part, point):
         integrator = physical_integrator(stage, physical, pair.hide_emitters)
         renderers.append(Renderer(physical, integrator, spp, "reference image"))
     images, noise = _render(renderers, part.seed)
-    counted = gbuffer(physical, *image_size(physical)).hit
+    counted = surface.hit
     result = measure(images[0], images[-1], counted, noise)
     result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
     result["miss"] = largest_miss(pair.misses)
     return result | (_derived(pair) if part.scene in SCENES else {})
 
 
-def source(part, point):
-    """Return the scene of a point, for :func:`reference.pair`.
+def opened(scene):
+    """Open a user's scene or a built-in one.
 
     Raises
     ------
     InputError
-        When a part's scene is neither a study scene nor a file nor built in, or not in RGB.
+        When it is neither a file nor built in, or not in RGB.
     """
+    case = open_case(scene)
+    if case.variant != RGB:
+        raise InputError(f"{scene} needs {case.variant}: studies are in RGB so far.")
+    return case.source
+
+
+def _source(part, point, identity):
     if part.scene in SCENES:
         return Source(part.scene, lambda: SCENES[part.scene].make(point, bsdf(point)))
-    return _opened(part.scene).edited(partial(set_values, values=point))
+    return _opened(part.scene, identity).edited(partial(set_values, values=point))
 
 
-def _guarded(part, chosen, physical, pair):
+def _guarded(part, identity, chosen, physical, pair):
     """Return a plan, or the one for everything where a probe of the plan disagrees.
 
     Probed is the first point of a part in this process, for each way in which its plans prune.
     """
-    key = part.name, chosen.simulated
+    key = part.name, part.scene, identity, chosen.simulated
     if key not in _guards:
         width, height = image_size(physical)
         samples = part.spp * width * height
@@ -86,16 +95,13 @@ _guards = {}
 
 
 @lru_cache(maxsize=4)
-def _opened(scene):
-    """Open a user's scene or a built-in one, once for all points in this process."""
-    case = open_case(scene)
-    if case.variant != RGB:
-        raise InputError(f"{scene} needs {case.variant}: studies are in RGB so far.")
-    return case.source
+def _opened(scene, identity):
+    """Open a scene once for all points in this process, as long as its files stay the same."""
+    return opened(scene)
 
 
 @lru_cache(maxsize=4)
-def _kept(scene):
+def _kept(scene, identity):
     """Return the scenes at hand of both halves, for all points of a scene in this process."""
     return Kept(), Kept()
 

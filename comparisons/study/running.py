@@ -6,6 +6,7 @@ So a run that ends early loses nothing, and the next one repeats nothing.
 
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from comparisons.pool import Pool, Task, cores
@@ -31,7 +32,20 @@ class Outcome:
     failed: int
 
 
-def run(study, folder, spread=None, progress=None):
+def all_blocks(study):
+    """Return the blocks of points of a study, of :class:`comparisons.study.point.Block`.
+
+    Raises
+    ------
+    InputError
+        When the scene of a part, or a path into it, does not exist.
+    """
+    for part in study.parts:
+        point.check(part)
+    return [block for part in study.parts for block in point.blocks(part)]
+
+
+def run(study, folder, spread=None, progress=None, blocks=None):
     """Do the points of a study that are not done yet, and put all together.
 
     Points that failed in an earlier run are done again.
@@ -48,6 +62,8 @@ def run(study, folder, spread=None, progress=None):
         process where it is not given.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
+    blocks : optional
+        What :func:`all_blocks` returned elsewhere: it reads the scenes, and runs scripts.
 
     Returns
     -------
@@ -56,23 +72,24 @@ def run(study, folder, spread=None, progress=None):
     Raises
     ------
     InputError
-        When the scene of a part, or a path into it, does not exist: before anything is rendered.
+        As :func:`all_blocks`, before anything is rendered.
     """
-    for part in study.parts:
-        point.check(part)
+    blocks = all_blocks(study) if blocks is None else blocks
     kept = Path(folder) / POINTS
     kept.mkdir(parents=True, exist_ok=True)
-    blocks = [block for part in study.parts for block in point.blocks(part)]
     entries = {block.key: Entry(kept / f"{block.key}.json", block.key) for block in blocks}
-    stored = {key: (entry.load() or {}).get("rows") for key, entry in entries.items()}
-    found = {key: rows for key, rows in stored.items() if rows and not _failed(rows)}
+    found = {}
+    for block in blocks:
+        rows = (entries[block.key].load() or {}).get("rows")
+        if dataset.fits(rows, block.points) and not _failed(rows):
+            found[block.key] = rows
     # Parts may share points; these are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
     at_hand = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
     report("points", done, total)
-    for block, rows in (spread or processes(1))(left):
+    for block, rows in (spread or processes(0))(left):
         entries[block.key].save({"rows": rows})
         found[block.key] = rows
         done += len(rows)
@@ -81,8 +98,11 @@ def run(study, folder, spread=None, progress=None):
     return Outcome(dataset.table(study, rows), done - at_hand, at_hand, _failed(rows))
 
 
-def processes(count):
+def processes(count, prepare=tuple, limit_s=inf):
     """Return what spreads blocks over so many processes of this machine, as `run` takes it.
+
+    ``prepare`` and ``limit_s`` are as of :class:`comparisons.pool.Pool`; with a ``count`` of 0 this
+    process does all.
 
     A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
     several processes keep all of them busy.
@@ -96,8 +116,8 @@ def processes(count):
     def spread(blocks):
         workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
         tasks = [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
-        threads = partial(_set_threads, max(1, cores() // workers))
-        with Pool(0 if workers == 1 else workers, threads) as pool:
+        ready = partial(_prepare, prepare, cores() // workers if workers else 0)
+        with Pool(workers, ready, limit_s) as pool:
             for task, rows in pool.each(tasks):
                 try:
                     yield task.arguments[0], rows.result()
@@ -110,10 +130,12 @@ def processes(count):
     return spread
 
 
-def _set_threads(number):
-    import drjit as dr
+def _prepare(prepare, threads):
+    prepare()
+    if threads:
+        import drjit as dr
 
-    dr.set_thread_count(number)
+        dr.set_thread_count(threads)
 
 
 def _named(block: Block, rows):

@@ -70,7 +70,10 @@ def of_smooth_plastic(level, int_ior, ext_ior, nonlinear):
     theta, weight = nodes(1.0)
     si, wo = _head_on(theta)
     value = bsdf.eval(mi.BSDFContext(), si, wo)
-    return float(weight @ np.array(value[0])), ((int_ior - ext_ior) / (int_ior + ext_ior)) ** 2
+    # Next to nothing comes out rounded, to either side of 0.
+    return max(float(weight @ np.array(value[0])), 0.0), (
+        (int_ior - ext_ior) / (int_ior + ext_ior)
+    ) ** 2
 
 
 def _head_on(theta):

@@ -15,6 +15,7 @@ BSDF = mi.ObjectType.BSDF
 COLOURS = {
     "diffuse": ("reflectance",),
     "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
+    "principled": ("base_color",),
     "phong": ("k_i", "k_a", "k_d", "k_s"),
 }
 """Colours that are read when a scene is paired, and checked before."""

@@ -106,6 +106,10 @@ class DifferenceSums(Accumulator):
         """Return the sums as arrays, for :meth:`restore`."""
         return super().state() | {"groups": self._groups.copy()}
 
+    def shapes(self, size):
+        """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
+        return super().shapes(size) | {"groups": self._groups.shape}
+
     def restore(self, state):
         """Go on from the :meth:`state` of another one."""
         super().restore(state)

@@ -88,6 +88,10 @@ class Mean:
         sums = {name: np.array(getattr(self, f"_{name}")) for name in self.SUMS}
         return {"count": np.array(self.count)} | sums
 
+    def shapes(self, size):
+        """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
+        return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
+
     def restore(self, state):
         """Go on from the :meth:`state` of another one."""
         self.count = int(state["count"])

@@ -5,13 +5,18 @@ dictionary, and knows the file and line of each node, which is what error messag
 """
 
 from contextlib import contextmanager
+from pathlib import Path
 
 import mitsuba as mi
+import numpy as np
 
 from heuristic import light
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, unknown
 from heuristic.plugins import mapped
+
+FILENAME = "filename"
+"""The parameter by which every plugin names the file that it reads."""
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -51,14 +56,14 @@ class Graph:
         self.state = state
         self.folders = []  # temporary ones with files that nodes refer to
         self.kinds = {}  # of plugins written in Python
-        self.folder = None  # where relative names of files begin
+        self.resolver = None  # where relative names of files begin, if not as Mitsuba has it
 
     def copy(self):
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
         copy.kinds = self.kinds
-        copy.folder = self.folder
+        copy.resolver = self.resolver
         return copy
 
     def instantiate(self, index=0):
@@ -80,11 +85,47 @@ class Graph:
         # wait for ever for another that waits for Python.
         self.config.parallel = not any(map(_is_python, state.nodes))
         try:
-            with files_from(self.folder):
+            with resolving(self.resolver):
                 made = Parser.instantiate(self.config, state)
-        except RuntimeError as error:
-            raise InputError(f"{self.name}: {_message(error)}") from error
-        return made[0] if isinstance(made, list) else made
+        except Exception as error:  # whatever a plugin raises, in Python or in Mitsuba
+            raise InputError(f"{self.name}: {_message(error)}{self._culprits(error)}") from error
+        made = made[0] if isinstance(made, list) else made
+        if isinstance(made, mi.Scene):
+            self._require_extents(made)
+        return made
+
+    def _culprits(self, error):
+        """Name the files that cannot be read, where a message names none."""
+        files = {index: self.file(index) for index in self.nodes_in_use()}
+        known = [(index, path) for index, path in files.items() if path is not None]
+        told = str(error).rpartition("plugin of type")[2]
+        if any(path.name in told for _, path in known):
+            return ""
+        found = [str(path) for index, path in known if self._fails(index)]
+        return f" (the file {', '.join(found)})" if found else ""
+
+    def _fails(self, index):
+        """Tell whether a node cannot be made by itself either."""
+        state = Parser.ParserState(self.state)
+        state.nodes[0] = Parser.SceneNode(state.nodes[index])
+        try:
+            with files_from(self.folder):
+                Parser.instantiate(self.config, state)
+        except Exception:
+            return True
+        return False
+
+    def _require_extents(self, scene):
+        """Refuse shapes that reach to infinity, of which no ray meets anything."""
+        for shape in scene.shapes():
+            box = shape.bbox()
+            ends = np.array([np.ravel(box.min), np.ravel(box.max)])
+            is_empty = (ends[0] > ends[1]).any()
+            if not (is_empty or np.isfinite(ends).all()):
+                raise InputError(
+                    f"{self.name}: {shape.id()}: the shape reaches from {ends[0]} to {ends[1]}."
+                    " Give it a finite size and place, its transforms and files included."
+                )
 
     def nodes(self, kind):
         """Return the indices of the nodes of a kind (``mitsuba.ObjectType``) that are in use."""
@@ -124,6 +165,22 @@ class Graph:
     def location(self, index):
         """Return where a node was written, as a person would look it up."""
         return Parser.file_location(self.state, self.state.nodes[index])
+
+    def file(self, index):
+        """Return the path of the file that a node reads; None where it reads none, or a lost one.
+
+        It is where Mitsuba finds it.
+        """
+        props = self.props(index)
+        name = props.get(FILENAME, None)
+        if not isinstance(name, str) or "\0" in name:
+            return None
+        with files_from(self.folder):
+            path = Path(str(mi.file_resolver().resolve(name)))
+        try:
+            return path if path.exists() else None
+        except OSError:  # a name that is too long
+            return None
 
     def children(self, index, kind):
         """Return ``(key, index)`` for the children of a node that are of a kind."""
@@ -175,16 +232,21 @@ class Graph:
         return sorted(seen)
 
 
-@contextmanager
 def files_from(folder):
-    """Let Mitsuba look for files in a scene's own folder first, as its own command does."""
-    if folder is None:
+    """Return what looks for files in a scene's own folder first, as Mitsuba's own command does."""
+    widened = mi.FileResolver(mi.file_resolver())
+    widened.prepend(str(folder))
+    return widened
+
+
+@contextmanager
+def resolving(resolver):
+    """Let Mitsuba look for files with a resolver, to which a ``<path>`` in a scene adds places."""
+    if resolver is None:
         yield
         return
     before = mi.file_resolver()
-    widened = mi.FileResolver(before)
-    widened.prepend(str(folder))
-    mi.set_file_resolver(widened)
+    mi.set_file_resolver(resolver)
     try:
         yield
     finally:

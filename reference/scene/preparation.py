@@ -6,6 +6,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from reference.pairing import bsdfs, lights
+from reference.scene import allowed, vertices
 from reference.scene.graph import Reference, properties
 
 FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
@@ -55,6 +56,8 @@ def prepare(graph, resolution, sensor=0):
     bsdfs.give_default(graph)
     bsdfs.check(graph)
     lights.check(graph)
+    allowed.check(graph)
+    vertices.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")
@@ -82,12 +85,15 @@ def _open_merged(graph):
 def film_size(graph, sensor=0):
     """Return the width and height that the film of a sensor is given."""
     films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
+    for _, film in films:
+        allowed.check_node(graph, film)
     return _size(graph.props(films[0][1]) if films else {})
 
 
 def _size(film):
     """Return a film's width and height, or what Mitsuba takes where they are not given."""
-    return tuple(int(film.get(side, usual)) for side, usual in (("width", 768), ("height", 576)))
+    sides = zip(("width", "height"), allowed.FILM, strict=True)
+    return tuple(int(film.get(side, usual)) for side, usual in sides)
 
 
 def keep_sensor(graph, number):

@@ -10,7 +10,8 @@ from typing import Any
 import mitsuba as mi
 
 from heuristic.errors import InputError
-from reference.scene.graph import Graph, files_from
+from reference.scene import messages
+from reference.scene.graph import Graph, files_from, resolving
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -59,22 +60,30 @@ class Source:
         """
         variant = mi.variant()
         if variant not in self._read:
-            self._read[variant] = self._parsed(variant)
+            with messages.collected(self.said):
+                self._read[variant] = self._parsed(variant)
         graph = self._read[variant].copy()
         for edit in self.edits:
             edit(graph)
         return graph
 
+    @property
+    def said(self) -> list[str]:
+        """What Mitsuba said when it read the scene."""
+        return self._read.setdefault("said", [])
+
     def files(self) -> tuple[Path, ...]:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
 
-        These are the scene's own file, what it includes, and every file that an element names.
+        These are the scene's own file, what it includes, every file that an element names, and what
+        a script read as it ran (:class:`reference.scene.script.Script`). The
+        tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
-        found = set()
+        found = set(getattr(self.content, "files", ()))
         if isinstance(self.content, (str, PathLike)):
-            found |= set(included(Path(self.content)))
-        with files_from(graph.folder):
+            found |= {Path(str(file)).resolve() for file in graph.state.files}
+        with resolving(graph.resolver):
             resolver = mi.file_resolver()
             for index in graph.nodes_in_use():
                 for _, value in graph.props(index).items():
@@ -91,15 +100,16 @@ class Source:
 
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
-        content, folder = self._content(), None
+        content, resolver = self._content(), None
         try:
             if isinstance(content, Mapping):
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
                 included(path)
-                state = Parser.parse_file(config, str(path), **self.parameters)
-                folder = path.resolve().parent
+                resolver = files_from(path.resolve().parent)
+                with resolving(resolver):
+                    state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
         except RuntimeError as error:
@@ -109,7 +119,7 @@ class Source:
                 f"{self.name}: this is not a scene. Its outermost element must be a scene."
             )
         graph = Graph(self.name, config, state)
-        graph.folder = folder
+        graph.resolver = resolver
         return graph
 
 
@@ -129,6 +139,7 @@ DEEPEST = 100
 
 TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'<>])*?(/?)>""")
 INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
+PLACEHOLDER = re.compile(r"\$(\w+)")
 COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
 
 
@@ -146,6 +157,13 @@ def included(path: Path) -> list[Path]:
     found: list[Path] = []
     _check(path, (), found)
     return found
+
+
+def placeholders(path: Path) -> set[str]:
+    """Return the names of the placeholders in a scene file and what it includes; none in others."""
+    if path.suffix != ".xml" or not path.is_file():
+        return set()
+    return {name for each in included(path) for name in PLACEHOLDER.findall(_text(each))}
 
 
 def _check(path: Path, outer: tuple[Path, ...], found: list[Path]) -> None:

@@ -74,12 +74,12 @@ def bundle() -> str:
     # There may be no home, or none that can be written to.
     with suppress(OSError, RuntimeError, OutputError):
         kept = Entry(_cache() / "vega.json", vl_convert.__version__)
-        found = kept.load() or {}
-        if "script" not in found:
-            found = {"script": _bundled()}
+        script = (kept.load() or {}).get("script")
+        if not isinstance(script, str):
+            script = _bundled()
             kept.path.parent.mkdir(parents=True, exist_ok=True)
-            kept.save(found)
-        return found["script"]
+            kept.save({"script": script})
+        return script
     return _bundled()
 
 

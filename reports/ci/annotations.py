@@ -20,6 +20,7 @@ import os
 import re
 from pathlib import Path
 
+from heuristic.errors import InputError
 from reports.ci import junit, lines
 from reports.files import ownership
 from reports.terminal.tables import markdown
@@ -45,8 +46,22 @@ def annotate(results, folder, level, environment=None):
         Significance of the whole command.
     environment
         Variables of the environment; those of this process where they are not given.
+
+    Raises
+    ------
+    InputError
+        When a file cannot be written to.
     """
-    variables = os.environ if environment is None else environment
+    try:
+        return _annotate(results, folder, level, os.environ if environment is None else environment)
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or folder}: {error.strerror or error}. This is where the CI service"
+            " reads results: ensure that it can be written to."
+        ) from error
+
+
+def _annotate(results, folder, level, variables):
     bad = [result for result in results if result.exit_code]
     if variables.get("GITHUB_ACTIONS") == "true":
         summary = variables.get("GITHUB_STEP_SUMMARY")
@@ -92,21 +107,26 @@ def _cell(text):
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
+def _title(result):
+    """Name the baseline, and say so if it could not be checked; what moved is in the headline."""
+    return f"fotismos check: {result.name}" + " not checked" * (result.status == "error")
+
+
 def _github(result, variables):
     place = os.path.relpath(result.path, variables.get("GITHUB_WORKSPACE") or ".")
     file = Path(place).as_posix().translate(GITHUB_PROPERTY)
-    title = f"fotismos check: {result.name}".translate(GITHUB_PROPERTY)
+    title = _title(result).translate(GITHUB_PROPERTY)
     return f"::error file={file},title={title}::{junit.headline(result).translate(GITHUB)}"
 
 
 def _azure(result):
     place = os.path.relpath(result.path).translate(AZURE_PROPERTY)
     text = junit.headline(result).translate(AZURE)
-    return f"##vso[task.logissue type=error;sourcepath={place}]{result.name}: {text}"
+    return f"##vso[task.logissue type=error;sourcepath={place}]{_title(result)}: {text}"
 
 
 def _teamcity(result):
-    text = f"fotismos check: {result.name}: {junit.headline(result)}".translate(TEAMCITY)
+    text = f"{_title(result)}: {junit.headline(result)}".translate(TEAMCITY)
     text = "".join(c if ord(c) < 128 else f"|0x{ord(c):04X}" for c in text)
     return f"##teamcity[buildProblem description='{text}']"
 
@@ -114,10 +134,10 @@ def _teamcity(result):
 def _code_quality(result):
     path = Path(os.path.relpath(result.path)).as_posix()
     return {
-        "description": f"{result.name}: {junit.headline(result)}",
+        "description": f"{_title(result)}: {junit.headline(result)}",
         "check_name": "fotismos check",
         # One finding for one baseline, however its numbers move: GitLab compares branches by it.
         "fingerprint": hashlib.sha256(path.encode()).hexdigest(),
-        "severity": "major",
+        "severity": "critical" if result.status == "error" else "major",
         "location": {"path": path, "lines": {"begin": 1}},
     }

@@ -8,8 +8,10 @@ import numpy as np
 from msgspec import structs
 
 from comparisons import atomic
-from comparisons.case import Request, open_case
+from comparisons.case import SUFFIXES, Request, file_of, open_case
 from comparisons.check.baseline import Baseline, parse
+from comparisons.check.measurement import HALVES
+from comparisons.store import content, require_regular
 from heuristic.errors import InputError
 from reports.files import exr
 
@@ -33,7 +35,13 @@ class BaselineFile:
         return open_case(scene_from(self.baseline.scene, self.path), Request.of(options))
 
     def pictures(self):
-        """Return the halves' small pictures by name, or None where the baseline has none."""
+        """Return the halves' small pictures by name, or None where the baseline has none.
+
+        Raises
+        ------
+        InputError
+            When they cannot be read.
+        """
         if not self.baseline.images:
             return None
         return _read_pictures(self.path.parent / Path(self.baseline.images).name)
@@ -58,6 +66,12 @@ def find(path):
     return [path]
 
 
+LARGEST = 2**24
+"""Bytes of a baseline, and of its pictures: a thousand times what is written."""
+
+LONGEST_KEPT = 128
+"""Pixels of the longer side of the pictures that a baseline keeps."""
+
 _HOW = "Make one with `fotismos check BASELINE --update --scene SCENE`."
 
 
@@ -70,7 +84,7 @@ def read(path):
         When it cannot be read, or is none.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
     return BaselineFile(path, parse(text, str(path)))
@@ -86,6 +100,8 @@ def write(path, baseline, pictures=None):
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists():
+            require_regular(path)
         if pictures is not None:
             images = path.with_suffix(".exr")
             # "baseline." keeps the layers at half precision, which pictures are fine with.
@@ -94,35 +110,58 @@ def write(path, baseline, pictures=None):
             baseline = structs.replace(baseline, images=images.name)
         atomic.write(path, baseline.text())
     except OSError as error:
-        raise InputError(f"baseline {path}: {error.strerror or error}.") from error
+        raise InputError(
+            f"baseline {path}: {error.strerror or error}. Name another place for it."
+        ) from error
 
 
 def scene_from(scene, path):
     """Return the scene of a baseline as a name for :func:`comparisons.case.open_case`."""
-    return str(path.parent / scene) if Path(scene).suffix == ".xml" else scene
+    beside = path.parent / scene
+    return str(beside) if Path(scene).suffix in SUFFIXES or beside.is_file() else scene
 
 
 def scene_for(scene, path):
-    """Return how a baseline at ``path`` names a scene: files relative to its own folder."""
-    if Path(scene).suffix != ".xml" and not Path(scene).exists():
-        return scene
-    return Path(os.path.relpath(scene, path.parent)).as_posix()
+    """Return how a baseline at ``path`` names a scene: files relative to its own folder.
+
+    Raises
+    ------
+    InputError
+        When the file is not there.
+    """
+    file = file_of(scene)
+    return scene if file is None else Path(os.path.relpath(file, path.parent)).as_posix()
+
+
+def name_of(scene):
+    """Return what the baseline of a scene is called: its name, or its file's."""
+    return Path(scene).stem if Path(scene).suffix in SUFFIXES else str(scene)
 
 
 def _read_pictures(path):
     import OpenEXR
 
     try:
+        content(path, LARGEST)  # refuses what is not a file before it is opened
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
-            return {
+            pictures = {
                 half: np.stack(
                     [channels[f"baseline.{half}.{c}"].pixels.astype(float) for c in "RGB"], axis=-1
                 )
-                for half in ("heuristic", "reference")
+                for half in HALVES
             }
-    except (RuntimeError, KeyError) as error:
-        raise InputError(
-            f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
-            " `fotismos check BASELINE --update --images`."
-        ) from error
+    # Of what is not an EXR file, the library says so in many ways.
+    except Exception as error:
+        raise _unreadable(path, error) from error
+    for picture in pictures.values():
+        if picture.ndim != 3 or max(picture.shape) > LONGEST_KEPT or not np.isfinite(picture).all():
+            raise _unreadable(path, "they are too large, or not finite")
+    return pictures
+
+
+def _unreadable(path, reason):
+    return InputError(
+        f"{path}: the baseline's pictures cannot be read: {reason}. Write them again with"
+        " `fotismos check BASELINE --update --images`."
+    )

@@ -9,13 +9,11 @@ from PIL import Image, ImageDraw, ImageFont
 from comparisons.check.measurement import HALVES, block_edges
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import luminance
+from reports.ci.baselines import LONGEST_KEPT
 from reports.files import images
 
 LONGEST = 640
 """Pixels of the longer side; small pictures are enlarged, pixel by pixel."""
-
-LONGEST_KEPT = 128
-"""Pixels of the longer side of the pictures that a baseline keeps."""
 
 NAMES = tuple(half + kind for half in HALVES for kind in ("", "-change", "-p", "-error"))
 """Names of all pictures that a failure can have."""

@@ -19,6 +19,9 @@ from reports.files import ownership
 FILES = ("check.json", *(f"{name}.png" for name in check_pictures.NAMES))
 """What a failure leaves in its folder."""
 
+ERROR = 2
+"""Exit code of what could not be checked, told apart from 1, which means that something moved."""
+
 
 @dataclass(frozen=True)
 class Result:
@@ -29,7 +32,8 @@ class Result:
     path, scene
         The baseline's file, and the scene that it names.
     status
-        ``passed``, ``failed``, ``error``; of an update ``created``, ``updated`` or ``unchanged``.
+        ``passed``, ``failed`` (something moved), ``error`` (it could not be told); of an update
+        ``created``, ``updated`` or ``unchanged``.
     seconds
         Time that it took.
     check
@@ -37,7 +41,7 @@ class Result:
     message
         Of an error, or on an update.
     exit_code
-        0, 1 for a failure, 2 for bad input or installation.
+        0, 1 for a failure, 2 for an error, whatever its reason.
     folder
         Where the pictures of a failure are.
     versions
@@ -80,9 +84,10 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
     Raises
     ------
     FotismosError
-        When the scene cannot be measured.
+        When the scene cannot be measured, or the baseline's pictures cannot be read.
     """
     begin = perf_counter()
+    pictures = file.pictures()
     found = _checked(file, case, level, progress)
     if folder is not None:
         ownership.clear(folder, FILES)
@@ -97,7 +102,7 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
         versions=_changed_versions(file.baseline),
     )
     if result.folder is not None:
-        _write_failure(file, result)
+        _write_failure(result, pictures)
     return result
 
 
@@ -144,11 +149,22 @@ def create(path, scene, case, images=False, progress=None):
 
 
 def guarded(run, path, *more):
-    """Call ``run(path, *more)``; an error that fotismos raises on purpose becomes its result."""
+    """Call ``run(path, *more)``; whatever it raises is the error of this baseline alone.
+
+    An interruption and ``SystemExit`` pass through.
+    """
+    begin = perf_counter()
     try:
         return run(path, *more)
-    except FotismosError as error:
-        return Result(path, "", "error", message=str(error), exit_code=error.exit_code)
+    except Exception as error:
+        return failed(path, error, perf_counter() - begin)
+
+
+def failed(path, error, seconds=0.0):
+    """Return the result of a baseline that an exception kept from being judged."""
+    kind = "" if isinstance(error, FotismosError) else f"{path}: {type(error).__name__}: "
+    message = f"{kind}{error}"
+    return Result(path, "", "error", seconds=seconds, message=message, exit_code=ERROR)
 
 
 def _checked(file: BaselineFile, case, level, progress):
@@ -165,10 +181,10 @@ def _changed_versions(baseline):
     }
 
 
-def _write_failure(file, result):
-    """Write pictures and the record."""
+def _write_failure(result, before):
+    """Write pictures and the record; ``before`` are the pictures of the baseline, if any."""
     folder = result.folder
     ownership.folder(folder)
-    for name, png in check_pictures.pictures(result.check, file.pictures()).items():
+    for name, png in check_pictures.pictures(result.check, before).items():
         ownership.write(folder / f"{name}.png", png)
     ownership.write(folder / "check.json", to_json(check_record.of(result)))

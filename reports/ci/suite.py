@@ -1,17 +1,16 @@
 """All baselines of one command: checked, or written."""
 
-from pathlib import Path
-
 from comparisons.case import Request, open_case
 from comparisons.check.moved import level_of_each
 from comparisons.gallery.builtin import SCENES
+from comparisons.pool import Pool, Task
 from heuristic.errors import InputError
 from reports.ci import baselines, checks
 from reports.terminal import progress
 
 
-def examine(path, significance, seed, folder):
-    """Check one baseline or a folder of them; the significance is shared.
+def examine(pool: Pool, path, significance, seed, folder):
+    """Check one baseline or a folder of them in a pool; the significance is shared.
 
     ``seed`` replaces the baselines' own unless it is None; ``folder`` is for pictures of failures.
 
@@ -22,16 +21,50 @@ def examine(path, significance, seed, folder):
     """
     paths = baselines.find(path)
     level = level_of_each(significance, len(paths))
+    given = [(one, level, seed, folder / one.stem) for one in paths]
+    return _each(pool, examine_one, given)
 
-    def examine_one(path):
-        file = baselines.read(path)
-        return checks.examine(file, file.open(seed), level, folder / path.stem, bar.of(path.stem))
 
+def _each(pool, function, given):
+    """Return the result of each baseline, in order; ``given`` has the arguments, its path first."""
+    paths = [arguments[0] for arguments in given]
     with progress.shown() as bar:
-        return [checks.guarded(examine_one, one) for one in paths]
+        tasks = [Task(each[0].name, function, each, bar.of(each[0].stem)) for each in given]
+        found = {}
+        for task, outcome in pool.each(tasks):
+            path = task.arguments[0]
+            error = outcome.exception()
+            found[path] = checks.failed(path, error) if error else outcome.result()
+    return [found[path] for path in paths]
 
 
-def update(path, scenes, images, significance, given):
+def examine_one(path, level, seed, folder, progress=None):
+    """Check one baseline; whatever fails is told in its result, which can be pickled.
+
+    Parameters
+    ----------
+    level
+        Chance of an alarm though nothing changed, of this baseline alone.
+    seed
+        In place of the baseline's own, unless it is None.
+    folder
+        For the pictures of a failure.
+    progress
+        As of :func:`comparisons.compare.compare`.
+
+    Returns
+    -------
+    reports.ci.checks.Result
+    """
+    return checks.guarded(_examine, path, level, seed, folder, progress)
+
+
+def _examine(path, level, seed, folder, progress):
+    file = baselines.read(path)
+    return checks.examine(file, file.open(seed), level, folder, progress)
+
+
+def update(pool: Pool, path, scenes, images, significance, given):
     """Write one baseline or several, unless they are there with the same options and nothing moved.
 
     Parameters
@@ -48,25 +81,29 @@ def update(path, scenes, images, significance, given):
     InputError
         When a baseline cannot be told from another, or has no scene.
     """
-    with progress.shown() as bar:
-        return [
-            checks.guarded(_update_one, one, scene, images, significance, given, bar)
-            for one, scene in _targets(path, scenes)
-        ]
+    targets = _targets(path, scenes)
+    return _each(
+        pool, update_one, [(one, scene, images, significance, given) for one, scene in targets]
+    )
 
 
-def _update_one(path, scene, images, significance, given, bar):
+def update_one(path, scene, images, significance, given, progress=None):
+    """Write one baseline, as :func:`update`; ``scene`` is None where the file says it."""
+    return checks.guarded(_update, path, scene, images, significance, given, progress)
+
+
+def _update(path, scene, images, significance, given, progress):
     file = _readable(path, scene)
     if file is not None:
         old = file.baseline
         if scene is None or baselines.scene_for(scene, path) == old.scene:
             scene, given = baselines.scene_from(old.scene, path), dict(old.options) | given
             if Request.of(given).stated() == old.options:
-                return checks.update(file, file.open(), significance, images, bar.of(path.stem))
+                return checks.update(file, file.open(), significance, images, progress)
         images = images or bool(old.images)
     case = open_case(scene, Request.of(given))
     named = baselines.scene_for(scene, path)
-    return checks.create(path, named, case, images, bar.of(path.stem))
+    return checks.create(path, named, case, images, progress)
 
 
 def _readable(path, scene):
@@ -92,12 +129,8 @@ def _targets(path, scenes):
             scenes = (path.stem,)
         return [(path, scenes[0] if scenes else None)]
     if scenes:
-        named = {path / f"{_stem(scene)}.json": scene for scene in scenes}
+        named = {path / f"{baselines.name_of(scene)}.json": scene for scene in scenes}
         if len(named) < len(scenes):
             raise InputError(f"{', '.join(scenes)}: two have one name. Name a file for each.")
         return list(named.items())
     return [(one, None) for one in baselines.find(path)]
-
-
-def _stem(scene):
-    return Path(scene).stem if Path(scene).suffix == ".xml" else scene

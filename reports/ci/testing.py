@@ -213,8 +213,7 @@ def _name(scene):
         return scene.__name__
     if isinstance(scene, Mapping):
         raise InputError("a scene that is a dictionary needs a name: unchanged(scene, name=...).")
-    path = Path(scene)
-    return path.stem if path.suffix == ".xml" else str(scene)
+    return baselines.name_of(scene)
 
 
 def _require_passed(result):

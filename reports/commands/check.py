@@ -41,18 +41,23 @@ from reports.terminal import verbosity
     metavar="FILE",
     help="Write a JUnit XML file.",
 )
-@jobs.output_option("out/check")
+@jobs.output_option("out")
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
+@verbosity.verbose_option
 @click.pass_context
 def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
-          **rendering):  # fmt: skip
+          timeout, **rendering):  # fmt: skip
     """Say whether anything that was measured before moved by more than noise.
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
     again with the options in its baseline, the seed included; --seed takes another. If something
-    moved, the exit code is 1, and OUTPUT holds pictures of where.
+    moved, the exit code is 1, and OUTPUT holds pictures of where. If one could not be checked, it
+    is 2; the others are checked all the same.
+
+    A scene in Python is code, and so is a baseline that names one: it is executed.
 
     \b
     Examples:
@@ -66,23 +71,26 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
     _require_consistent(update, scenes, images, given)
-    jobs.make_ready()
-    from comparisons.records import to_json
-    from reports.ci import annotations, check_record, lines, suite
-    from reports.ci.junit import document
-    from reports.run.output import held
+    jobs.require_known(scenes)
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons.records import to_json
+        from reports.ci import annotations, check_record, lines, suite
+        from reports.ci.junit import document
+        from reports.run.output import below, held
 
-    if update:
-        results = suite.update(baseline, scenes, images, significance, given)
-    else:
-        with held(output, f"fotismos check {baseline}") as folder:
-            results = suite.examine(baseline, significance, given.get("seed"), folder)
+        if update:
+            results = suite.update(pool, baseline, scenes, images, significance, given)
+        else:
+            with held(output, jobs.command_line()) as held_folder:
+                folder = below(held_folder, "check")
+                results = suite.examine(pool, baseline, significance, given.get("seed"), folder)
     for result in results:
         if result.status == "error":
             click.echo(f"fotismos: error: {result.message}", err=True)
-    notes = annotations.annotate(results, output, significance)
     if junit is not None:
         _write(junit, document(results))
+    notes = annotations.annotate(results, output, significance)
     if as_json:
         click.echo(to_json(check_record.of_all(results, significance)), nl=False)
     elif not verbosity.is_quiet():

@@ -12,6 +12,8 @@ from reports.terminal import verbosity
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option
+@jobs.scripts_option
+@jobs.timeout_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
@@ -26,16 +28,16 @@ from reports.terminal import verbosity
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, figures, fresh, with_cost, **rendering):
+def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
-    which `scene` is a dictionary or returns one, or a folder: all such files in it that others do
-    not include. Writes OUTPUT/index.html and tables of all scenes, and for each scene
+    which `scene` is a dictionary or returns one, or a folder: the Mitsuba files in it and its
+    subfolders that others do not include. Python files in a folder are code, and run only with
+    --scripts. Writes OUTPUT/index.html and tables of all scenes, and for each scene
     comparison.json, comparison.exr and pictures. Of several scenes, one that fails keeps no other
-    from being compared. An
-    interrupted run keeps its finished scenes and its passes: the same command goes on where it
-    stopped, to the same image.
+    from being compared. An interrupted run keeps its finished scenes and its passes: the same
+    command goes on where it stopped, to the same image.
 
     \b
     Examples:
@@ -47,6 +49,6 @@ def compare(scenes, output, figures, fresh, with_cost, **rendering):
       fotismos compare plastic-spheres --cost
       fotismos compare my_scenes/
     """  # noqa: D301 click reads the \b as: keep these lines
-    run = batch.start()
-    wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh)
-    batch.finish(run, scenes, output, wanted)
+    jobs.require_known(scenes)
+    wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
+    batch.run(scenes, output, wanted, timeout)

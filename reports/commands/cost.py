@@ -2,7 +2,9 @@
 
 import click
 
+from comparisons.pool import Task
 from reports import jobs
+from reports.run import tasks
 from reports.terminal import verbosity
 
 
@@ -10,12 +12,14 @@ from reports.terminal import verbosity
 @jobs.scene_argument
 @jobs.output_option("out")
 @jobs.figures_option
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
+@verbosity.verbose_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @jobs.json_option
-def cost(scene, output, figures, rounds, as_json, **rendering):
+def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
@@ -29,31 +33,25 @@ def cost(scene, output, figures, rounds, as_json, **rendering):
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.make_ready()
-    from comparisons.case import open_case
-    from comparisons.cost.cost import Effort, cost
-    from comparisons.records import to_json
-    from reports.charts.figures import write_cost
-    from reports.run import cost_files
-    from reports.run.output import below, held, require_free_folders
-    from reports.run.places import FIGURES, TABLES, places
-    from reports.terminal import cost_tables, progress, tables
+    jobs.require_known([scene])
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons.records import to_json
+        from reports.run.output import below, held, require_free_folders
+        from reports.run.places import FIGURES, TABLES, places
+        from reports.terminal import cost_tables, progress, tables
 
-    case = open_case(scene, jobs.request(rendering))
-    effort = Effort() if rounds is None else Effort(rounds=rounds)
-    words = case.command("cost", rounds=rounds)
-    with held(output, words) as held_folder:
-        folder = below(held_folder, "cost")
-        (place,) = places(folder, [scene])
-        require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
-        with progress.shown() as bar:
-            study = cost(case.source, case.options, effort, bar.of(case.name), words)
-        cost_files.write(folder / place, study)
-        tables.write_cost(folder / TABLES, place, study.record)
-        if figures:
-            write_cost(folder / FIGURES, place, study.record)
+        with held(output, jobs.command_line()) as held_folder:
+            folder = below(held_folder, "cost")
+            (place,) = places(folder, [scene])
+            require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
+            for_print = folder / FIGURES if figures else None
+            with progress.shown() as bar:
+                words = (scene, jobs.request(rendering), rounds, folder / place, for_print)
+                record = pool.do(Task(place, tasks.priced, words, bar.of(place)))
+            tables.write_cost(folder / TABLES, place, record)
     if as_json:
-        click.echo(to_json(study.record), nl=False)
+        click.echo(to_json(record), nl=False)
         return
-    verbosity.tell(cost_tables.lines(study.record))
+    verbosity.tell(cost_tables.lines(record))
     verbosity.tell_where(folder / place / "cost.svg")

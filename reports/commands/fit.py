@@ -1,12 +1,13 @@
 """``fotismos fit``: the best heuristic parameters, and what they leave."""
 
 import json
-import shlex
 from pathlib import Path
 
 import click
 
+from comparisons.pool import Task
 from reports import jobs
+from reports.run import tasks
 from reports.terminal import verbosity
 
 
@@ -41,10 +42,12 @@ from reports.terminal import verbosity
     metavar="FILE",
     help="Write the departures of all scenes as a table in Markdown, too.",
 )
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
-def fit(scenes, output, form, as_json, markdown, **words):
+@verbosity.verbose_option
+def fit(scenes, output, form, as_json, markdown, timeout, **words):
     """Find the heuristic parameters that come nearest to the reference, and say what they leave.
 
     What the best parameters remove of the loss is the parameter error, what they leave the model
@@ -57,33 +60,31 @@ def fit(scenes, output, form, as_json, markdown, **words):
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong --intensities
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.make_ready()
-    from comparisons import atomic
-    from comparisons.case import open_case
-    from comparisons.fit.fit import FitOptions, fit
-    from comparisons.records import plain
-    from heuristic.materials import FORMS
-    from reference.scene.graph import set_variant
-    from reports.run import fit_files
-    from reports.run.output import below, held, require_free_folders
-    from reports.run.places import places
-    from reports.terminal import progress
+    jobs.require_known(scenes)
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons import atomic
+        from comparisons.fit.fit import FitOptions
+        from comparisons.records import plain
+        from heuristic.materials import FORMS
+        from reports.run import fit_files
+        from reports.run.output import below, held, require_free_folders
+        from reports.run.places import places
+        from reports.terminal import progress
 
-    fitting_words = {key: words.pop(key) for key in ("loss", "intensities")}
-    chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting_words)
-    wanted = [open_case(name, jobs.request(words)) for name in scenes]
-    records = []
-    with held(output, shlex.join(["fotismos", "fit", *scenes])) as held_folder:
-        folder = below(held_folder, "fit")
-        found = places(folder, scenes)
-        require_free_folders(folder, *found)
-        with progress.shown() as bar:
-            for place, case in zip(found, wanted, strict=True):
-                set_variant(case.variant)
-                command = case.command("fit", **fitting_words, form=form)
-                result = fit(case.source, case.options, chosen, bar.of(case.name), command)
-                fit_files.write(folder / place, result)
-                records.append(result.record)
+        fitting = {key: words.pop(key) for key in ("loss", "intensities")}
+        chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting)
+        told = (jobs.request(words), chosen, fitting | {"form": form})
+        with held(output, jobs.command_line()) as held_folder:
+            folder = below(held_folder, "fit")
+            found = places(folder, scenes)
+            require_free_folders(folder, *found)
+            with progress.shown() as bar:
+                wanted = [
+                    Task(place, tasks.fitted, (scene, *told, folder / place), bar.of(place))
+                    for place, scene in found.items()
+                ]
+                records = [outcome.result() for _, outcome in pool.each(wanted)]
     if markdown:
         atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:

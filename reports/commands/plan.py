@@ -2,16 +2,21 @@
 
 import click
 
+from comparisons.pool import Task
 from reports import jobs
+from reports.run import tasks
+from reports.terminal import verbosity
 
 
 @click.command()
 @jobs.scene_argument
 @jobs.json_option
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
+@jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
-def plan(scene, as_json, verify, **rendering):
+@verbosity.verbose_option
+def plan(scene, as_json, verify, timeout, **rendering):
     """Say which effects a scene calls for, by which rule, and what will be simulated.
 
     \b
@@ -19,24 +24,21 @@ def plan(scene, as_json, verify, **rendering):
       fotismos plan cornell-box
       fotismos plan --verify fig-8-9 --resolution 128x128
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.make_ready()
-    from comparisons.case import open_case
-    from comparisons.records import to_json
-    from reports.terminal import plan_lines, progress
+    jobs.require_known([scene])
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from comparisons.records import to_json
+        from reports.terminal import plan_lines, progress
 
-    case = open_case(scene, jobs.request(rendering))
-    if verify:
-        from comparisons import verification
-
-        with progress.shown() as bar:
-            found = verification.verify(case.source, case.options, bar.of(case.name))
-        lines = plan_lines.verification_lines([found])
-    else:
-        from comparisons.compare import prepare
-
-        ready = prepare(case.source, case.options)
-        found = plan_lines.report(case.name, ready, case.variant)
-        lines = plan_lines.lines(found)
+        request = jobs.request(rendering)
+        if verify:
+            with progress.shown() as bar:
+                task = Task(scene, tasks.verified, (scene, request, None), bar.of(scene))
+                found = pool.do(task)
+            lines = plan_lines.verification_lines([found])
+        else:
+            found = pool.do(Task(scene, tasks.planned, (scene, request)))
+            lines = plan_lines.lines(found)
     if as_json:
         lines = [to_json(found).rstrip()]
     for line in lines:

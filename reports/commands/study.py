@@ -1,7 +1,7 @@
 """``fotismos study``: how the departure behaves over a space of scenes."""
 
-import shlex
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
 import click
@@ -37,8 +37,10 @@ from reports.terminal import verbosity
     help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
     " dataset beside FILE.",
 )
+@jobs.timeout_option
 @verbosity.quiet_option
-def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
+@verbosity.verbose_option
+def study(file, output, processes, workers, scheduler, findings, timeout):  # fmt: skip
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
     FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and
@@ -54,8 +56,7 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
     given = [name for name in (processes, workers, scheduler) if name is not None]
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
-    jobs.make_ready()
-    from comparisons.pool import cores
+    from comparisons.pool import Task, cores
     from comparisons.study import cluster, design, running
     from reports.run import study_files
     from reports.run.output import below, held
@@ -64,7 +65,9 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
 
     wanted = design.read(file)
     page = study_files.page(wanted, file, findings)
-    with held(output, shlex.join(["fotismos", "study", str(file)])) as held_folder:
+    with jobs.pool(timeout) as pool:
+        blocks = pool.do(Task(wanted.name, running.all_blocks, (wanted,)))
+    with held(output, jobs.command_line()) as held_folder:
         studies = below(held_folder, "study")
         (place,) = assigned(studies, [(wanted.name, file)])
         folder = study_files.prepare(wanted, studies / place)
@@ -73,9 +76,11 @@ def study(file, output, processes, workers, scheduler, findings):  # fmt: skip
         elif workers:
             spreading = cluster.local(workers)
         else:
-            spreading = nullcontext(running.processes(processes or cores()))
+            count = (processes or cores()) if jobs.PROCESSES else 0
+            prepare = partial(jobs.prepare, verbosity.level())
+            spreading = nullcontext(running.processes(count, prepare, timeout))
         with spreading as spread, progress.shown("points") as bar:
-            outcome = running.run(wanted, folder, spread, bar.of(wanted.name))
+            outcome = running.run(wanted, folder, spread, bar.of(wanted.name), blocks)
         places = list(study_files.write(wanted, outcome, folder, page))
     verbosity.tell([*study_files.summary(wanted, outcome), ""])
     for place in places:

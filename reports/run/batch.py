@@ -1,74 +1,104 @@
 """Comparing scenes one after another, and writing their results and the page.
 
 A scene that cannot be compared does not keep the others from it: the page names it with its error,
-and the command ends with that error's exit code. Several scenes are compared in a process apart,
-which one of them may kill; a single one is compared in this process.
+and the command ends with that error's exit code. Scenes are compared in a process apart, which one
+of them may kill.
 """
 
-import shlex
-import sys
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from comparisons.pool import Pool, Task
-from heuristic.errors import FotismosError
+from heuristic.errors import FotismosError, InstallationError
 from reports import jobs
 from reports.run import single
 from reports.run.single import Wanted
-from reports.run.stages import Failure, Run
 from reports.terminal import verbosity
 
+if TYPE_CHECKING:
+    from reports.run.stages import Run
 
-def start():
-    """Load what renders, and begin the record of a run.
+More = Callable[[Pool, "Run"], dict[str, Any]]
+
+
+def run(
+    names: Iterable[str], folder: Path, wanted: Wanted, timeout: float, more: More | None = None
+) -> None:
+    """Compare scenes, and write the results of each, then page and tables of all.
+
+    Parameters
+    ----------
+    names
+        Of built-in scenes, files and folders.
+    folder
+        For the results.
+    wanted
+        What of each scene.
+    timeout
+        Seconds that a scene may take without any progress.
+    more
+        Does what else the page shows in the given pool, counts its time, and returns it by name.
 
     Raises
     ------
-    InstallationError
-        When LLVM cannot be used.
+    FotismosError
+        The gravest of the errors that kept a scene from being compared.
     """
-    single.load()
-    return Run(shlex.join(["fotismos", *sys.argv[1:]]))
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from reports.files import ownership
+        from reports.run import output, stages
+        from reports.run.places import places
 
-
-def finish(run, names, folder, wanted: Wanted, **shown):
-    """Compare the scenes of a run, and write the results of each, then page and tables of all.
-
-    ``shown`` is what else the page shows.
-    """
-    from reports.run import output
-    from reports.run.places import places
-
-    scenes = jobs.expand(names)
-    with output.held(folder, run.command) as folder:
-        found = places(folder, scenes)
-        output.require_free(folder, found, wanted.figures)
-        views, failures = {}, {}
-        try:
-            _compare(run, found, folder, wanted, views, failures)
-        except KeyboardInterrupt:
-            if views or failures:
-                _write(run, folder, views, failures, wanted.figures, shown)
-            raise
-        _write(run, folder, views, failures, wanted.figures, shown)
+        scenes = jobs.expand(names, wanted.with_scripts)
+        requests = dict(zip(scenes, jobs.requests(wanted.request, scenes), strict=True))
+        command = jobs.command_line()
+        with output.held(folder, command) as folder:
+            found = places(folder, scenes)
+            output.require_free(folder, found, wanted.figures)
+            record = stages.Run(command)
+            shown = more(pool, record) if more else {}
+            views, failures = {}, {}
+            try:
+                _compare(pool, record, found, folder, wanted, requests, views, failures)
+            except KeyboardInterrupt:
+                pool.end()  # before its half written files are cleared away
+                ownership.recover(folder)
+                if views or failures:
+                    _write(record, folder, views, failures, wanted.figures, shown)
+                raise
+            _write(record, folder, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
         count = f"{len(failures)} of {len(found)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _compare(run, places, folder, wanted, views, failures):
+def _compare(pool, record, places, folder, wanted, requests, views, failures):
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from comparisons.case import name_of
     from reports.terminal import progress
 
     alone = len(places) == 1
-    with progress.shown() as bar, Pool(0 if alone else 1, single.load) as pool:
+    with progress.shown() as bar:
         tasks = (
-            Task(place, single.compare, (name, folder, place, wanted), bar.of(name_of(name)))
+            Task(
+                place,
+                single.compare,
+                (name, folder, place, replace(wanted, request=requests[name])),
+                bar.of(name_of(name)),
+            )
             for place, name in places.items()
         )
         for task, outcome in pool.each(tasks):
             try:
                 view, spent = outcome.result()
+            except InstallationError:
+                raise
             except FotismosError as error:
                 if alone:
                     raise
@@ -76,13 +106,14 @@ def _compare(run, places, folder, wanted, views, failures):
                 continue
             views[task.name] = view
             for stage, seconds in spent.seconds.items():
-                run.add(stage, seconds)
+                record.add(stage, seconds)
             verbosity.remark(progress.details(view.record))
 
 
 def _write(run, folder, views, failures, with_figures, shown):
     """Write what is about all scenes, and say what came of them."""
     from reports.run import output
+    from reports.run.stages import Failure
     from reports.terminal import progress, tables
 
     run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]

@@ -1,7 +1,8 @@
 """Finished scenes, found again in their files instead of rendered once more.
 
-``view.json``, in the folder of a scene's results, holds what the page shows of the scene and the
-key of all that it depends on. It is written with the other results, atomically.
+``view.json``, in the folder of a scene's results, holds what the page shows of the scene, the sizes
+of the files that the page links to, and the key of all that it depends on. It is written with the
+other results, atomically.
 """
 
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from comparisons.departure.metrics import METRICS
-from comparisons.records import VERSION, plain
+from comparisons.records import VERSION, Record, plain
 from comparisons.store import Entry
 from heuristic.errors import InputError
 from reports.page.scene_view import SceneView
@@ -26,20 +27,30 @@ def key_of(passes, options, with_cost, figures):
     return f"{passes} noise={options.noise} {written}"
 
 
+class Kept(Record):
+    """What the file holds: the view, and the bytes of each linked file by its name."""
+
+    view: SceneView
+    sizes: dict[str, int]
+
+
 def save(place: Path, key: str, view: SceneView) -> None:
     """Write the file of a view, which `output.write_scene` returns, to a folder."""
-    Entry(place / FILE, key).save({"view": plain(view)})
+    kept = Kept(view=view, sizes=_sizes(place, view))
+    Entry(place / FILE, key).save(plain(kept))
 
 
 def load(place: Path, key: str) -> SceneView | None:
     """Return the view of the results in a folder; None where they are not those of the key."""
-    kept = Entry(place / FILE, key).load()
-    if kept is None:
-        return None
     try:
         # JSON has no bytes: pictures are text in it.
-        view = msgspec.convert(kept.get("view"), SceneView, builtin_types=())
-    except (msgspec.ValidationError, InputError):
-        return None  # not a view of this version
-    linked = [place.parent / file for file in view.files.values()]
-    return view if all(map(Path.is_file, linked)) else None
+        kept = msgspec.convert(Entry(place / FILE, key).load(), Kept, builtin_types=())
+        return kept.view if kept.sizes == _sizes(place, kept.view) else None
+    except (msgspec.ValidationError, InputError, OSError):
+        return None  # no file, not a view of this version, or a linked file is gone
+
+
+def _sizes(place: Path, view: SceneView) -> dict[str, int]:
+    """Return the sizes of the linked files, which lie in the same folder as the view."""
+    names = [Path(file).name for file in view.files.values()]
+    return {name: (place / name).stat().st_size for name in names}

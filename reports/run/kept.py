@@ -9,10 +9,9 @@ import hashlib
 import json
 from time import perf_counter
 
-import numpy as np
-
 from comparisons.store import Entry
 from heuristic.heuristics import named
+from reference.scene.identity import digest
 
 INTERVAL_S = 10.0
 """Seconds from one writing to the next, at least: short runs write nothing."""
@@ -61,22 +60,12 @@ def of_scene(folder, name, case):
 def key_of(source, options, variant, versions):
     """Return a digest of all that the passes of a comparison depend on.
 
-    These are the scene as Mitsuba reads it, the content of every file that it reads, the code of
-    the heuristic, the options but for the ones that only say how long to go on, variant and
-    versions.
+    These are the scene with the content of every file that it reads
+    (:func:`reference.scene.identity.digest`), the code of the heuristic, the options but for the
+    ones that only say how long to go on, variant and versions.
     """
-    digest = hashlib.sha256()
-    graph = source.parse()
-    for index in graph.nodes_in_use():
-        props = graph.props(index)
-        digest.update(str(props).encode())
-        for _, value in props.items():
-            if hasattr(value, "__array__") or hasattr(value, "__array_interface__"):
-                digest.update(np.array(value).tobytes())  # printed, large arrays are shortened
-    for path in source.files():
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
     told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
     told["heuristic code"] = named(options.heuristic).digest()
-    digest.update(json.dumps(told, sort_keys=True).encode())
-    return digest.hexdigest()
+    told["scene"] = digest(source)
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()

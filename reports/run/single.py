@@ -9,37 +9,25 @@ from typing import TYPE_CHECKING
 
 from msgspec import structs
 
-from reports import jobs
-from reports.run.stages import Stages
-
 if TYPE_CHECKING:
     from comparisons.case import Request
     from reports.page.scene_view import SceneView
+    from reports.run.stages import Stages
 
 
 @dataclass(frozen=True)
 class Wanted:
     """What a command wants of each of its scenes.
 
-    ``request`` says how; ``fresh`` renders what is finished, too.
+    ``request`` says how; ``fresh`` renders what is finished, too; ``with_scripts`` runs the scripts
+    that are found in folders.
     """
 
     request: Request
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
-
-
-def load():
-    """Load what renders.
-
-    Raises
-    ------
-    InstallationError
-        When LLVM cannot be used.
-    """
-    jobs.make_ready()
-    import comparisons.compare  # noqa: F401  part of start-up
+    with_scripts: bool = False
 
 
 def compare(
@@ -61,6 +49,7 @@ def compare(
     from comparisons.case import open_case
     from comparisons.compare import compare
     from reports.run import finished, kept, output
+    from reports.run.stages import Stages
 
     spent = Stages()
     case = open_case(name, wanted.request)

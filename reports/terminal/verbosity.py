@@ -53,33 +53,3 @@ def remark(lines):
     if level() > 0:
         for line in lines:
             click.echo(line, err=True)
-
-
-def divert_mitsuba():
-    """Send Mitsuba's messages to standard error while the command runs.
-
-    Its own logger writes to standard output.
-    """
-    import mitsuba as mi
-
-    class Messages(mi.Appender):
-        """Standard error as Mitsuba sees it; progress is shown by the command itself."""
-
-        def append(self, level, text):
-            click.echo(text, err=True)
-
-        def log_progress(self, *progress):
-            pass
-
-    def replace(appenders):
-        before = [logger.appender(number) for number in range(logger.appender_count())]
-        logger.clear_appenders()
-        for appender in appenders:
-            logger.add_appender(appender)
-        return before
-
-    logger = mi.logger()
-    before = replace([Messages()])
-    context = click.get_current_context(silent=True)
-    if context is not None:  # a process of a pool has none, and keeps to it
-        context.call_on_close(lambda: replace(before))

@@ -8,6 +8,7 @@ such surfaces on each path.
 from dataclasses import asdict
 from functools import lru_cache
 
+from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.factors import Convention, Phong, exponent_of
@@ -138,6 +139,8 @@ def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
     (1 - f rho)``, with ``f = 0`` where ``nonlinear`` is off; ``c`` and ``f`` follow from the
     albedos at ``rho`` of 1 and 0.5: ``a(1) / a(0.5) = (2 - f) / (1 - f)``.
     """
+    if min(whole, half) <= 0:  # no light reaches the base and leaves it again
+        return operations.product(graph, rho, 0.0)
     ratio = whole / half
     returned = (ratio - 2) / (ratio - 1)
     if returned < 1e-5:
@@ -164,7 +167,7 @@ def _roughplastic(
     props = graph.props(index)
     return RoughPlastic(
         diffuse_reflectance=base or values.colour(graph, index, "diffuse_reflectance", 0.5),
-        alpha=values.number(graph, index, "alpha", 0.1),
+        alpha=max(values.number(graph, index, "alpha", 0.1), SMALLEST_ALPHA),
         int_ior=values.index_of_refraction(graph, index, "int_ior", "polypropylene"),
         ext_ior=values.index_of_refraction(graph, index, "ext_ior", "air"),
         specular_reflectance=coat or values.colour(graph, index, "specular_reflectance", 1.0),

@@ -1,0 +1,44 @@
+"""Signals that end a command: the first lets it clear up, a second one ends it at once."""
+
+import os
+import signal
+from types import FrameType
+from typing import NoReturn
+
+SIGNALS = {
+    number
+    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None))
+    if number is not None
+}
+"""Ctrl-C, what ends a job, and the end of a terminal."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A command was told to end; ``exit_code`` is what a shell expects then: 130, 143 or 129."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.exit_code = 128 + number
+
+
+def listen() -> None:
+    """Raise :class:`Interrupted` in this process for each of `SIGNALS` that is not ignored."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup
+            signal.signal(number, _interrupt)
+
+
+def code_of(error: BaseException | None) -> int:
+    """Return the exit code for an interruption."""
+    return getattr(error, "exit_code", 128 + signal.SIGINT)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
+    for each in SIGNALS:
+        if signal.getsignal(each) is _interrupt:
+            signal.signal(each, _leave)
+    raise Interrupted(number)
+
+
+def _leave(number: int, frame: FrameType | None) -> NoReturn:
+    os._exit(128 + number)

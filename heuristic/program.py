@@ -1,0 +1,17 @@
+"""How the program was started, so that the commands that it prints can be pasted."""
+
+import os
+import shlex
+
+VARIABLE = "FOTISMOS_PROGRAM"
+"""Environment variable with the words that start the program, such as ``./run``."""
+
+
+def program() -> list[str]:
+    """Return the words that start the program."""
+    return shlex.split(os.environ.get(VARIABLE, "")) or ["fotismos"]
+
+
+def command(*words: object) -> str:
+    """Return a command of the program, as a shell takes it."""
+    return shlex.join([*program(), *map(str, words)])

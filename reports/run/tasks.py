@@ -1,0 +1,96 @@
+"""What commands ask of the process that reads and renders scenes, one function per task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from comparisons.case import Request
+    from comparisons.cost.cost_record import Cost
+    from comparisons.fit.fit import FitOptions
+    from comparisons.fit.fit_record import FitRecord
+    from comparisons.hard.collection import HardCases
+    from comparisons.verification import Verification
+    from reports.terminal.plan_lines import PlanReport
+
+
+def planned(name: str, request: Request) -> PlanReport:
+    """Return the plan of a scene."""
+    from comparisons.case import open_case
+    from comparisons.compare import prepare
+    from reports.terminal import plan_lines
+
+    case = open_case(name, request)
+    return plan_lines.report(case.name, prepare(case.source, case.options), case.variant)
+
+
+def verified(name: str, request: Request, level: float | None, progress: Any) -> Verification:
+    """Hold the plan of a scene against everything simulated.
+
+    ``level`` is the chance that a right plan is marked; None takes the usual one.
+    """
+    from comparisons.case import open_case
+    from comparisons.verification import LEVEL, verify
+
+    case = open_case(name, request)
+    return verify(case.source, case.options, progress, LEVEL if level is None else level)
+
+
+def hard_cases() -> HardCases:
+    """Evaluate the hard cases."""
+    from comparisons.case import RGB
+    from comparisons.hard import collection
+    from reference.scene.graph import set_variant
+
+    set_variant(RGB)
+    return collection.collect()
+
+
+def priced(
+    name: str,
+    request: Request,
+    rounds: int | None,
+    place: Path,
+    figures: Path | None,
+    progress: Any,
+) -> Cost:
+    """Study what each step of accuracy costs, and write the study's files.
+
+    ``figures`` is the folder for those for print, None for none.
+    """
+    from comparisons.case import open_case
+    from comparisons.cost.cost import Effort, cost
+    from reports.charts.figures import write_cost
+    from reports.run import cost_files
+
+    case = open_case(name, request)
+    effort = Effort() if rounds is None else Effort(rounds=rounds)
+    words = case.command("cost", rounds=rounds)
+    study = cost(case.source, case.options, effort, progress, words)
+    cost_files.write(place, study)
+    if figures is not None:
+        write_cost(figures, place.name, study.record)
+    return study.record
+
+
+def fitted(
+    name: str,
+    request: Request,
+    chosen: FitOptions,
+    words: dict[str, Any],
+    place: Path,
+    progress: Any,
+) -> FitRecord:
+    """Fit the heuristic to a scene, and write the fit's files.
+
+    ``words`` are the options of the command by name, for the record.
+    """
+    from comparisons.case import open_case
+    from comparisons.fit.fit import fit
+    from reports.run import fit_files
+
+    case = open_case(name, request)
+    result = fit(case.source, case.options, chosen, progress, case.command("fit", **words))
+    fit_files.write(place, result)
+    return result.record

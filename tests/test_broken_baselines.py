@@ -1,0 +1,305 @@
+"""Baselines that somebody damaged: each is an error of its own, and never a pass."""
+
+import copy
+import json
+import os
+import pickle
+import random
+import shutil
+import sys
+from collections import Counter
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from heuristic.errors import (
+    FotismosError,
+    InputError,
+    InstallationError,
+    LostProcessError,
+    NonFiniteError,
+)
+from reports import cli
+from reports.ci import baselines, checks, suite
+
+WHOLE = Path(__file__).parent / "baselines/cornell-box-llvm_ad_rgb.json"
+FAST = ("--spp", 32, "--resolution", "16x12")
+ODD = (
+    None, True, "x", "", -1, 0, 1e308, -1e308, 10**400, 10**30, float("nan"), float("inf"), [], {},
+    "é\ud800", "a\0b", [[[]]], 1e-320, -0.5,
+)  # fmt: skip
+
+
+def places(value, path=()):
+    """Yield the path of everything inside some JSON."""
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, inner in items:
+        yield (*path, key)
+        if isinstance(inner, (dict, list)):
+            yield from places(inner, (*path, key))
+
+
+def damaged(content, rng):
+    """Return a baseline's bytes with something wrong: cut, flipped, or other values in it."""
+    kind = rng.randrange(5)
+    if kind == 0:
+        return content[: rng.randrange(len(content))]
+    if kind == 1:
+        flipped = bytearray(content)
+        for _ in range(rng.randint(1, 5)):
+            flipped[rng.randrange(len(flipped))] = rng.randrange(256)
+        return bytes(flipped)
+    data = json.loads(content)
+    for _ in range(rng.randint(1, 2)):
+        found = [path for path in places(data) if kind != 4 or len(path) <= 2]
+        *outer, last = rng.choice(found)
+        inner = data
+        for key in outer:
+            inner = inner[key]
+        act = rng.randrange(3)
+        if act == 0:
+            del inner[last]
+        elif act == 1:
+            inner[last] = copy.deepcopy(rng.choice(ODD))
+        elif isinstance(inner, dict):
+            inner["extra"] = rng.choice(ODD)
+        else:
+            inner.append(copy.deepcopy(inner[last]))
+    return json.dumps(data).encode("utf-8", "surrogatepass")
+
+
+@pytest.mark.parametrize(
+    "count", [400, pytest.param(20_000, marks=pytest.mark.slow)], ids=["short", "long"]
+)
+def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(count, tmp_path):
+    path, whole, outcomes = tmp_path / "b.json", WHOLE.read_bytes(), Counter()
+    for seed in range(count):
+        path.write_bytes(damaged(whole, random.Random(seed)))
+        try:
+            found = baselines.read(path).baseline
+        except InputError as error:
+            assert str(path) in str(error)
+            assert "--update --scene" in str(error)
+            outcomes["refused"] += 1
+            continue
+        quantities = list(found.measured().quantities())
+        errors = np.array([quantity.error for quantity in quantities])
+        assert np.isfinite([quantity.value for quantity in quantities]).all()
+        assert np.isfinite(errors**4).all()
+        assert (errors >= 0).all()
+        assert 2 <= found.passes <= 1024
+        found.text()
+        outcomes["legal"] += 1
+    assert outcomes["refused"] > 10 * outcomes["legal"] > 0
+
+
+# --- One command over all of them ------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Two baselines with pictures."""
+    folder = tmp_path_factory.mktemp("made") / "baselines"
+    words = ["check", folder, "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b", "--images"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["fotismos", *map(str, words), *map(str, FAST)])
+        cli.main()
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """A copy of the two, one of which seems to have moved."""
+    for name in ("GITHUB_ACTIONS", "GITLAB_CI", "TF_BUILD", "TEAMCITY_VERSION"):
+        monkeypatch.delenv(name, raising=False)
+    copied = Path(shutil.copytree(made, tmp_path / "baselines"))
+    data = json.loads((copied / "fig-8-6b.json").read_text())
+    data["reference"]["blocks"][1][2]["mean"][0] *= 1.5
+    (copied / "fig-8-6b.json").write_text(json.dumps(data))
+    return copied
+
+
+def other(folder, name, **changes):
+    """Write one more baseline, with changes to the one that is whole."""
+    data = json.loads((folder / "fig-8-6a.json").read_text()) | changes
+    (folder / f"{name}.json").write_text(json.dumps(data))
+
+
+def sparse(path, size):
+    with path.open("wb") as file:
+        file.truncate(size)
+
+
+def break_all(folder):
+    """Put baselines that are broken in many ways into a folder, and return their names."""
+    before = {path.name for path in folder.glob("*.json")}
+    whole = (folder / "fig-8-6a.json").read_text()
+    (folder / "text.json").write_text("nothing")
+    (folder / "nul.json").write_text(whole.replace("fig-8-6a", "a\\u0000b"))
+    (folder / "bytes.json").write_bytes(whole.encode("utf-16"))
+    (folder / "deep.json").write_text("[" * 200_000 + "]" * 200_000)
+    (folder / "digits.json").write_text(whole.replace('"passes": 16', f'"passes": {"9" * 10_000}'))
+    sparse(folder / "large.json", 100_000_000)
+    (folder / "folder.json").mkdir()
+    os.mkfifo(folder / "fifo.json")
+    (folder / "loop.json").symlink_to("loop.json")
+    (folder / "gone.json").symlink_to("nowhere.json")
+    other(folder, "version", record_version=3)
+    other(folder, "passes", passes=10**9)
+    other(folder, "scene", scene="fig-0")
+    other(folder, "file", scene="../nowhere.xml")
+    other(folder, "options", options={"spp": "many"})
+    other(folder, "pairing", options={"pairing": "any"})
+    other(folder, "seed", options={"seed": -1, "spp": 32})
+    other(folder, "script", scene="raises.py")
+    (folder / "raises.py").write_text("raise SystemExit(0)")
+    for name, content in (("garbage", b"garbage" * 100), ("cut", None), ("fifo", "fifo")):
+        picture = folder / f"picture-{name}.exr"
+        if content == "fifo":
+            os.mkfifo(picture)
+        else:
+            picture.write_bytes(content or (folder / "fig-8-6a.exr").read_bytes()[:300])
+        other(folder, f"exr-{name}", images=picture.name)
+    other(folder, "exr-missing", images="missing.exr")
+    return {path.stem for path in folder.glob("*.json") if path.name not in before}
+
+
+@pytest.mark.guarantee(
+    "checks", "A baseline that cannot be judged is an error, keeps no other from it, and exits 2."
+)
+def test_each_baseline_is_judged_alone(run, folder, tmp_path, monkeypatch):
+    broken = break_all(folder)
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
+    junit = tmp_path / "junit.xml"
+    code, printed, messages = run(
+        "check", folder, "-o", tmp_path / "out", "--json", "--junit", junit
+    )
+    assert code == 2
+    statuses = {
+        Path(check["baseline"]).stem: check["status"] for check in json.loads(printed)["checks"]
+    }
+    expected = dict.fromkeys(broken, "error") | {"fig-8-6a": "passed", "fig-8-6b": "failed"}
+    assert statuses == expected
+    assert len(broken) > 20
+    told = {case.get("name"): [kind.tag for kind in case] for case in suite_of(junit)}
+    kinds = {"error": ["error"], "failed": ["failure"], "passed": []}
+    assert told == {name: kinds[status] for name, status in expected.items()}
+    assert "Traceback" not in messages
+    for name in broken:
+        assert f"title=fotismos check%3A {name} not checked::" in messages
+    assert "title=fotismos check%3A fig-8-6b::" in messages
+    assert (folder / "fifo.json").is_fifo()
+
+
+def suite_of(junit):
+    return ElementTree.parse(junit).getroot().find("testsuite")
+
+
+def test_an_update_destroys_nothing_that_is_not_a_baseline(run, folder):
+    os.mkfifo(folder / "fifo.json")
+    (folder / "folder.json").mkdir()
+    for name in ("fifo", "folder"):
+        code, _, messages = run(
+            "check", folder / f"{name}.json", "--update", "--scene", "fig-8-6a", *FAST
+        )
+        assert code == 2
+        assert "not a regular file" in messages
+    assert (folder / "fifo.json").is_fifo()
+    assert (folder / "folder.json").is_dir()
+
+
+# --- Whatever goes wrong ---------------------------------------------------------------------
+
+RAISED = (
+    TypeError("wrong"), MemoryError(), RecursionError("too deep"), OSError(28, "No space left"),
+    KeyError("x"), ZeroDivisionError("by nothing"), InputError("bad"), NonFiniteError("a NaN"),
+    LostProcessError("gone"), InstallationError("no LLVM"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("raised", RAISED, ids=lambda error: type(error).__name__)
+def test_whatever_goes_wrong_is_the_error_of_one(raised, run, folder, tmp_path, monkeypatch):
+    check_one = checks.examine
+
+    def examine(file, *words):
+        if file.path.stem == "fig-8-6a":
+            raise raised
+        return check_one(file, *words)
+
+    monkeypatch.setattr(checks, "examine", examine)
+    code, printed, messages = run("check", folder, "-o", tmp_path / "out")
+    assert code == 2
+    assert "1 of 2 moved" in printed
+    assert "1 could not be checked" in printed
+    kind = "" if isinstance(raised, FotismosError) else f"{type(raised).__name__}: "
+    assert f"{kind}{raised}" in messages
+    assert "Traceback" not in messages
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
+def test_an_interruption_passes_through(raised, folder, tmp_path, monkeypatch):
+    def examine(*_):
+        raise raised
+
+    monkeypatch.setattr(checks, "examine", examine)
+    with pytest.raises(raised):
+        suite.examine(folder, 0.01, None, tmp_path)
+
+
+def test_a_result_goes_from_one_process_to_another(folder, tmp_path):
+    for name, status in (("fig-8-6a", "passed"), ("fig-8-6b", "failed"), ("none", "error")):
+        result = suite.examine_one(folder / f"{name}.json", 0.01, None, tmp_path / name)
+        received = pickle.loads(pickle.dumps(result))
+        assert received.status == result.status == status
+        assert received.path == result.path
+        if result.check is not None:
+            assert received.check.moves == result.check.moves
+
+
+def test_a_number_that_is_not_one_is_never_a_pass(folder, tmp_path, monkeypatch):
+    from comparisons.check import moved
+
+    monkeypatch.setattr(moved, "sidak", lambda p, tests: np.full(len(p), np.nan))
+    assert suite.examine_one(folder / "fig-8-6a.json", 0.01, None, tmp_path).status != "passed"
+
+
+# --- Scenes in Python ------------------------------------------------------------------------
+
+SCRIPT = """
+from colours import GREY
+
+def scene():
+    return {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 16, "height": 16}},
+        "ball": {"type": "sphere", "center": [0, 0, 4],
+                 "bsdf": {"type": "diffuse", "reflectance": GREY}},
+        "lamp": {"type": "point", "position": [2, 2, 0], "intensity": 30.0},
+    }
+"""
+
+
+def test_a_scene_in_python_is_checked_as_one_in_xml(run, tmp_path, monkeypatch):
+    scenes = tmp_path / "scenes"
+    scenes.mkdir()
+    (scenes / "ball.py").write_text(SCRIPT)
+    (scenes / "colours.py").write_text("GREY = 0.5\n")
+    folder = tmp_path / "baselines"
+    words = ("check", folder, "--update", "--scene", scenes / "ball.py", "--spp", 32)
+    assert run(*words)[0] == 0
+    assert json.loads((folder / "ball.json").read_text())["scene"] == "../scenes/ball.py"
+    monkeypatch.chdir(scenes)
+    assert run("check", folder, "-o", tmp_path / "out")[0] == 0
+    code, printed, _ = run(*words)
+    assert code == 0
+    assert "0 of 1 baselines written" in printed
+    (scenes / "colours.py").write_text("GREY = 0.25\n# changed\n")
+    assert run("check", folder, "-o", tmp_path / "out")[0] == 1
+    (scenes / "colours.py").write_text("GREY = undefined\n")
+    code, _, messages = run("check", folder, "-o", tmp_path / "out")
+    assert code == 2
+    assert "NameError" in messages
