@@ -110,7 +110,12 @@ def write(path: Path, content: str | bytes) -> None:
         As for :func:`replacing`.
     """
     with replacing(path) as partial:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        partial.write_bytes(encoded(content))
+
+
+def encoded(content: str | bytes) -> bytes:
+    """Return text as UTF-8, with names that are not in UTF-8 escaped as JSON does it."""
+    return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
 
 def abandoned(folder: Path, kind: str = "partial") -> Iterator[tuple[Path, Path]]:

@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from random import Random
 
@@ -12,6 +14,8 @@ from reports.commands import __path__ as commands
 from reports.files import listing, ownership
 from reports.run import output, places
 from tests.small_scene import SCENE
+
+ROOT = Path(__file__).parents[1]
 
 SMALL = ("--spp", 2, "--resolution", "12x12")
 
@@ -192,3 +196,55 @@ def test_whatever_the_order_a_folder_stays_its_scene_s(tmp_path, seed):
         for place in out.glob("*/result"):
             assert owner[place.parent.name.casefold()] == place.read_text(encoding="utf-8")
         assert len({place.casefold() for place in os.listdir(out)}) == len(os.listdir(out))
+
+
+ODD = ("a\nb", '{"gone": "x"}', "-o", "...", "\u2028", "x" * 250, "'\"$()")
+
+
+def test_scenes_and_folders_of_odd_names_work(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = scenes(tmp_path, *(f"{name}.xml" for name in ODD))
+    words = ("compare", *(f"./{path.name}" for path in made), "-o", "./\n{", *SMALL)
+    assert run(*words)[0] == 0
+    before = files(tmp_path / "\n{")
+    assert len([path for path in before if path.name == "comparison.json"]) == len(ODD)
+    assert run(*words)[0] == 0
+    assert files(tmp_path / "\n{") == before
+
+
+def test_a_folder_whose_name_is_not_in_utf8_is_written_to(scene_file):
+    """Its name is printed as it is, also where the terminal is strict about UTF-8."""
+    out = b"caf\xe9"
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-P",
+            "-m",
+            "reports",
+            "compare",
+            scene_file,
+            "-q",
+            "-o",
+            out,
+            *map(str, SMALL),
+        ],
+        cwd=scene_file.parent,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8:strict"},
+        capture_output=True,
+        check=False,
+        timeout=120,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout == out + b"/index.html\n"
+    record = scene_file.parent / os.fsdecode(out) / "run.json"
+    assert r"caf\udce9" in record.read_text(encoding="utf-8")
+    assert json.loads(record.read_bytes())["command"].endswith("12x12")
+
+
+def test_a_scene_whose_name_is_not_in_utf8_is_one_message(run, tmp_path):
+    (scene,) = scenes(tmp_path, "caf\udce9.xml")
+    for command in ("compare", "cost", "fit"):
+        code, printed, messages = run(command, scene, "-o", tmp_path / "out")
+        assert (code, printed) == (2, "")
+        assert r"caf\udce9.xml': this name is not in UTF-8" in messages
+        assert messages.count("\n") == 1

@@ -111,7 +111,7 @@ def write(path: Path, content: str | bytes) -> None:
         Where it cannot be written to.
     """
     with replacing(path) as partial:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        partial.write_bytes(atomic.encoded(content))
 
 
 @contextmanager
