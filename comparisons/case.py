@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from comparisons import atomic
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.pool import end_after_task
@@ -206,7 +207,7 @@ def file_of(scene: str | Path) -> Path | None:
     Raises
     ------
     InputError
-        When the file is not there.
+        When the file is not there, or Mitsuba cannot open a file of its name.
     """
     path = Path(scene)
     if path.suffix not in SUFFIXES and not path.exists():
@@ -217,6 +218,13 @@ def file_of(scene: str | Path) -> Path | None:
             " that makes one (.py), a folder of such, or the name of a built-in scene;"
             f" `{program.command('scenes')}` lists them."
         )
+    try:
+        str(path.resolve()).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"{atomic.printable(path.resolve())}: this name is not in UTF-8, and Mitsuba cannot"
+            " open it. Rename the file, or the folder that it is in."
+        ) from error
     return path
 
 
