@@ -71,7 +71,7 @@ def _is_of(column, value):
 def write(path, data):
     """Write a table to a Parquet file, atomically."""
     with atomic.replacing(Path(path)) as partial:
-        pq.write_table(data, partial, compression="zstd")
+        pq.write_table(data, partial, compression="zstd", write_page_checksum=True)
 
 
 def read(path):
@@ -84,7 +84,7 @@ def read(path):
     """
     try:
         require_regular(path)
-        found = pq.read_table(path)
+        found = pq.read_table(path, page_checksum_verification=True)
         found.validate(full=True)
         missing = {"part", "point", "error"} - set(found.column_names)
         if missing:
