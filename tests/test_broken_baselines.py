@@ -192,6 +192,10 @@ def test_each_baseline_is_judged_alone(run, folder, tmp_path, monkeypatch):
     kinds = {"error": ["error"], "failed": ["failure"], "passed": []}
     assert told == {name: kinds[status] for name, status in expected.items()}
     assert "Traceback" not in messages
+    for name in ("options", "passes", "version", "nul", "deep", "digits", "bytes"):
+        assert f"{folder / name}.json: " in messages
+        with pytest.raises(InputError, match="--update --scene"):
+            baselines.read(folder / f"{name}.json")
     for name in broken:
         assert f"title=fotismos check%3A {name} not checked::" in messages
     assert "title=fotismos check%3A fig-8-6b::" in messages
@@ -296,7 +300,8 @@ def test_a_scene_in_python_is_checked_as_one_in_xml(run, tmp_path, monkeypatch):
     words = ("check", folder, "--update", "--scene", scenes / "ball.py", "--spp", 32)
     assert run(*words)[0] == 0
     assert json.loads((folder / "ball.json").read_text())["scene"] == "../scenes/ball.py"
-    monkeypatch.chdir(scenes)
+    (tmp_path / "deeper/down").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "deeper/down")
     assert run("check", folder, "-o", tmp_path / "out")[0] == 0
     code, printed, _ = run(*words)
     assert code == 0
