@@ -226,6 +226,7 @@ def _results(out):
     for path in sorted(out.glob("?/*")):
         if path.suffix == ".json":
             record = json.loads(path.read_text(encoding="utf-8"))
+            record = record.get("content", record)
             record = record.get("view", record)
             record = record.get("record", record)
             found[path.relative_to(out)] = {
