@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from heuristic.errors import InputError
-from reference.scene.source import INCLUDE
+from reference.scene.reading import INCLUDE
 
 NAME = "scene"
 """What a Python file calls its dictionary, or the function that returns it."""
