@@ -1,6 +1,6 @@
 """What the user gave: the one door through which every command, test and notebook opens a scene."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.pool import end_after_task
 from heuristic import program
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
@@ -57,8 +57,12 @@ class Request:
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
         object.__setattr__(self, "define", values)
-        if self.resolution is not None:
+        if isinstance(self.resolution, Iterable):
             object.__setattr__(self, "resolution", tuple(self.resolution))
+        for word, kinds in (("pairing", Convention), ("interpolation", Interpolation)):
+            allowed = [kind.value for kind in kinds]
+            if getattr(self, word) not in (None, *allowed):
+                raise unknown(word, getattr(self, word), allowed)
         for name in (self.variant, self.heuristic_variant):
             if name not in (None, *VARIANTS):
                 raise InputError(
