@@ -110,16 +110,24 @@ def write(path: Path, content: str | bytes) -> None:
         As for :func:`replacing`.
     """
     with replacing(path) as partial:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        partial.write_bytes(encoded(content))
+
+
+def encoded(content: str | bytes) -> bytes:
+    """Return text as UTF-8, with names that are not in UTF-8 escaped as JSON does it."""
+    return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
 
 def abandoned(folder: Path, kind: str = "partial") -> Iterator[tuple[Path, Path]]:
-    """Yield what dead processes of this machine left in a folder, and what it was to stand at."""
+    """Yield what was left in a folder, and what it was to stand at.
+
+    That is by dead processes of this machine, and by earlier writings of this one that failed.
+    """
     for path in sorted(folder.iterdir()):
         found = LEFT.fullmatch(path.name)
         if found is None or (found["kind"], found["host"]) != (kind, HOST):
             continue
-        if not _is_alive(int(found["pid"]), found["start"]):
+        if not _may_go_on(int(found["pid"]), found["start"]):
             yield path, folder / found["name"]
 
 
@@ -131,8 +139,10 @@ def remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _is_alive(pid: int, start: str | None) -> bool:
-    """Tell whether a process is alive that has this number, and started then if that is known."""
+def _may_go_on(pid: int, start: str | None) -> bool:
+    """Tell whether another process is alive that has this number, and started then if known."""
+    if start and (pid, start) == (os.getpid(), _start(pid)):
+        return False
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

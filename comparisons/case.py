@@ -1,16 +1,17 @@
 """What the user gave: the one door through which every command, test and notebook opens a scene."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from comparisons import atomic
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.pool import end_after_task
 from heuristic import program
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
@@ -56,8 +57,12 @@ class Request:
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
         object.__setattr__(self, "define", values)
-        if self.resolution is not None:
+        if isinstance(self.resolution, Iterable):
             object.__setattr__(self, "resolution", tuple(self.resolution))
+        for word, kinds in (("pairing", Convention), ("interpolation", Interpolation)):
+            allowed = [kind.value for kind in kinds]
+            if getattr(self, word) not in (None, *allowed):
+                raise unknown(word, getattr(self, word), allowed)
         for name in (self.variant, self.heuristic_variant):
             if name not in (None, *VARIANTS):
                 raise InputError(
@@ -206,7 +211,7 @@ def file_of(scene: str | Path) -> Path | None:
     Raises
     ------
     InputError
-        When the file is not there.
+        When the file is not there, or Mitsuba cannot open a file of its name.
     """
     path = Path(scene)
     if path.suffix not in SUFFIXES and not path.exists():
@@ -217,6 +222,13 @@ def file_of(scene: str | Path) -> Path | None:
             " that makes one (.py), a folder of such, or the name of a built-in scene;"
             f" `{program.command('scenes')}` lists them."
         )
+    try:
+        str(path.resolve()).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"{atomic.printable(path.resolve())}: this name is not in UTF-8, and Mitsuba cannot"
+            " open it. Rename the file, or the folder that it is in."
+        ) from error
     return path
 
 

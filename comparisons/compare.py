@@ -26,12 +26,9 @@ from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
 from reference.rendering.gbuffer import GBuffer, gbuffer, image_size
 from reference.rendering.guard import Guard, Verdict, examine_plan
-from reference.rendering.renderer import Renderer, physical_integrator, variant
+from reference.rendering.renderer import LARGEST_PASS, Renderer, physical_integrator, variant
 from reference.scene import messages
 from reference.scene.sampler import with_sampler
-
-LARGEST = 2**26
-"""Pixels of an image: sums, images and maps of a comparison take some 300 bytes each."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -61,10 +58,10 @@ def prepare(source, options=None):
     pair = options.pair(source)
     physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
-    if width * height > LARGEST:
+    if width * height > LARGEST_PASS:
         raise InputError(
-            f"{source.name}: an image of {width}x{height} pixels is too large: {LARGEST} pixels are"
-            " allowed. Give a smaller one with --resolution."
+            f"{source.name}: an image of {width}x{height} pixels is too large:"
+            f" {LARGEST_PASS} pixels are allowed. Give a smaller one with --resolution."
         )
     begin = perf_counter()
     chosen = plan(pair, physical, options.interpolation, options.everything)

@@ -1,14 +1,28 @@
 """What can be chosen about a comparison."""
 
 from dataclasses import dataclass
+from math import inf
+from numbers import Integral, Real
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
+from heuristic.meshes import FINEST
 from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair
 from reference.scene.source import Source
+
+LARGEST_SPP = 2**20
+"""Samples a pixel: the noise is a thousandth of that of one, and an image takes days."""
+
+WHOLE = {
+    "seed": (0, 2**64 - 1),
+    "spp": (2, LARGEST_SPP),  # the noise needs at least 2
+    "tessellation": (1, FINEST),
+    "sensor": (0, 2**31 - 1),
+}
+"""Bounds of the options that are whole numbers, both allowed."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +63,8 @@ class Options:
     Raises
     ------
     InputError
-        For fewer than 2 samples, a noise target that is not positive, a negative seed, a
-        resolution below 1, or a heuristic that is not declared.
+        For a number beyond its bounds in :data:`WHOLE`, a noise target that is not positive and
+        finite, a resolution below 1, or a heuristic that is not declared.
     """
 
     seed: int = 0
@@ -69,20 +83,16 @@ class Options:
 
     def __post_init__(self):
         heuristics.named(self.heuristic)
-        if self.spp is not None and self.spp < 2:
+        for name, bounds in WHOLE.items():
+            _require_whole(name, getattr(self, name), *bounds)
+        if self.noise is not None and not (isinstance(self.noise, Real) and 0 < self.noise < inf):
             raise InputError(
-                f"spp = {self.spp} is not allowed: the noise needs at least 2 samples."
+                f"noise = {self.noise!r} is not allowed: give a ΔE2000 above 0, such as 0.5."
             )
-        if self.noise is not None and not self.noise > 0:
+        if self.resolution is not None and not _is_size(self.resolution):
             raise InputError(
-                f"noise = {self.noise} is not allowed: give a ΔE2000 above 0, such as 0.5."
-            )
-        if self.seed < 0:
-            raise InputError(f"seed = {self.seed} is not allowed: give 0 or more.")
-        if self.resolution is not None and min(self.resolution) < 1:
-            width, height = self.resolution
-            raise InputError(
-                f"resolution {width}x{height} is not allowed: width and height are at least 1."
+                f"resolution {self.resolution!r} is not allowed: give width and height, whole"
+                " numbers of at least 1."
             )
 
     def pair(self, source: Source) -> Pair:
@@ -97,3 +107,18 @@ class Options:
             sensor=self.sensor,
             heuristic=self.heuristic,
         )
+
+
+def _require_whole(name: str, value: object, low: int, high: int) -> None:
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if value is not None and not (is_whole and low <= value <= high):
+        raise InputError(
+            f"{name} = {value!r} is not allowed: give a whole number from {low} to {high}."
+        )
+
+
+def _is_size(resolution: object) -> bool:
+    if not isinstance(resolution, (tuple, list)):
+        return False
+    sides = [side for side in resolution if isinstance(side, Integral) and side >= 1]
+    return len(sides) == len(resolution) == 2

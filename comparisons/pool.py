@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count, islice
 from math import inf
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection, get_context, parent_process, resource_tracker
 from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
@@ -238,6 +238,7 @@ class _Worker:
 @contextmanager
 def _deaf() -> Iterator[None]:
     """Hold back signals, which a process that is started meanwhile never hears."""
+    resource_tracker.ensure_running()  # where it starts one, it lets signals through afterwards
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         yield

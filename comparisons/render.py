@@ -185,7 +185,7 @@ def _fits(state, sums, halves, size, passes):
     if {name: array.shape for name, array in state.items()} != shapes:
         return False
     counts = {name for name in shapes if name.endswith("_count")}
-    if any(state[name] != count for name in counts):
+    if any(state[name].dtype != count.dtype or state[name] != count for name in counts):
         return False
     doubles = [array for name, array in state.items() if name not in counts]
     return all(array.dtype == float and np.isfinite(array).all() for array in doubles)

@@ -24,15 +24,10 @@ def checked(name, value):
     """
     if dr.is_array_v(value) and dr.is_jit_v(value):
         return value
-    if isinstance(value, Real):
-        components = (float(value),)
-    elif not isinstance(value, str) and (
-        isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value)
-    ):
-        components = tuple(float(component) for component in np.ravel(value))
-    else:
+    components = _components(value)
+    if components is None:
         raise InputError(
-            f"{name} = {value!r} is no colour: give a number, RGB, or one value for each"
+            f"{name} = {value!r} is not a colour: give a number, RGB, or one value for each"
             " wavelength."
         )
     if not components:
@@ -41,6 +36,17 @@ def checked(name, value):
         if not (np.isfinite(component) and component >= 0):
             raise InputError(f"{name} = {value!r} is not allowed: give finite values of 0 or more.")
     return components[0] if len(components) == 1 else components
+
+
+def _components(value):
+    """Return the numbers of a value, None for what is not made of numbers."""
+    is_several = isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value)
+    if isinstance(value, str) or not (is_several or isinstance(value, Real)):
+        return None
+    try:
+        return tuple(float(component) for component in np.ravel(value))
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def is_zero(value):

@@ -14,8 +14,9 @@ from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import drjit as dr
+import numpy as np
 
-from heuristic import colours
+from heuristic import colours, numerics
 from heuristic.errors import InputError
 
 PLUGINS: dict[str, type["Light"]] = {}
@@ -86,10 +87,12 @@ class Light:
 def _triple(name: str, value: Any) -> object:
     """Return three finite floats, or the Dr.Jit array that was given."""
     if dr.is_array_v(value) and dr.is_jit_v(value):
-        return value
+        if dr.depth_v(value) == 2 and dr.size_v(value) == 3:
+            return value
+        raise InputError(f"{name}: {type(value).__name__} is not allowed: give three components.")
     try:
         triple = tuple(float(component) for component in value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         triple = ()
     if len(triple) != 3 or not all(map(isfinite, triple)):
         raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
@@ -118,9 +121,16 @@ def _attenuation(value: Any) -> tuple:
 
 
 def _number(name: str, is_allowed: Callable[[Real], bool], allowed: str, value: object) -> object:
-    if isinstance(value, Real) and not is_allowed(value):
+    number = numerics.plain(value)
+    if number is None or (isinstance(number, Real) and not is_allowed(number)):
         raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
-    return value
+    return number
+
+
+def _flag(name: str, value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
+    return bool(value)
 
 
 CHECKS: dict[str, Callable[[Any], object]] = {
@@ -135,6 +145,7 @@ CHECKS: dict[str, Callable[[Any], object]] = {
     ),
     "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
     "attenuation": _attenuation,
+    "clamped": partial(_flag, "clamped"),
 }
 
 ARRAYS = {

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from math import inf
 from numbers import Real
 
-import drjit as dr
-
 from heuristic import colours, numerics
 from heuristic.errors import InputError, unknown
 
@@ -67,20 +65,25 @@ class Material:
     def __post_init__(self):
         for name in COEFFICIENTS:
             object.__setattr__(self, name, colours.checked(name, getattr(self, name)))
-        _check_exponent(self.n)
+        object.__setattr__(self, "n", _exponent(self.n))
+        for name in ("normalised", "n_is_moderate"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(
+                    f"{name} = {getattr(self, name)!r} is not allowed: give True or False."
+                )
         check_form(self.form)
         if numerics.is_moderate(self.n):
             object.__setattr__(self, "n_is_moderate", True)
 
 
-def _check_exponent(n):
-    if dr.is_array_v(n):
-        return
-    if not (isinstance(n, Real) and 0 <= n < inf):
+def _exponent(n):
+    number = numerics.plain(n)
+    if number is None or (isinstance(number, Real) and not 0 <= number < inf):
         raise InputError(f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more.")
+    return number
 
 
 def check_form(form):
     """Refuse a form of the specular lobe that is not in :data:`FORMS`."""
-    if form not in FORMS:
+    if not isinstance(form, str) or form not in FORMS:
         raise unknown("form =", form, FORMS)

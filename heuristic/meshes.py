@@ -14,6 +14,9 @@ from heuristic.vertex_normals import Weighting, vertex_normals
 
 RESOLUTION = 16
 
+FINEST = 512
+"""A sphere then has four million triangles, which take half a gigabyte while they are made."""
+
 
 def to_mesh(shape, resolution=RESOLUTION):
     """Return a shape as a triangle mesh with the shape's own normals and texture coordinates.
@@ -37,11 +40,12 @@ def to_mesh(shape, resolution=RESOLUTION):
     Raises
     ------
     InputError
-        For a shape of any other type, or a resolution that is no whole number of 1 or more.
+        For a shape of any other type, or a resolution that is not a whole number from 1 to
+        :data:`FINEST`.
     """
-    if not isinstance(resolution, int) or resolution < 1:
+    if not isinstance(resolution, int) or not 1 <= resolution <= FINEST:
         raise InputError(
-            f"resolution = {resolution!r} is not allowed: give a whole number of 1 or more."
+            f"resolution = {resolution!r} is not allowed: give a whole number from 1 to {FINEST}."
         )
     kind = mi.ShapeType(shape.shape_type())
     if kind not in _cells(resolution):

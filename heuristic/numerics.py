@@ -13,8 +13,8 @@ Three ideas carry the module:
 """
 
 import sys
-from math import factorial, inf, log2
-from numbers import Real
+from math import factorial, inf, log2, nan
+from numbers import Integral, Real
 from typing import NamedTuple
 
 import drjit as dr
@@ -36,6 +36,19 @@ class Cosine(NamedTuple):
     value: object
     complement: object
     supplement: object = None
+
+
+def plain(value):
+    """Return a number as a Python int or float, and a Dr.Jit float as it is; else None.
+
+    NumPy's numbers and fractions are numbers, too; NaN comes of what is beyond all floats.
+    """
+    if dr.is_array_v(value):
+        return value if dr.depth_v(value) == 1 and dr.is_jit_v(value) else None
+    if isinstance(value, Integral):
+        value = int(value)
+        return value if abs(value) < 2**63 else nan
+    return float(value) if isinstance(value, Real) else None
 
 
 def is_moderate(n):
@@ -139,6 +152,15 @@ def inverse_root(square):
     return dr.rsqrt(at_least(square, smallest(square)))
 
 
+def inverse_length(square):
+    """Return ``1 / sqrt(square)``, and 0 where ``square`` is 0.
+
+    A vector times that is a unit vector or zero, and so is its derivative at the zero vector, where
+    that of a large number times zero would overflow as soon as light is added to it.
+    """
+    return dr.select(square >= smallest(square), inverse_root(square), 0)
+
+
 def at_least(value, low):
     """Return the larger of two, and NaN for NaN.
 
@@ -180,7 +202,7 @@ def wide(value):
 def wide_unit(vector):
     """Return a vector in double precision with length 1 to 1e-13, and zero for zero."""
     scaled_vector, _, square = scaled(vector)
-    root = inverse_root(square)
+    root = inverse_length(square)
     if not _is_single(vector):
         return scaled_vector * root
     vector = wide(scaled_vector)

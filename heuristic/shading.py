@@ -2,14 +2,15 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from heuristic import colours, lobes, numerics, terms, vectors
+from heuristic import arguments, colours, lobes, numerics, terms, vectors
 from heuristic.light import Light
-from heuristic.materials import Material
+from heuristic.materials import COEFFICIENTS, Material
 
 
 def shade(position, normal, view, material, lights, ambient=0, visible=None):
@@ -24,7 +25,9 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
     ----------
     position, normal, view
         Dr.Jit arrays of three components, of any float type: ``P``, ``N`` and ``V``, in one space.
-        Normals and views of any length are normalised; a zero vector receives no light.
+        Normals and views of any length are normalised; a zero vector receives no light. Three
+        plain numbers stand for all points, where another of the three is a Dr.Jit array. Half
+        precision and integers are computed in single precision.
     material : Material
         The coefficients.
     lights : sequence of PointLight, DirectionalLight or SpotLight
@@ -45,7 +48,8 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
     Raises
     ------
     InputError
-        For a negative or non-finite ``ambient``, or mixed numbers of wavelengths.
+        For arguments of other types or shapes, a negative or non-finite ``ambient``, or mixed
+        numbers of points or wavelengths.
 
     Examples
     --------
@@ -58,7 +62,11 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
     >>> shade(Array3f(0), normals, Array3f(0, 0, 1), Material(k_d=0.5), [sun])
     [0.5, 0.4]
     """
+    position, normal, view = arguments.vectors(position, normal, view)
+    material, lights = arguments.material(material), arguments.lights(lights)
+    visible = arguments.visibility(visible)
     ambient = colours.checked("ambient", ambient)
+    _check_sizes((position, normal, view), material, lights, ambient)
     _check_wavelengths(material, lights, ambient)
     vector_type = type(position)
     k_i, k_a, k_d, k_s, ambient = (
@@ -80,12 +88,28 @@ def shade(position, normal, view, material, lights, ambient=0, visible=None):
             for coefficient, term in ((k_d, diffuse), (k_s, specular))
             if term is not None
         ]
-    return _total(present, dr.value_t(vector_type))
+    coefficients = (k_i, k_a, k_d, k_s, ambient)
+    return _total(present, _value_type(coefficients, dr.value_t(vector_type)))
 
 
-def _total(present, float_type):
-    """Add up terms of any kind into one value of at least the kernel's float type."""
-    total = float_type(0)
+def _check_sizes(point, material, lights, ambient):
+    values = dict(zip(("position", "normal", "view"), point, strict=True))
+    values |= {name: getattr(material, name) for name in (*COEFFICIENTS, "n")}
+    for number, light in enumerate(lights):
+        own = {entry.name: getattr(light, entry.name) for entry in fields(light)}
+        values |= {f"lights[{number}].{name}": value for name, value in own.items()}
+    arguments.require_one_size(values | {"ambient": ambient})
+
+
+def _value_type(coefficients, float_type):
+    """Return the type of a sum of all terms, whether or not each is there."""
+    arrays = [value for value in coefficients if dr.is_array_v(value)]
+    return dr.expr_t(float_type, *map(type, arrays)) if arrays else float_type
+
+
+def _total(present, value_type):
+    """Add up terms of any kind into one value of a type."""
+    total = value_type(0)
     for term in present:
         total = total + term
     return total

@@ -15,7 +15,7 @@ def normalise(vector):
     A direction that does not exist then contributes nothing to a scalar product, instead of NaN.
     """
     vector, _, square = numerics.scaled(vector)
-    return vector * numerics.inverse_root(square)
+    return vector * numerics.inverse_length(square)
 
 
 def light_vector(light_position, position):
@@ -26,7 +26,7 @@ def light_vector(light_position, position):
     float.
     """
     half, inverse, square = numerics.scaled(_half_offset(light_position, position))
-    inverse_length = numerics.inverse_root(square)
+    inverse_length = numerics.inverse_length(square)
     distance = square * inverse_length * 2 * numerics.inverse_of_power(inverse)
     return half * inverse_length, numerics.at_most(distance, numerics.largest(distance))
 
@@ -41,7 +41,7 @@ def wide_light_vector(light_position, position):
     """Return ``L`` of 6.26 in double precision as a vector and its inverse length, to 1e-13."""
     half = _half_offset(light_position, position)
     scaled, inverse, square = numerics.scaled(half)
-    root = numerics.inverse_root(square)
+    root = numerics.inverse_length(square)
     if type(half) is dr.float64_array_t(type(half)):
         return scaled, root
     half = _half_offset(numerics.wide(light_position), numerics.wide(position))

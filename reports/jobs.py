@@ -260,7 +260,7 @@ def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
     """
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
-    from reference.scene.source import placeholders
+    from reference.scene.reading import placeholders
 
     own = [
         {key: value for key, value in whole.define.items() if key in placeholders(Path(scene))}

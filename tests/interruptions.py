@@ -16,7 +16,8 @@ import tempfile
 import time
 import uuid
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -202,8 +203,8 @@ def interrupt(name: str, own: Path, whole: dict, seconds: float, random: Random)
     """Interrupt a command at a random moment, and run it once more to its end."""
     number = random.choice((signal.SIGINT, signal.SIGTERM))
     to_all, moment, mark = random.random() < 0.5, random.uniform(0, seconds), uuid.uuid4().hex
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder, "out")
+    # Beside the whole one, since baselines name their scenes as seen from their folder.
+    with _folder(own.parent / mark) as out:
         process = start(name, own, out, mark)
         time.sleep(moment)
         if process.poll() is None:
@@ -220,7 +221,7 @@ def interrupt(name: str, own: Path, whole: dict, seconds: float, random: Random)
         if process.returncode not in (0, 128 + number, -number):
             faults.append(f"exit code {process.returncode}")
         if process.returncode != -number:
-            faults += [word for word in MESSAGES if word in messages]
+            faults += [messages[-2000:] for word in MESSAGES if word in messages]
         again = start(name, own, out, mark)
         _, messages = again.communicate(timeout=600)
         if again.returncode:
@@ -228,6 +229,14 @@ def interrupt(name: str, own: Path, whole: dict, seconds: float, random: Random)
         elif (found := results(out)) != whole:
             faults += [f"differs: {k}" for k in {*found, *whole} if found.get(k) != whole.get(k)]
     return Trial(number, moment, process.returncode, tuple(faults))
+
+
+@contextmanager
+def _folder(path: Path) -> Iterator[Path]:
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def trials(name: str, count: int, seed: int = 0) -> list[Trial]:

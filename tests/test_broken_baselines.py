@@ -80,8 +80,12 @@ def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(count, tmp_path):
         try:
             found = baselines.read(path).baseline
         except InputError as error:
-            assert str(path) in str(error)
-            assert "--update --scene" in str(error)
+            message = str(error)
+        else:
+            message = None
+        if message is not None:
+            assert str(path) in message
+            assert "--update --scene" in message
             outcomes["refused"] += 1
             continue
         quantities = list(found.measured().quantities())
@@ -188,6 +192,10 @@ def test_each_baseline_is_judged_alone(run, folder, tmp_path, monkeypatch):
     kinds = {"error": ["error"], "failed": ["failure"], "passed": []}
     assert told == {name: kinds[status] for name, status in expected.items()}
     assert "Traceback" not in messages
+    for name in ("options", "passes", "version", "nul", "deep", "digits", "bytes"):
+        assert f"{folder / name}.json: " in messages
+        with pytest.raises(InputError, match="--update --scene"):
+            baselines.read(folder / f"{name}.json")
     for name in broken:
         assert f"title=fotismos check%3A {name} not checked::" in messages
     assert "title=fotismos check%3A fig-8-6b::" in messages
@@ -292,7 +300,8 @@ def test_a_scene_in_python_is_checked_as_one_in_xml(run, tmp_path, monkeypatch):
     words = ("check", folder, "--update", "--scene", scenes / "ball.py", "--spp", 32)
     assert run(*words)[0] == 0
     assert json.loads((folder / "ball.json").read_text())["scene"] == "../scenes/ball.py"
-    monkeypatch.chdir(scenes)
+    (tmp_path / "deeper/down").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "deeper/down")
     assert run("check", folder, "-o", tmp_path / "out")[0] == 0
     code, printed, _ = run(*words)
     assert code == 0

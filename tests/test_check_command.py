@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from comparisons.check.moved import Move
+from heuristic.errors import InputError
 from reports import cli
 from reports.ci import annotations, junit
 from tests.schemas import schema
@@ -252,6 +253,26 @@ def test_junit_survives_names_that_xml_cannot_hold():
     document = junit.document([failure(name="a\x00<b>&\x1b", message="no\x08\ufffe")])
     case = ElementTree.fromstring(document).find("testsuite/testcase")
     assert case.get("name") == "a�<b>&�"
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_name_that_is_not_utf_8_can_be_told(service, tmp_path):
+    environment = {service: "true", "GITHUB_STEP_SUMMARY": str(tmp_path / "summary.md")}
+    results = [failure("a\udcff\n[b]"), failure("c\udcff", "d\udcff")]
+    told = annotations.annotate(results, tmp_path, 0.01, environment)
+    told += [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()]
+    assert told
+    assert "\udcff" not in "".join(told)
+    "".join(told).encode()
+
+
+def test_a_place_that_cannot_be_written_to_is_a_message(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"Not a directory|File exists"):
+        annotations.annotate([failure()], tmp_path / "file", 0.01, {"GITLAB_CI": "true"})
+    environment = {"GITHUB_ACTIONS": "true", "GITHUB_STEP_SUMMARY": str(tmp_path / "file/summary")}
+    with pytest.raises(InputError, match="Not a directory"):
+        annotations.annotate([failure()], tmp_path, 0.01, environment)
 
 
 def test_github_gets_errors_and_a_summary(tmp_path):

@@ -33,7 +33,8 @@ def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
         assert record["resolution"] == size
         assert (out / name / "comparison.exr").stat().st_size > 0
         assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
-    expected = [".fotismos", "index.html", "my-scene", "other", "run.json", "tables"]
+    hidden = [".fotismos", ".fotismos-lock"]
+    expected = [*hidden, "index.html", "my-scene", "other", "run.json", "tables"]
     assert sorted(path.name for path in out.iterdir()) == expected
 
 

@@ -459,7 +459,7 @@ def test_a_sheared_cylinder_is_refused(rgb, capfd):
 
 @pytest.mark.parametrize("resolution", [0, -3, 1.5])
 def test_resolutions_that_mean_nothing_are_refused(rgb, resolution):
-    with pytest.raises(InputError, match="whole number of 1 or more"):
+    with pytest.raises(InputError, match="whole number from 1 to 512"):
         meshes.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
 
 

@@ -99,7 +99,6 @@ def image(source):
     return np.array(Renderer(graph.instantiate(), integrator, 4, "test").render(0))
 
 
-@pytest.mark.guarantee("runs", "A result is rendered again once any file that was read changes.")
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_that_changes_changes_image_and_key(kind, place, folder):
@@ -153,6 +152,50 @@ def test_values_count_to_the_last_digit(folder):
 
 def frame(size):
     return {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(size)}
+
+
+PYTHON = """
+import json
+from pathlib import Path
+
+GREY = json.loads(Path("grey.json").read_text())
+scene = {
+    "type": "scene",
+    "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+    "ball": {"type": "sphere", "center": [0, 0, 4],
+             "bsdf": {"type": "diffuse", "reflectance": {"type": "bitmap", "filename": "t.exr"}}},
+    "lamp": {"type": "constant", "radiance": GREY},
+}
+"""
+
+
+@pytest.mark.guarantee(
+    "runs",
+    "A finished scene is rendered again once a file changes that Mitsuba or the scene's script"
+    " read for it, wherever it was found.",
+)
+@pytest.mark.parametrize("suffix", [".xml", ".py"])
+def test_a_finished_scene_is_rendered_again_once_a_file_changes(suffix, run, folder):
+    name, write, element = KINDS["texture"]
+    scene, texture = folder / f"scene/s{suffix}", file_in("current", name, folder)
+    grey = folder / "current/grey.json"
+    grey.write_text("0.5")
+    write(texture, 0.2)
+    scene.write_text(PYTHON if suffix == ".py" else SCENE % ("", element % name))
+    words = ("compare", scene, "--spp", 4, "-o", folder / "out")
+    result = folder / "out/s/comparison.json"
+
+    def written():
+        before = result.stat().st_mtime_ns if result.exists() else None
+        assert run(*words)[0] == 0
+        return result.stat().st_mtime_ns != before
+
+    assert [written(), written()] == [True, False]
+    write(texture, 0.9)
+    assert [written(), written()] == [True, False]
+    if suffix == ".py":
+        grey.write_text("0.50000001")
+        assert [written(), written()] == [True, False]
 
 
 # --- Scripts ---------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -11,9 +12,10 @@ import pytest
 from comparisons import atomic
 from heuristic.errors import InputError
 from reports.ci.checks import FILES
-from reports.files import listing, ownership
+from reports.files import holding, listing, ownership
 from reports.run import output
 
+HIDDEN = {listing.MARK, holding.LOCK}
 SMALL = ("--spp", 2, "--resolution", "12x12")
 
 
@@ -116,11 +118,11 @@ def test_what_a_dead_run_left_is_cleared_away_and_restored(tmp_path, dead):
         old.mkdir()
         listing.confirm(old)
         (old / "comparison.json").write_text(f"old {name}")
-    (tmp_path / "b").mkdir()
+    ownership.folder(tmp_path / "b")
     (tmp_path / "b/comparison.json").write_text("b")
     with output.held(tmp_path, "test"):
         pass
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+    assert {path.name for path in tmp_path.iterdir()} - HIDDEN == {"a", "b"}
     assert (tmp_path / "a/comparison.json").read_text() == "old a"
     assert (tmp_path / "b/comparison.json").read_text() == "b"
 
@@ -180,3 +182,77 @@ def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
                 continue
         assert all(path.read_text() == text for path, text in mine.items())
     assert not [path for path in tmp_path.iterdir() if "fotismos-" in path.name]
+
+
+def test_a_number_that_another_process_has_now_keeps_nothing(tmp_path):
+    """The start of a process is in the name; without it, the number alone tells."""
+    mine = atomic.beside(tmp_path / "a").name
+    recycled = mine.replace(f".{os.getpid()}-", f".{os.getpid()}-1")
+    alive = partial(tmp_path, "b", os.getppid())
+    endless = partial(tmp_path, "c", "9" * 30)
+    for name in (mine, recycled, alive.name, endless.name):
+        (tmp_path / name).touch()
+    with output.held(tmp_path, "test"):
+        assert {path.name for path in tmp_path.iterdir()} - HIDDEN == {alive.name, endless.name}
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import heuristic
+from reports.files import ownership
+from reports.run import output
+
+def ending(call):
+    def instead(*words, **more):
+        global count
+        count += 1
+        if count == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return call(*words, **more)
+    return instead
+
+def produce(folder):
+    for name in ("mkdir", "rename", "replace", "unlink", "rmdir", "open", "write"):
+        setattr(os, name, ending(getattr(os, name)))
+    with output.held(folder, "killed"):
+        ownership.write(folder / "index.html", "ours")
+        with ownership.replacing_folder(folder / "scene") as new:
+            (new / "a.png").write_bytes(b"ours")
+        ownership.write(output.below(folder, "fit") / "fit.json", "ours")
+
+for at in range(1, 100):
+    count, folder = 0, Path(sys.argv[1], str(at))
+    folder.mkdir()
+    child = os.fork()
+    if not child:
+        produce(folder)
+        os._exit(0)
+    if not os.waitpid(child, 0)[1]:
+        break
+print(at)
+"""
+
+
+@pytest.mark.guarantee(
+    "runs", "What a user puts where a killed command was about to write stays the user's."
+)
+def test_what_is_put_where_a_killed_run_was_about_to_write_is_not_ours(tmp_path):
+    """Killed at every call that changes the disk; the user's file comes before the next run."""
+    root, words = Path(__file__).parents[1], [sys.executable, "-c", KILLED, tmp_path]
+    done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True)
+    assert 15 < int(done.stdout) < 99
+    for folder in tmp_path.iterdir():
+        mine = [folder / name for name in ("index.html", "fit/fit.json")]
+        mine = [path for path in mine if path.parent.is_dir() and not path.exists()]
+        for path in mine:
+            path.write_text("mine", encoding="utf-8")
+        with output.held(folder, "next"):
+            for path in mine:
+                with pytest.raises(InputError, match="not made by fotismos"):
+                    ownership.write(path, "ours")
+            with ownership.replacing_folder(folder / "scene") as new:
+                (new / "a.png").write_bytes(b"next")
+        assert all(path.read_text(encoding="utf-8") == "mine" for path in mine)
+        left = [path.name for path in folder.rglob("*") if "fotismos-" in path.name]
+        assert left == [holding.LOCK], folder

@@ -82,7 +82,7 @@ def write(path, data):
 def file_of(data):
     """Return the Parquet file of a table as bytes."""
     stream = pa.BufferOutputStream()
-    pq.write_table(data, stream, compression="zstd")
+    pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
     return stream.getvalue().to_pybytes()
 
 
@@ -96,7 +96,7 @@ def read(path):
     """
     try:
         require_regular(path)
-        found = pq.read_table(path)
+        found = pq.read_table(path, page_checksum_verification=True)
         found.validate(full=True)
         missing = {"part", "point", "error"} - set(found.column_names)
         if missing:

@@ -5,13 +5,14 @@ half replaces what is physical, the physical half replaces what is heuristic, an
 the right kind stays. Geometry, cameras and films are those of the scene in both.
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
+from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
@@ -109,6 +110,23 @@ def pair(
     register()
     graph = source.parse()
     settings = preparation.prepare(graph, resolution, sensor)
+    with _refused_by_mitsuba(graph):
+        return _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic)
+
+
+@contextmanager
+def _refused_by_mitsuba(graph):
+    """Let Mitsuba say what is wrong with a scene that breaks pairing, if it refuses it too."""
+    try:
+        yield
+    except FotismosError:
+        raise
+    except Exception:
+        graph.instantiate()
+        raise
+
+
+def _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic):
     geometry = cache(_bare(graph).instantiate)
 
     model, half = named(heuristic), graph.copy()
@@ -133,7 +151,7 @@ def pair(
 
     records = (*given_physical, *given_heuristic)
     return Pair(
-        name=source.name,
+        name=graph.name,
         heuristic=half,
         physical=physical,
         hide_emitters=settings.hide_emitters,

@@ -18,7 +18,11 @@ import numpy as np
 from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
 from reference.rendering.direct import AlbedoTable
+from reference.rendering.gbuffer import image_size
 from reference.scene.preparation import PATHS
+
+LARGEST_PASS = 2**26
+"""Samples of one pass, and pixels of an image: each takes some 300 bytes while it is under way."""
 
 
 @dataclass(frozen=True)
@@ -150,6 +154,11 @@ class Renderer:
         Samples per pixel and pass.
     label
         Name in error messages.
+
+    Raises
+    ------
+    InputError
+        For more samples than :data:`LARGEST_PASS` in a pass, when it is rendered.
     """
 
     def __init__(self, scene, integrator, spp, label):
@@ -171,6 +180,7 @@ class Renderer:
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
         """
+        self._require_room()
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
@@ -195,6 +205,15 @@ class Renderer:
         if not dr.all(dr.isfinite(image.array)):
             require_finite(np.array(image), f"{self.label}, pass with seed {seed}")
         return image
+
+    def _require_room(self):
+        width, height = image_size(self.scene)
+        if width * height * self.spp > LARGEST_PASS:
+            raise InputError(
+                f"{self.label}: {self.spp} samples a pixel of {width}x{height} pixels at once are"
+                f" too many: {LARGEST_PASS} samples a pass are allowed. Give fewer with --spp, or a"
+                " smaller image with --resolution."
+            )
 
     def pass_times(self):
         """Return the :class:`PassTimes` of the passes so far."""

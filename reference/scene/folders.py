@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from heuristic.errors import InputError
+from reference.scene.reading import INCLUDE
 from reference.scene.script import NAME
-from reference.scene.source import INCLUDE
 
 ROOT = re.compile(r"<scene\b")
 

@@ -79,6 +79,8 @@ class Graph:
             state.nodes[0] = Parser.SceneNode(state.nodes[index])
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
+                if isinstance(node.props[key], mi.TensorXf):  # a plugin takes it away
+                    node.props[key] = mi.TensorXf(node.props[key])
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
         # A plugin written in Python that evaluates something, made by one of several threads, would

@@ -27,8 +27,8 @@ def noted() -> Iterator[set[Path]]:
     modules imported. Left out are the standard library, installed packages and the project itself.
     Modules imported are forgotten again: other code may mean another file by the same name.
 
-    What is read in native code, in other processes, after the block, or from the environment and
-    the clock is not noted.
+    What is read in native code, in other processes, after the block (as a Python plugin may, once
+    it renders), or from the environment and the clock is not noted.
     """
     _listen()
     paths: set[str] = set()

@@ -1,6 +1,5 @@
 """Where a scene comes from, read once: the file parsed, the script run, its files named."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -12,6 +11,7 @@ import mitsuba as mi
 from heuristic.errors import InputError
 from reference.scene import messages
 from reference.scene.graph import Graph, files_from, resolving
+from reference.scene.reading import included, require_named_files
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -103,16 +103,17 @@ class Source:
         content, resolver = self._content(), None
         try:
             if isinstance(content, Mapping):
+                require_named_files(content)
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                included(path)
+                included(path, self.parameters)
                 resolver = files_from(path.resolve().parent)
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
-        except RuntimeError as error:
+        except (RuntimeError, ValueError) as error:  # the latter of bytes that are not UTF-8
             raise InputError(f"{self.name}: {error}") from error
         if state.root.type != mi.ObjectType.Scene:
             raise InputError(
@@ -132,70 +133,3 @@ def _file(resolver: mi.FileResolver, value: str) -> Path | None:
         return path.resolve() if path.is_file() else None
     except OSError:
         return None
-
-
-DEEPEST = 100
-"""Elements within elements. Scenes need about ten; the parser's stack is full at some thousands."""
-
-TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'<>])*?(/?)>""")
-INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
-PLACEHOLDER = re.compile(r"\$(\w+)")
-COMMENT = re.compile(r"<!--.*?(?:-->|\Z)", re.DOTALL)
-
-
-def included(path: Path) -> list[Path]:
-    """Return a scene file and those that it includes, after ensuring that all can be read.
-
-    Mitsuba's parser recurses, and can be made to crash. No more is checked than what would end the
-    process or never end; all else is Mitsuba's to refuse.
-
-    Raises
-    ------
-    InputError
-        When one is not a file or cannot be read, has a NUL, includes itself, or is too deep.
-    """
-    found: list[Path] = []
-    _check(path, (), found)
-    return found
-
-
-def placeholders(path: Path) -> set[str]:
-    """Return the names of the placeholders in a scene file and what it includes; none in others."""
-    if path.suffix != ".xml" or not path.is_file():
-        return set()
-    return {name for each in included(path) for name in PLACEHOLDER.findall(_text(each))}
-
-
-def _check(path: Path, outer: tuple[Path, ...], found: list[Path]) -> None:
-    if path.resolve() in outer:
-        raise InputError(f"{path}: it includes itself. Take the <include> out that leads back.")
-    if len(outer) >= DEEPEST:
-        raise InputError(f"{path}: more than {DEEPEST} files include each other.")
-    text = _text(path)
-    found.append(path.resolve())
-    depth = 0
-    for end, empty in TAG.findall(text):
-        depth += -1 if end else 0 if empty else 1
-        if depth > DEEPEST:
-            raise InputError(
-                f"{path}: elements lie more than {DEEPEST} deep in each other. Write it flatter."
-            )
-    for name in INCLUDE.findall(text):
-        inner = path.parent / name
-        if inner.is_file():  # else Mitsuba looks elsewhere, or says what is missing
-            _check(inner, (*outer, path.resolve()), found)
-
-
-def _text(path: Path) -> str:
-    """Return a file's text without its comments."""
-    if not path.is_file():
-        raise InputError(
-            f"{path}: there is no such file, or it is no regular one. Give a Mitsuba scene (.xml)."
-        )
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}. Ensure that it can be read.") from error
-    if b"\0" in content:
-        raise InputError(f"{path}: it holds a NUL byte, which no XML file in UTF-8 has.")
-    return COMMENT.sub("", content.decode("utf-8", errors="replace"))

@@ -103,24 +103,25 @@ def _cells(result):
 
 def _cell(text):
     """Return text in one line that Markdown shows as it is; `markdown` sees to bars."""
-    text = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
+    text = junit.clean(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
 def _title(result):
     """Name the baseline, and say so if it could not be checked; what moved is in the headline."""
-    return f"fotismos check: {result.name}" + " not checked" * (result.status == "error")
+    name = junit.clean(result.name)
+    return f"fotismos check: {name}" + " not checked" * (result.status == "error")
 
 
 def _github(result, variables):
     place = os.path.relpath(result.path, variables.get("GITHUB_WORKSPACE") or ".")
-    file = Path(place).as_posix().translate(GITHUB_PROPERTY)
+    file = junit.clean(Path(place).as_posix()).translate(GITHUB_PROPERTY)
     title = _title(result).translate(GITHUB_PROPERTY)
     return f"::error file={file},title={title}::{junit.headline(result).translate(GITHUB)}"
 
 
 def _azure(result):
-    place = os.path.relpath(result.path).translate(AZURE_PROPERTY)
+    place = junit.clean(os.path.relpath(result.path)).translate(AZURE_PROPERTY)
     text = junit.headline(result).translate(AZURE)
     return f"##vso[task.logissue type=error;sourcepath={place}]{_title(result)}: {text}"
 
@@ -132,7 +133,7 @@ def _teamcity(result):
 
 
 def _code_quality(result):
-    path = Path(os.path.relpath(result.path)).as_posix()
+    path = junit.clean(Path(os.path.relpath(result.path)).as_posix())
     return {
         "description": f"{_title(result)}: {junit.headline(result)}",
         "check_name": "fotismos check",

@@ -21,12 +21,12 @@ def document(results):
     root = Element("testsuites", totals)
     suite = SubElement(root, "testsuite", totals, skipped="0")
     for result in results:
-        names = {"name": _clean(result.name), "file": _clean(result.path.as_posix())}
+        names = {"name": clean(result.name), "file": clean(result.path.as_posix())}
         time = f"{result.seconds:.3f}"
         case = SubElement(suite, "testcase", names, classname="fotismos.check", time=time)
         if result.status == "failed":
             failure = SubElement(case, "failure", message=headline(result), type="moved")
-            failure.text = _clean("\n".join(lines.moved_lines(result.check)))
+            failure.text = clean("\n".join(lines.moved_lines(result.check)))
         elif result.status == "error":
             error = SubElement(case, "error", message=headline(result), type="error")
             error.text = headline(result)
@@ -37,14 +37,15 @@ def document(results):
 def headline(result):
     """Return one line on a baseline that did not pass."""
     if result.check is None:
-        return _clean(result.message)
+        return clean(result.message)
     first, *others = result.check.moved
     more = f", and {len(others)} more" if others else ""
-    return _clean(
+    return clean(
         f"{first.quantity} moved from {first.before:.6g} to {first.after:.6g}"
         f" (p = {first.p_corrected:.1g}){more}"
     )
 
 
-def _clean(text):
+def clean(text):
+    """Return text with a mark in place of what XML and UTF-8 cannot hold, as a file's name may."""
     return NOT_IN_XML.sub("�", text)

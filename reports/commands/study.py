@@ -1,5 +1,6 @@
 """``fotismos study``: how the departure behaves over a space of scenes."""
 
+import os
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -84,4 +85,4 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
         places = list(study_files.write(wanted, outcome, folder, page))
     verbosity.tell([*study_files.summary(wanted, outcome), ""])
     for place in places:
-        click.echo(place)
+        click.echo(os.fsencode(place))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -50,14 +48,10 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         "compression": OpenEXR.ZIP_COMPRESSION,
         "chromaticities": BT709,
     }
-    with atomic.replacing(path) as partial:
-        # The bindings report an unwritable place as a RuntimeError; opening it says why.
-        partial.touch()
-        with OpenEXR.File(attributes, channels(layers)) as file:
-            try:
-                file.write(str(partial))
-            except RuntimeError as error:
-                raise _of_the_system(error) from error
+    file = OpenEXR.File(attributes, channels(layers))
+    # Given a path, the bindings do not say when its end could not be written.
+    with file, atomic.replacing(path) as partial, partial.open("wb") as stream:
+        file.write(stream)
 
 
 def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -76,13 +70,6 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
             plane = np.ascontiguousarray(planes[..., index], precision)
             result[f"{name}.{suffix}"] = plane
     return result
-
-
-def _of_the_system(error: RuntimeError) -> OSError:
-    """Return the error of the system that the bindings tell in words."""
-    words = str(error)
-    code = next((code for code in errno.errorcode if os.strerror(code) in words), errno.EIO)
-    return OSError(code, words)
 
 
 def _suffixes(name: str, image: np.ndarray) -> str:

@@ -4,7 +4,7 @@ import errno
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -36,10 +36,12 @@ def held(folder: Path, command: str) -> Iterator[None]:
         Saying which process holds the folder, or why it cannot be written to.
     """
     path = folder / LOCK
+    for own in (path, folder / listing.MARK):
+        with atomic.explained(own):
+            if os.path.lexists(own) and (own.is_symlink() or not own.is_file()):
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
     lock = FileLock(path, PATIENCE_S, fallback_to_soft=False, preserve_lock_file=True)
     with atomic.explained(path):
-        if os.path.lexists(path) and not path.is_file():
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
         try:
             lock.acquire()
         except Timeout:
@@ -52,9 +54,10 @@ def held(folder: Path, command: str) -> Iterator[None]:
             path.write_text(_holder(command), encoding="utf-8")
         yield
     finally:
-        if not listing.read(folder).made:
-            for name in (listing.MARK, LOCK):
-                (folder / name).unlink(missing_ok=True)
+        if listing.read(folder).is_empty():
+            with suppress(OSError):
+                for name in (listing.MARK, LOCK):
+                    (folder / name).unlink(missing_ok=True)
         lock.release()
 
 

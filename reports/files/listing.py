@@ -36,6 +36,10 @@ class Listed:
     coming: dict[str, str] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
 
+    def is_empty(self) -> bool:
+        """Tell whether fotismos neither made anything nor was about to."""
+        return not self.made and not self.coming
+
 
 def read(folder: Path) -> Listed:
     """Return what the list of a folder says; nothing where there is none."""
@@ -60,7 +64,9 @@ def announce(folder: Path, name: str, identity: str) -> None:
 def withdraw(folder: Path, *names: str) -> None:
     """Take names off the list."""
     listed = read(folder)
-    _append(folder, [json.dumps({"gone": n}) for n in names if n in listed.made | {*listed.coming}])
+    known = listed.made | listed.coming.keys()
+    if gone := [json.dumps({"gone": name}) for name in names if name in known]:
+        _append(folder, gone)
 
 
 def assign(folder: Path, places: dict[str, str]) -> None:
@@ -139,7 +145,7 @@ def _name_line(name: str) -> str:
 def _append(folder: Path, lines: list[str]) -> None:
     """Add whole lines, or none."""
     content = "".join(f"{line}\n" for line in lines).encode()
-    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NONBLOCK
+    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
     descriptor = os.open(folder / MARK, flags, 0o666)
     try:
         size = os.fstat(descriptor).st_size

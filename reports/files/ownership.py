@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from comparisons import atomic
-from heuristic.errors import InputError
+from heuristic.errors import InputError, OutputError
 from reports.files import listing
 from reports.files.listing import MARK
 
@@ -87,7 +87,7 @@ def clear(path: Path, names: Iterable[str]) -> None:
 
 def leave(path: Path) -> None:
     """Delete the list of a folder in which fotismos made nothing, and the folder if it is empty."""
-    if made(path):
+    if not listing.read(path).is_empty():
         return
     (path / MARK).unlink(missing_ok=True)
     if path.name in made(path.parent) and _is_empty(path):
@@ -113,7 +113,7 @@ def write(path: Path, content: str | bytes) -> None:
         Where it cannot be written to.
     """
     with replacing(path) as partial:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        partial.write_bytes(atomic.encoded(content))
 
 
 @contextmanager
@@ -156,13 +156,15 @@ def replacing_folder(place: Path) -> Iterator[Path]:
             new.mkdir()
             yield new
             listing.confirm(new, *sorted(path.name for path in new.iterdir()))
-            _put(new, place, old)
+            was_there = _put(new, place, old)
         finally:
             with suppress(OSError):  # what stays is cleared away by the next run
                 atomic.remove(new)
         listing.confirm(place.parent, place.name)
-    with suppress(OSError):
-        atomic.remove(old)
+    with suppress(OSError):  # as above; what is half deleted has not the name of what is whole
+        if was_there:
+            old.rename(new)
+            atomic.remove(new)
 
 
 def recover(folder: Path) -> None:
@@ -175,15 +177,15 @@ def recover(folder: Path) -> None:
     for old, place in atomic.abandoned(folder, "old"):
         if not (old / MARK).is_file():
             continue
-        if place.exists():
-            atomic.remove(old)
-        else:
+        if not place.exists():
             old.rename(place)
+        elif (place / MARK).is_file():
+            atomic.remove(old)
     listing.tidy(folder)
     for name in made(folder):
         inner = folder / name
         if (inner / MARK).is_file() and not inner.is_symlink():
-            with suppress(OSError):  # a result without rights is not in this run's way
+            with suppress(OSError, OutputError):  # without rights it is not in this run's way
                 recover(inner)
 
 
@@ -199,12 +201,15 @@ def _withdrawing(path: Path) -> Iterator[None]:
         raise
 
 
-def _put(new: Path, place: Path, old: Path) -> None:
-    """Put a new folder in the place of an old one, with what others put into that."""
+def _put(new: Path, place: Path, old: Path) -> bool:
+    """Put a new folder in the place of an old one, with what others put into that.
+
+    Returns whether there was one.
+    """
     listing.announce(place.parent, place.name, listing.identity_of(new))
     if not place.exists():
         new.rename(place)
-        return
+        return False
     _keep(place, new)
     place.rename(old)
     try:
@@ -213,6 +218,7 @@ def _put(new: Path, place: Path, old: Path) -> None:
         if not place.exists():
             old.rename(place)
         raise
+    return True
 
 
 def _keep(place: Path, new: Path) -> None:

@@ -129,7 +129,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         for png_name, png in pictured.items():
             (place / f"{png_name}.png").write_bytes(png)
         exr.write(place / "comparison.exr", layers, _header(record))
-        (place / "comparison.json").write_text(to_json(record), encoding="utf-8")
+        (place / "comparison.json").write_bytes(atomic.encoded(to_json(record)))
         for file, content in priced.items():
             (place / file).write_bytes(content)
         if key is not None:

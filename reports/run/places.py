@@ -69,7 +69,8 @@ def folder_name(name: str, taken: Iterable[str] = ()) -> str:
 
 
 def _candidates(name: str) -> Iterable[str]:
-    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
+    composed = unicodedata.normalize("NFC", name)
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in composed)
     plain = plain.encode(errors="replace")[:LONGEST].decode(errors="ignore").strip(".") or "scene"
     yield plain
     number = 1

@@ -1,5 +1,7 @@
 """How much a command says: results on standard output, everything else on standard error."""
 
+import os
+
 import click
 
 LEVEL = "fotismos.verbosity"
@@ -45,7 +47,8 @@ def tell(lines):
 
 def tell_where(path):
     """Print where the results are; of a quiet command it is all that is printed."""
-    click.echo(path if is_quiet() else f"\n{path}")
+    name = os.fsencode(path)  # as it is, also where it is not in UTF-8
+    click.echo(name if is_quiet() else b"\n" + name)
 
 
 def remark(lines):

@@ -2,10 +2,15 @@
 
 from dataclasses import replace
 
+import drjit as dr
+import mitsuba as mi
+
+from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS
 from reference.pairing.nearest import operations
 from reference.pairing.nearest.material import BSDF, Context, Nearest, alike, rule
 from reference.pairing.nearest.operations import TEXTURE
+from reference.scene.graph import Reference
 
 
 @rule("twosided", wraps=True)
@@ -77,15 +82,40 @@ def blend(context: Context, index: int) -> Nearest:
 @rule("normalmap", wraps=True)
 def normal_map(context: Context, index: int) -> Nearest:
     """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
-    return _tilted(context, index, normals=context.graph.props(index)["normalmap"])
+    normals = context.graph.props(index)["normalmap"]
+    _require(context, index, normals, "eval_3", "normal")
+    return _tilted(context, index, normals=normals)
 
 
 @rule("bumpmap", wraps=True)
 def bump_map(context: Context, index: int) -> Nearest:
     """``bumpmap``: the nested material, with the displaced surface's normal (as there)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
-    scale = float(context.value(index, "scale", 1.0))
-    return _tilted(context, index, heights=context.graph.props(index)[key], scale=scale)
+    scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
+    _require(context, index, heights, "eval_1_grad", "slope")
+    return _tilted(context, index, heights=heights, scale=scale)
+
+
+def _require(context: Context, index: int, texture: object, ability: str, what: str) -> None:
+    """Refuse a texture that lacks what its map evaluates, which shading would only find out.
+
+    Mitsuba has no such texture either, but in integrators that evaluate no material.
+    """
+    graph = context.graph
+    if not isinstance(texture, Reference):
+        return
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.shape = mi.ShapePtr(mi.load_dict({"type": "rectangle"}))
+    made = graph.instantiate(texture.index())
+    try:
+        dr.eval(getattr(made, ability)(si))
+    except RuntimeError as error:
+        if f"{ability}()" in str(error):
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: a texture {graph.plugin(texture.index())}"
+                f" gives {context.plugin(index)} no {what} (Mitsuba"
+                f" cannot {ability} it). Give a bitmap of three channels."
+            ) from error
 
 
 def _tilted(context: Context, index: int, **values: object) -> Nearest:

@@ -1,0 +1,207 @@
+"""What `heuristic.shade` takes, what it refuses in words, and that its gradients are finite."""
+
+from itertools import product
+
+import drjit as dr
+import drjit.scalar
+import numpy as np
+import pytest
+from drjit.llvm.ad import Array2f, Array3f, Array3f16, Array3f64, Array3i, Array4f, Float, TensorXf
+
+from heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
+from heuristic.errors import InputError
+
+UP = (0.0, 0.0, 1.0)
+LAMP = PointLight((0, 0, 3), 1.0)
+GREY = Material(k_a=0.1, k_d=0.5, k_s=0.3, n=8)
+
+
+def points(count=3):
+    return Array3f(np.linspace(0, 1, count), 0, 0)
+
+
+def shaded(position=None, normal=UP, view=UP, material=GREY, lights=(LAMP,), **more):
+    position = points() if position is None else position
+    return shade(position, normal, view, material, lights, **more)
+
+
+ACCEPTED = {
+    "a tuple": UP,
+    "a list": list(UP),
+    "a NumPy array": np.array(UP),
+    "integers": (0, 0, 1),
+    "one point": Array3f(UP),
+    "half precision": Array3f16(UP),
+    "whole numbers": Array3i(0, 0, 1),
+    "scalars": drjit.scalar.Array3f(UP),
+    "double precision": Array3f64(UP),
+}
+
+
+@pytest.mark.parametrize("given", ACCEPTED.values(), ids=ACCEPTED.keys())
+@pytest.mark.parametrize("name", ["normal", "view"])
+def test_a_vector_may_be_given_in_any_of_these_forms(name, given):
+    expected = np.array(shaded(normal=Array3f(UP), view=Array3f(UP)))
+    np.testing.assert_allclose(np.array(shaded(**{name: given})), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("vector", [Array3f16, Array3i])
+def test_narrow_types_are_computed_in_single_precision(vector):
+    value = shaded(vector(0, 0, 0), vector(0, 0, 1), vector(0, 0, 1))
+    assert type(value) is Float
+    assert value[0] == pytest.approx(0.8)
+
+
+REFUSED_VECTORS = {
+    "None": None,
+    "a word": "up",
+    "a number": 1.0,
+    "rows": np.zeros((5, 3)),
+    "columns": np.zeros((3, 5)),
+    "nested lists": [[0, 0, 1]] * 3,
+    "two numbers": (0, 1),
+    "words": ["0", "0", "1"],
+    "two components": Array2f(0, 1),
+    "four components": Array4f(0, 0, 1, 0),
+    "a float": Float(1),
+    "a tensor": TensorXf(np.zeros((3, 4))),
+    "an object": object(),
+    "other points": points(4),
+    "no points": dr.zeros(Array3f, 0),
+}
+
+
+@pytest.mark.parametrize("given", REFUSED_VECTORS.values(), ids=REFUSED_VECTORS.keys())
+@pytest.mark.parametrize("name", ["position", "normal", "view"])
+def test_any_other_vector_is_refused_by_name(name, given):
+    arguments = {"position": points(), "normal": points(), "view": points()} | {name: given}
+    with pytest.raises(InputError, match=name):
+        shade(**arguments, material=GREY, lights=[LAMP])
+
+
+def test_plain_numbers_alone_are_refused():
+    with pytest.raises(InputError, match="none of them"):
+        shade(UP, UP, UP, GREY, [LAMP])
+
+
+REFUSED_REST = [
+    ({"material": None}, "material"),
+    ({"material": {"k_d": 1}}, "material"),
+    ({"lights": None}, "lights"),
+    ({"lights": LAMP}, "lights is .*give a list"),
+    ({"lights": "sun"}, "lights"),
+    ({"lights": [None]}, r"lights\[0\]"),
+    ({"lights": [LAMP, [LAMP]]}, r"lights\[1\]"),
+    ({"lights": [PointLight]}, r"lights\[0\]"),
+    ({"lights": [PointLight((0, 0, 3), Float([1, 2]))]}, r"position has 3, lights\[0\].intensity"),
+    ({"material": Material(k_d=Float([1, 2]))}, "position has 3, k_d has 2"),
+    ({"ambient": Float([1, 2, 3, 4])}, "ambient has 4"),
+    ({"ambient": None}, "ambient"),
+    ({"ambient": ["a", "b"]}, "ambient"),
+    ({"visible": True}, "visible"),
+    ({"visible": lambda toward, distance: None}, "visible returned"),
+    ({"visible": lambda toward, distance: 1}, "visible returned"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED_REST)
+def test_any_other_argument_is_refused_by_name(words, message):
+    with pytest.raises(InputError, match=message):
+        shaded(**words)
+
+
+ODD = [None, "x", object(), [1, [2]], ["a"], 1j, {1: 2}, 10**400, float("nan"), -1, (), Array2f(1)]
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: str(odd)[:9])
+def test_odd_values_are_refused_where_a_material_or_light_is_made(odd):
+    makers = [
+        lambda: Material(n=odd),
+        lambda: Material(form=odd),
+        lambda: Material(normalised=odd),
+        lambda: PointLight(odd, 1),
+        lambda: PointLight(UP, 1, attenuation=odd),
+        lambda: PointLight(UP, 1, clamped=odd),
+        lambda: DirectionalLight(odd, 1),
+        lambda: SpotLight(UP, UP, 1, cutoff=odd),
+        lambda: SpotLight(UP, UP, 1, cutoff=30, exponent=odd),
+    ]
+    if not dr.is_array_v(odd):
+        makers += [lambda: Material(k_d=odd), lambda: PointLight(UP, odd)]
+    for make in makers:
+        with pytest.raises(InputError):
+            make()
+
+
+@pytest.mark.parametrize("number", [np.int32(2), np.float32(2), np.float64(2)])
+def test_numbers_of_numpy_are_numbers(number):
+    spot = SpotLight((0, 0, 3), (0, 0, -1), number, cutoff=20 * number, exponent=number)
+    same = SpotLight((0, 0, 3), (0, 0, -1), 2, cutoff=40, exponent=2)
+    value = shaded(material=Material(k_d=0.1 * number, k_s=0.5, n=number), lights=[spot])
+    expected = shaded(material=Material(k_d=0.2, k_s=0.5, n=2), lights=[same])
+    np.testing.assert_allclose(np.array(value), np.array(expected), rtol=1e-6)
+
+
+def test_lights_may_come_from_any_iterable():
+    several = [LAMP, DirectionalLight((0, 0, -1), 0.5)]
+    expected = np.array(shaded(lights=several))
+    for given in (tuple(several), iter(several), (light for light in several)):
+        np.testing.assert_array_equal(np.array(shaded(lights=given)), expected)
+
+
+MATERIALS = [
+    Material(k_d=0.5),
+    Material(k_d=(0.1, 0.2, 0.3)),
+    Material(k_a=(0.1, 0.2, 0.3), k_d=0.5),
+    Material(k_d=(0.1,) * 5),
+    Material(k_d=Array3f(0.1, 0.2, 0.3)),
+    Material(k_d=Float([0.1, 0.2, 0.3])),
+    Material(),
+]
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_without_lights_the_type_is_the_same(material):
+    assert type(shaded(material=material, lights=[])) is type(shaded(material=material))
+
+
+# -- Gradients -------------------------------------------------------------------------------------
+
+WHERE = {
+    "a zero normal": {"normal": (0, 0, 0)},
+    "a zero view": {"view": (0, 0, 0)},
+    "at the light": {"lamp": (0, 0, 0)},
+    "all of them": {"normal": (0, 0, 0), "view": (0, 0, 0), "lamp": (0, 0, 0)},
+    "the mirror direction": {"view": UP},
+    "a light behind": {"lamp": (0, 0, -2)},
+    "a light on the horizon": {"lamp": (2, 0, 0)},
+}
+LIGHTS = {
+    "even": lambda place, axis, power: PointLight(place, power),
+    "inverse square": lambda place, axis, power: PointLight(place, power, (0, 0, 1)),
+    "clamped": lambda place, axis, power: PointLight(place, power, (0, 0, 1), clamped=True),
+    "spot": lambda place, axis, power: SpotLight(place, axis, power, 40, 2.5, (0, 0, 1)),
+    "parallel": lambda place, axis, power: DirectionalLight(axis, power),
+}
+
+
+@pytest.mark.guarantee(
+    "kernel", "Gradients are finite at a zero normal, a zero view and a light's own position."
+)
+@pytest.mark.parametrize("where", WHERE.values(), ids=WHERE.keys())
+@pytest.mark.parametrize("make", LIGHTS.values(), ids=LIGHTS.keys())
+def test_gradients_are_finite_wherever_a_direction_is_missing(where, make):
+    for vector, n, form in product((Array3f, Array3f64), (0, 2, 0.5, 1e5), ("phong", "blinn")):
+        number = dr.value_t(vector)
+        given = {"normal": UP, "view": (0, 0.3, 1), "lamp": (0, 0, 2)} | where
+        leaves = {name: vector(*value) for name, value in given.items()}
+        leaves |= {"position": vector(0, 0, 0), "axis": vector(0, 0, -1)}
+        leaves |= {"power": number(9), "k_d": number(0.5), "k_s": number(0.4)}
+        dr.enable_grad(leaves)
+        material = Material(k_d=leaves["k_d"], k_s=leaves["k_s"], n=n, form=form)
+        light = make(leaves["lamp"], leaves["axis"], leaves["power"])
+        value = shade(leaves["position"], leaves["normal"], leaves["view"], material, [light])
+        dr.backward(value, flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+        assert np.isfinite(np.array(value)).all()
+        for name, leaf in leaves.items():
+            assert np.abs(np.array(dr.grad(leaf))).max() < 1e4, (name, vector, n, form)
