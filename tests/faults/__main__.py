@@ -34,7 +34,7 @@ def of_kind(kind: str) -> list[Fault]:
     ValueError
         For two faults of one name.
     """
-    modules = [import_module(f"tests.faults.{name}") for name in KINDS[kind]]
+    modules = [import_module(f"tests.faults.declared.{name}") for name in KINDS[kind]]
     faults = list(chain.from_iterable(module.faults() for module in modules))
     if len({fault.name for fault in faults}) < len(faults):
         names = [fault.name for fault in faults]
@@ -68,11 +68,11 @@ def main(words: list[str]) -> int:
         done.append(found)
         print("." if found.is_good else f"\n{next(table.failures([found]))}", end="",
               file=sys.stderr, flush=True)  # fmt: skip
+        if chosen.json:
+            rows = [asdict(each) for each in done]
+            chosen.json.write_text(json.dumps(rows, indent=1, ensure_ascii=False))
     print(file=sys.stderr)
     print(*table.lines(done), "", *table.failures(done), sep="\n")
-    if chosen.json:
-        rows = [asdict(each) for each in done]
-        chosen.json.write_text(json.dumps(rows, indent=1, ensure_ascii=False), encoding="utf-8")
     return int(not all(each.is_good for each in done))
 
 

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from threading import Lock
 
+from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, Fault, compare, with_scene, written
-from tests.faults.words import STUDY
 from tests.interruptions import ROOT
 
 Damage = Callable[[Path], object]
@@ -67,8 +67,12 @@ DAMAGES: dict[str, Damage] = {
 }
 KEPT = {"view.json": "out/a/view.json", "the list of the folder": "out/.fotismos",
         "the lock": "out/.fotismos-lock"}  # fmt: skip
-OTHERS = {"comparison.exr": "out/a/comparison.exr", "comparison.json": "out/a/comparison.json",
-          "the list of the scene's folder": "out/a/.fotismos", "run.json": "out/run.json"}  # fmt: skip
+OTHERS = {
+    "comparison.exr": "out/a/comparison.exr",
+    "comparison.json": "out/a/comparison.json",
+    "the list of the scene's folder": "out/a/.fotismos",
+    "run.json": "out/run.json",
+}
 
 LISTS = {
     "a list that names files elsewhere": "../mine.txt\n/etc/passwd\n../../x\n.\n..\n",

@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.faults.fault import RESULTS, Fault, compare, written
 from tests.small_scene import SCENE
 
-CORPUS = Path(__file__).parents[1] / "corpus"
+CORPUS = Path(__file__).parents[2] / "corpus"
 
 READS = {
     "waves.png": "texture-bitmap",

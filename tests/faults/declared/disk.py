@@ -4,8 +4,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, SMALL, UNPRIVILEGED, Fault, compare, then, written
-from tests.faults.words import STUDY
 from tests.small_scene import SCENE
 
 MADE = "was not made by fotismos"
@@ -136,7 +136,8 @@ def _limits(scene) -> Iterator[Fault]:
                         "ulimit -f|File too large", codes, scene,
                         shell=f'ulimit -f {blocks}; exec "$@"')  # fmt: skip
     yield Fault("compare with files of 100 blocks at most", compare(), "ulimit -f", (2,), scene,
-                (), ("out/a/comparison.json", "out/run.json"), 'ulimit -f 100; exec "$@"')  # fmt: skip
+                leaves=("out/a/comparison.json", "out/run.json"),
+                shell='ulimit -f 100; exec "$@"')  # fmt: skip
     yield Fault("compare with 12 open files", compare(), "open files|Too many", (0, 1, 2), scene,
                 RESULTS, shell='ulimit -n 12; exec "$@"')  # fmt: skip
     check = ("check", "b", "-o", "out", "--junit")

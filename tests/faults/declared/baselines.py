@@ -9,7 +9,7 @@ from typing import Any
 from tests.faults.fault import CHECKED, Fault, then, written
 from tests.small_scene import SCENE
 
-WHOLE = Path(__file__).parents[1] / "baselines/fig-8-9-llvm_ad_rgb.json"
+WHOLE = Path(__file__).parents[2] / "baselines/fig-8-9-llvm_ad_rgb.json"
 CHECK = ("check", "b", "-o", "out", "--junit", CHECKED)
 BESIDE = "a-whole.json"
 Edit = Callable[[dict[str, Any]], object]
@@ -166,8 +166,8 @@ def _together() -> Iterator[Fault]:
     words = ("check", "b", "--update", "-o", "out")
     yield Fault("an update of a broken one", words, "b.json", (2,), then(_folder, broken))
     words = ("check", "b/b.json", "--update", "--scene", "a.xml", "--spp", "8")
-    yield Fault("an update in place of a pipe", words, "regular|b.json", (2,),
-                then(_folder, written({"a.xml": SCENE}), lambda f: os.mkfifo(f / "b/b.json")))  # fmt: skip
+    pipe = then(_folder, written({"a.xml": SCENE}), lambda f: os.mkfifo(f / "b/b.json"))
+    yield Fault("an update in place of a pipe", words, "regular|b.json", (2,), pipe)
 
 
 def _of(name: str, prepare, codes: tuple[int, ...] = (2,)) -> Fault:

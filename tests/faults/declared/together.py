@@ -7,9 +7,9 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.faults.disk import LIMITED
+from tests.faults.declared.disk import LIMITED
+from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, Fault, compare, then, written
-from tests.faults.words import STUDY
 from tests.small_scene import SCENE
 
 SMALL = "--spp 4 --resolution 16x16"
@@ -74,7 +74,8 @@ def _after_each_other() -> Iterator[Fault]:
     runs = f'"$@" study a.toml -o out --processes 1 && exec "$@" compare a.xml -o out {SMALL}'
     places = ("out/study/a/*.parquet", "out/a/comparison.json")
     yield Fault("a study and a scene of one name", (), "", (0,), prepare, places, shell=runs)
-    runs = f'"$@" check b --update --scene a.xml --spp 8 & "$@" check c --update --scene a.xml --spp 8; wait'
+    made = '"$@" check {} --update --scene a.xml --spp 8'
+    runs = f"{made.format('b')} & {made.format('c')}; wait"
     yield Fault("two updates at once", (), "", (0,), SCENES, ("b/a.json", "c/a.json"), shell=runs)
     runs = f'for i in 1 2 3 4; do "$@" compare a.xml -o out {SMALL} & done; wait'
     yield Fault("four at once", (), None, (0,), SCENES, RESULTS, shell=runs)
@@ -123,8 +124,8 @@ def _locks() -> Iterator[Fault]:
         yield Fault(f"a lock of {name}", compare(), "", (0,), _lock(pid, place), RESULTS, ours=ours)
         for kind in ("partial", "old"):
             left = _left(kind, abs(pid), place)
-            yield Fault(f"{kind} files of {name}", compare(), "", (0,), left, RESULTS,
-                        ours=ours if "dead" in name or "no pro" in name else (ours[0] + "lock",))  # fmt: skip
+            own = ours if "dead" in name else (".fotismos-lock",)
+            yield Fault(f"{kind} files of {name}", compare(), "", (0,), left, RESULTS, ours=own)
     hold = ("python3 -c 'import fcntl, sys, time; f = open(\"out/.fotismos-lock\", \"w\");"
             " fcntl.flock(f, fcntl.LOCK_EX); time.sleep(60)' & p=$!; sleep 1; ")  # fmt: skip
     for command in ("compare", "cost", "fit", "study"):

@@ -10,8 +10,8 @@ import mitsuba as mi
 
 def scene():
     return {"type": "scene", "integrator": {"type": "direct"},
-            "sensor": {"type": "perspective",
-                       "to_world": mi.ScalarTransform4f().look_at([0, -5, 2], [0, 0, 0], [0, 0, 1])},
+            "sensor": {"type": "perspective", "to_world": mi.ScalarTransform4f().look_at(
+                [0, -5, 2], [0, 0, 0], [0, 0, 1])},
             "ball": {"type": "sphere", "bsdf": {"type": "diffuse"}},
             "lamp": {"type": "point", "position": [2, -3, 4], "intensity": 60.0}}
 """
@@ -131,7 +131,8 @@ LIVES = {
     "a trace function": "sys.settrace(lambda *_: None)",
     "another variant": "import mitsuba as mi\nmi.set_variant('scalar_rgb')",
     "a plugin of its own":
-        "import mitsuba as mi\nmi.register_bsdf('own', lambda p: mi.load_dict({'type': 'diffuse'}))",
+        "import mitsuba as mi\n"
+        "mi.register_bsdf('own', lambda p: mi.load_dict({'type': 'diffuse'}))",
     "NumPy's errors raised": "import numpy\nnumpy.seterr(all='raise')",
     "the random seed": "import random\nrandom.seed(1)",
     "a log level": "import mitsuba as mi\nmi.set_log_level(mi.LogLevel.Trace)",

@@ -18,32 +18,39 @@ HEIGHT = '<integer name="height" value="16"/>'
 DEPTH = '<integer name="max_depth" value="3"/>'
 LAST = "</scene>"
 
+
+def _child(kind: str, name: str) -> str:
+    return f'<{kind} name="{name}" value="{{}}"/>'
+
+
+CROP = (
+    '<integer name="crop_width" value="4"/><integer name="crop_height" value="4"/>'
+    '<integer name="crop_offset_y" value="0"/>'
+)
+ZEROS, NANS = " ".join("0" * 16), " ".join(["nan"] * 16)
+
 REFUSED = {
-    "radius": (SPHERE, SPHERE + '<float name="radius" value="{}"/>', ("nan", "inf", "0", "1e39", "x", "")),
+    "radius": (SPHERE, SPHERE + _child("float", "radius"), ("nan", "inf", "0", "1e39", "x", "")),
     "centre": (SPHERE, SPHERE + '<point name="center" x="{}" y="0" z="0"/>', ("nan", "-inf", "x")),
-    "fov": (CAMERA, CAMERA + '<float name="fov" value="{}"/>', ("nan", "0", "-10", "180", "inf", "x")),
-    "near_clip": (CAMERA, CAMERA + '<float name="near_clip" value="{}"/>', ("nan", "0", "-1", "1e30")),
-    "alpha": (ALPHA, '<float name="alpha" value="{}"/>', ("nan", "inf", "1e308", "x")),
-    "int_ior": (ALPHA, ALPHA + '<float name="int_ior" value="{}"/>', ("nan", "inf", "0", "-1.5")),
-    "material": (ALPHA, ALPHA + '<string name="int_ior" value="{}"/>', ("watr",)),
-    "distribution": (ALPHA, ALPHA + '<string name="distribution" value="{}"/>', ("gxg",)),
+    "fov": (CAMERA, CAMERA + _child("float", "fov"), ("nan", "0", "-10", "180", "inf", "x")),
+    "near_clip": (CAMERA, CAMERA + _child("float", "near_clip"), ("nan", "0", "-1", "1e30")),
+    "alpha": (ALPHA, _child("float", "alpha"), ("nan", "inf", "1e308", "x")),
+    "int_ior": (ALPHA, ALPHA + _child("float", "int_ior"), ("nan", "inf", "0", "-1.5")),
+    "material": (ALPHA, ALPHA + _child("string", "int_ior"), ("watr",)),
+    "distribution": (ALPHA, ALPHA + _child("string", "distribution"), ("gxg",)),
     "colour": (COLOUR, 'value="{}"', ("nan, 0, 0", "-1, 0, 0", "0.2, 0.3", "a, b, c", "", "#12")),
     "position": (LAMP, '<point name="position" x="{}" y="-3" z="4"/>', ("nan", "inf", "x")),
-    "intensity": (POWER, '<rgb name="intensity" value="{}"/>', ("nan", "inf", "1e39")),
+    "intensity": (POWER, _child("rgb", "intensity"), ("nan", "inf", "1e39")),
     "scale": (FLOOR, '<scale x="{}" y="5"/>', ("nan", "0", "inf", "1e-60")),
     "rotation": (FLOOR, FLOOR + '<rotate x="1" angle="{}"/>', ("nan", "inf", "x")),
-    "matrix": (FLOOR, '<matrix value="{}"/>', ("1 2 3", " ".join("0" * 16), " ".join(["nan"] * 16))),
-    "width": (WIDTH, '<integer name="width" value="{}"/>', ("0", "-5", "1000000000", "x", "1.5", "9" * 30)),
-    "crop_width": (WIDTH, WIDTH + '<integer name="crop_width" value="{}"/>', ("0", "-1", "25")),
-    "crop_offset_x": (
-        WIDTH, WIDTH + '<integer name="crop_width" value="4"/><integer name="crop_offset_y" value="0"/>'
-        '<integer name="crop_height" value="4"/><integer name="crop_offset_x" value="{}"/>',
-        ("-1", "23"),
-    ),
+    "matrix": (FLOOR, '<matrix value="{}"/>', ("1 2 3", ZEROS, NANS)),
+    "width": (WIDTH, _child("integer", "width"), ("0", "-5", "1000000000", "x", "1.5", "9" * 30)),
+    "crop_width": (WIDTH, WIDTH + _child("integer", "crop_width"), ("0", "-1", "25")),
+    "crop_offset_x": (WIDTH, WIDTH + CROP + _child("integer", "crop_offset_x"), ("-1", "23")),
     "filter": (HEIGHT, HEIGHT + '<rfilter type="{}"/>', ("boxy",)),
-    "pixel_format": (HEIGHT, HEIGHT + '<string name="pixel_format" value="{}"/>', ("rgbx",)),
-    "depth": (DEPTH, '<integer name="max_depth" value="{}"/>', ("-5", "x")),
-}  # fmt: skip
+    "pixel_format": (HEIGHT, HEIGHT + _child("string", "pixel_format"), ("rgbx",)),
+    "depth": (DEPTH, _child("integer", "max_depth"), ("-5", "x")),
+}
 """By name: what stands in the small scene, what comes in its place, and values for that."""
 
 REPLACED = {

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from signal import Signals
 
-from tests.faults.disk import LIMITED
+from tests.faults.declared.disk import LIMITED
+from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, Fault, Sent, compare, written
-from tests.faults.words import STUDY
 from tests.small_scene import SCENE
 
 INT, TERM, HUP = Signals.SIGINT, Signals.SIGTERM, Signals.SIGHUP
