@@ -18,7 +18,7 @@ from itertools import count, islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, NoReturn
 
 from comparisons.interruption import SIGNALS
@@ -32,6 +32,9 @@ GUARD = ("/bin/sh", "-c", "read _; kill -9 0")
 
 GRACE_S = 1.0
 """Seconds in which a process may end by itself."""
+
+PAUSE_S = 0.01
+"""Seconds between looks at whether a process that was told to end has ended."""
 
 LOOK_S = 1.0
 """Seconds between looks at whether a process lives: what it forked may hold its pipe open."""
@@ -223,7 +226,10 @@ class _Worker:
     def end(self, grace_s: float = GRACE_S) -> int | None:
         """End the process with its group, and return its exit code."""
         self.pipe.close()
-        self.process.join(grace_s)
+        until = monotonic() + grace_s
+        # Not by `join`, which waits for ever for a process that closed all its files.
+        while self.process.is_alive() and monotonic() < until:
+            sleep(PAUSE_S)
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
@@ -308,7 +314,7 @@ def _answer(
         return "set_result", function(*arguments, *([progress] if with_progress else []))
     except FotismosError as error:
         return "set_exception", error
-    except Exception as error:  # whatever a task brings about is its own failure
+    except BaseException as error:  # Ctrl-C is ignored here: whatever comes is the task's own
         LOGGER.info("a task failed", exc_info=True)
         return "unexpected", f"{type(error).__name__}: {error}"
 

@@ -38,6 +38,10 @@ def refuse(message):
     raise InputError(message)
 
 
+def stop(kind):
+    raise kind
+
+
 def note_once(path):
     with path.open("a") as file:
         file.write("once\n")
@@ -116,6 +120,29 @@ def test_a_task_that_kills_its_process_takes_no_other_along():
     assert messages["killed"].startswith("killed: its process was killed (SIGKILL)")
     assert messages["leaving"] == "leaving: its process ended with exit code 7."
     assert messages["dividing"].startswith("dividing: ZeroDivisionError: ")
+
+
+def close_all():
+    os.closerange(0, 100)
+    time.sleep(1000)
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit, GeneratorExit])
+def test_whatever_a_task_raises_is_its_own_failure(kind, capfd):
+    with Pool(1) as pool:
+        found = do(pool, Task("raising", stop, (kind,)), Task("sum", add, (1, 2)))
+    assert str(found["raising"]).startswith(f"raising: {kind.__name__}")
+    assert found["sum"] == 3
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_closed_all_its_files_is_ended():
+    begin = time.monotonic()
+    with Pool(1, limit_s=60) as pool:
+        found = do(pool, Task("closing", close_all, ()), Task("sum", add, (1, 2)))
+    assert isinstance(found["closing"], LostProcessError)
+    assert found["sum"] == 3
+    assert time.monotonic() - begin < 50
 
 
 def test_what_a_task_prints_is_no_result(capfd):

@@ -31,7 +31,7 @@ from reports.terminal import verbosity
     "--significance",
     default=0.01,
     show_default=True,
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    type=jobs.Within(0, 1, min_open=True, max_open=True),
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
 @jobs.json_option
