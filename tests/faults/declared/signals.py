@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from signal import Signals
 
 from tests.faults.declared.disk import LIMITED
+from tests.faults.declared.scripts import GOOD
 from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, Fault, Sent, compare, written
 from tests.small_scene import SCENE
@@ -13,7 +14,9 @@ ENDS = {INT: 130, TERM: 143, HUP: 129}
 SAID = "interrupted"
 
 BEGUN, WRITTEN, FINISHED = "out/.fotismos-lock", "out/.fotismos", "out/a/view.json"
-PREPARED = written({"a.xml": SCENE, "b.xml": SCENE, "s.toml": STUDY})
+UNDER_WAY = "started"
+SLOW = "from pathlib import Path\nimport time\nPath('started').touch()\ntime.sleep(3)\n" + GOOD
+PREPARED = written({"a.xml": SCENE, "b.xml": SCENE, "s.toml": STUDY, "slow.py": SLOW})
 
 
 def faults() -> Iterator[Fault]:
@@ -31,7 +34,7 @@ def faults() -> Iterator[Fault]:
             yield _ended(f"{number.name} to {command}", number, Sent(number, when), words=words)
     report = ("report", "-o", "out", "--resolution", "8x8", "--spp", "4")
     for number in (INT, TERM):
-        for when in (2.0, BEGUN, "out/fig-8-5a/view.json"):
+        for when in (2.0, BEGUN, 15.0):
             yield _ended(f"{number.name} to report at {when}", number, Sent(number, when),
                          words=report)  # fmt: skip
     for words in (("scenes",), ("doctor",), ("completion", "bash")):
@@ -49,23 +52,26 @@ def _killed() -> Iterator[Fault]:
     yield Fault("SIGKILL, and once more", compare("a.xml", "b.xml"), None, (0,), PREPARED, RESULTS,
                 shell='"$@" & sleep 9; kill -9 $!; wait; exec "$@"')  # fmt: skip
     for number in (kill, TERM, Signals.SIGSEGV, Signals.SIGBUS, Signals.SIGABRT, Signals.SIGUSR1):
-        for when in (0.05, BEGUN):
-            yield Fault(f"{number.name} to the worker at {when}", compare(), number.name, (1,),
-                        PREPARED, sent=(Sent(number, when, "worker"),))  # fmt: skip
-    for number in (INT, Signals.SIGPIPE, Signals.SIGCHLD, Signals.SIGWINCH):
-        yield Fault(f"{number.name} to the worker", compare(), "", (0,), PREPARED, RESULTS,
-                    sent=(Sent(number, BEGUN, "worker"),))  # fmt: skip
-    stop = Sent(Signals.SIGSTOP, BEGUN, "worker")
-    yield Fault("SIGSTOP to the worker", (*compare(), "--timeout", "20"), "20 s without", (1,),
-                PREPARED, sent=(stop,))  # fmt: skip
-    yield Fault("SIGSTOP to the worker, and Ctrl-C", compare(), SAID, (130,), PREPARED,
+        # Before it has begun with a scene, another process takes its place.
+        yield Fault(f"{number.name} to a worker that begins", compare(), number.name, (0, 1),
+                    PREPARED, RESULTS, sent=(Sent(number, 0.05, "worker"),))  # fmt: skip
+        yield Fault(f"{number.name} to the worker", compare("slow.py"), number.name, (1,),
+                    PREPARED, sent=(Sent(number, UNDER_WAY, "worker"),))  # fmt: skip
+    for number in (INT, Signals.SIGCHLD, Signals.SIGWINCH, Signals.SIGCONT):
+        yield Fault(f"{number.name} to the worker", compare("slow.py"), "", (0,), PREPARED, RESULTS,
+                    sent=(Sent(number, UNDER_WAY, "worker"),))  # fmt: skip
+    stop = Sent(Signals.SIGSTOP, UNDER_WAY, "worker")
+    yield Fault("SIGSTOP to the worker", (*compare("slow.py"), "--timeout", "20"), "20 s without",
+                (1,), PREPARED, sent=(stop,))  # fmt: skip
+    yield Fault("SIGSTOP to the worker, and Ctrl-C", compare("slow.py"), SAID, (130,), PREPARED,
                 sent=(stop, Sent(INT, 1.0)))  # fmt: skip
-    yield Fault("SIGKILL to the worker of a batch", compare("a.xml", "b.xml"), "SIGKILL", (1,),
-                PREPARED, leaves=("out/?/comparison.json", "out/index.html", "out/run.json"),
-                sent=(Sent(kill, BEGUN, "worker"),))  # fmt: skip
-    for command in ("cost", "fit", "study"):
-        yield Fault(f"SIGKILL to the worker of {command}", LIMITED[command], "SIGKILL", (1,),
-                    PREPARED, sent=(Sent(kill, BEGUN, "worker"),))  # fmt: skip
+    yield Fault("SIGKILL to the worker of a batch", compare("slow.py", "b.xml"), "SIGKILL", (1,),
+                PREPARED, leaves=("out/b/comparison.json", "out/index.html", "out/run.json"),
+                sent=(Sent(kill, UNDER_WAY, "worker"),))  # fmt: skip
+    for command in ("plan", "cost", "fit"):
+        words = tuple("slow.py" if word == "a.xml" else word for word in LIMITED[command])
+        yield Fault(f"SIGKILL to the worker of {command}", words, "SIGKILL", (1,),
+                    PREPARED, sent=(Sent(kill, UNDER_WAY, "worker"),))  # fmt: skip
 
 
 def _ignored() -> Iterator[Fault]:
@@ -91,9 +97,10 @@ def _ignored() -> Iterator[Fault]:
 
 def _ended(name: str, number: Signals, *sent: Sent, words: tuple[str, ...] = ()) -> Fault:
     """Return the fault of a command that is told to end, if it has not ended by itself."""
-    # Before Python listens, the signal itself ends it, as a shell tells by the same code.
+    # Before Python listens, and once it is done, the signal itself ends it: the same to a shell.
     is_early = isinstance(sent[0].when, float)
     is_twice = len(sent) > 1
-    codes = (0, ENDS[number], ENDS[sent[-1].number], *((-number,) if is_early else ()))
+    last = sent[-1].number
+    codes = (0, ENDS[number], ENDS[last], *((-last,) if is_early or is_twice else ()))
     said = None if is_early or is_twice else SAID
     return Fault(name, words or compare("a.xml", "b.xml"), said, codes, PREPARED, sent=sent)
