@@ -117,6 +117,6 @@ def _require_consistent(update, scenes, images, given):
 def _write(path, content):
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.write(path, content)
+        atomic.put(path, content)
     except OSError as error:
         raise InputError(f"--junit {path}: {error.strerror or error}.") from error
