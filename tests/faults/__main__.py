@@ -55,10 +55,12 @@ def main(words: list[str]) -> int:
     parser.add_argument("--list", action="store_true", help="name the faults, and run none")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all trials")
     parser.add_argument("--only", default="", metavar="TEXT", help="faults whose names have it")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="one of N faults alone")
     chosen = parser.parse_args(words)
     if unknown := set(chosen.kinds) - set(KINDS):
         parser.error(f"no kind: {', '.join(sorted(unknown))}")
     faults = [(k, f) for k in chosen.kinds or KINDS for f in of_kind(k) if chosen.only in f.name]
+    faults = faults[:: chosen.every]
     if chosen.list:
         print(*(f"{kind}: {fault.name}" for kind, fault in faults), sep="\n")
         print(len(faults))

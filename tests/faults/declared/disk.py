@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.faults.declared.baselines import WHOLE
 from tests.faults.declared.words import STUDY
 from tests.faults.fault import RESULTS, SMALL, UNPRIVILEGED, Fault, compare, then, written
 from tests.small_scene import SCENE
@@ -33,7 +34,7 @@ IN_THE_WAY = {
 """What is where results go: the place, what stands there (or where a link leads), what is said."""
 
 OUTPUTS = {
-    "/dev/null": "/dev/null", "/dev/full": "/dev/full", "/proc/self": "/proc/self/x",
+    "/dev/null": "null", "/dev/full": "full", "/proc/self": "/proc/self/x",
     "a folder of /sys": "/sys/x", "a name of 300": "x" * 300, "a path of 6000": "x/" * 3000,
     "a folder below a file": "mine.txt/x",
 }  # fmt: skip
@@ -67,6 +68,16 @@ LIMITED = {
     "study": ("study", "s.toml", "-o", "out", "--processes", "1"),
 }
 
+SPECIAL = {
+    "full": "full: No space",
+    "folder": "folder.*irectory",
+    "pipe": "pipe: No such device",
+    "mine.txt/x": "mine.txt",
+    "x" * 300: "xxx.*too long",
+    "/proc/x": "/proc/x",
+}
+"""Places for single files, and what is said."""
+
 STREAMS = {
     "standard output full": '"$@" >/dev/full',
     "standard output closed": 'exec "$@" >&-',
@@ -98,7 +109,7 @@ def faults() -> Iterator[Fault]:
         yield Fault(name, compare(), message, (2,), then(scene, stands))
     for name, place in OUTPUTS.items():
         yield Fault(f"-o {name}", ("compare", "a.xml", "-o", place, *SMALL), "-o|another place",
-                    (2,), scene)  # fmt: skip
+                    (2,), then(scene, _special))  # fmt: skip
     for name, place in RENDERED_TO.items():
         prepare = then(
             scene, lambda f: (f / "out").mkdir(), lambda f: (f / "link").symlink_to("out")
@@ -110,7 +121,8 @@ def faults() -> Iterator[Fault]:
             Path(os.fsdecode(os.fsencode(folder) + b"/" + file)).write_text(SCENE)
         )
         words = ("compare", b"./" + file, "-o", "out", *SMALL)
-        yield Fault(f"a scene's name with {name}", words, "scene", (0,), prepare, RESULTS)
+        codes = (2,) if name == "no UTF-8" else (0,)  # Mitsuba has no such names
+        yield Fault(f"a scene's name with {name}", words, "in UTF-8", codes, prepare, RESULTS)
     for name, files in CLASHES.items():
         prepare = written({file: SCENE for file in files if file.endswith(".xml")})
         both = ("out/*/comparison.json", "out/*-2/comparison.json")
@@ -141,12 +153,22 @@ def _limits(scene) -> Iterator[Fault]:
     yield Fault("compare with 12 open files", compare(), "open files|Too many", (0, 1, 2), scene,
                 RESULTS, shell='ulimit -n 12; exec "$@"')  # fmt: skip
     check = ("check", "b", "-o", "out", "--junit")
-    known = then(scene, written({"b/b.json": "{}", "folder": None}),
-                 lambda folder: os.mkfifo(folder / "pipe"))  # fmt: skip
-    for place in ("/dev/full", "folder", "pipe", "mine.txt/x", "x" * 300, "/proc/x"):
-        yield Fault(f"--junit {place[:20]}", (*check, place), "junit", (2,), known)
+    known = then(scene, written({"b/b.json": WHOLE.read_bytes(), "folder": None}), _special)
+    for place, message in SPECIAL.items():
+        yield Fault(f"--junit {place[:20]}", (*check, place), message, (2,), known)
         words = (*LIMITED["fit"], "--markdown", place)
-        yield Fault(f"--markdown {place[:20]}", words, "markdown|another place|folder", (2,), known)
+        yield Fault(f"--markdown {place[:20]}", words, message, (2,), known)
+    for place in ("link", "stdout"):
+        yield Fault(f"--junit {place}", (*check, place), "", (0,), known, ours=("other.txt",))
+
+
+def _special(folder: Path) -> None:
+    """Make what is no file; never name a device itself, which root could replace."""
+    os.mkfifo(folder / "pipe")
+    for name in ("full", "stdout", "null"):
+        (folder / name).symlink_to(f"/dev/{name}")
+    (folder / "other.txt").write_text("replaced by way of the link")
+    (folder / "link").symlink_to("other.txt")
 
 
 def _rights(scene) -> Iterator[Fault]:
