@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from functools import partial
 from pathlib import Path
@@ -143,6 +144,24 @@ def test_a_process_that_closed_all_its_files_is_ended():
     assert isinstance(found["closing"], LostProcessError)
     assert found["sum"] == 3
     assert time.monotonic() - begin < 50
+
+
+def make_temporary(number):
+    tempfile.mkdtemp()
+    if number:
+        os.kill(os.getpid(), number)
+    return tempfile.mkstemp()[1]
+
+
+@pytest.mark.parametrize("number", [0, signal.SIGKILL])
+def test_temporary_files_go_with_their_process(number, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with Pool(1) as pool:
+        found = do(pool, Task("making", make_temporary, (number,)))["making"]
+        assert isinstance(found, LostProcessError if number else str)
+        if not number:
+            assert Path(found).is_relative_to(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_a_task_prints_is_no_result(capfd):
