@@ -257,14 +257,17 @@ def read_by(path):
 
 
 @pytest.mark.parametrize("how", ["source", "compiled"])
-def test_what_a_script_reads_is_known_whether_or_not_it_is_compiled(how, script):
-    for _ in range(2 if how == "compiled" else 1):
+def test_what_a_script_reads_is_known_whether_or_not_it_is_compiled(how, script, monkeypatch):
+    monkeypatch.setattr("sys.dont_write_bytecode", how == "source")
+    for _ in range(2):
         _, files = read_by(script)
+    assert bool(list(script.parent.glob("__pycache__/first.*.pyc"))) == (how == "compiled")
     assert set(files) == {script.parent / name for name in READ}
 
 
 @pytest.mark.parametrize("name", READ)
-def test_a_file_that_a_script_reads_changes_the_key(name, script):
+def test_a_file_that_a_script_reads_changes_the_key(name, script, monkeypatch):
+    monkeypatch.setattr("sys.dont_write_bytecode", False)
     file = script.parent / name
     before, _ = read_by(script)
     assert read_by(script)[0] == before
