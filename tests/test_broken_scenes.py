@@ -108,6 +108,16 @@ BROKEN = {
         "odd: a texture checkerboard gives bumpmap no slope",
     ),
     "bumps of nothing": (MATTE, '<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>', "Texture"),
+    "a bitmap of nothing": (
+        MATTE,
+        '<bsdf type="diffuse"><texture type="bitmap" name="reflectance" id="odd"/></bsdf>',
+        "odd: it has no picture",
+    ),
+    "a blend of one": (
+        MATTE,
+        '<bsdf type="blendbsdf" id="odd"><bsdf type="diffuse"/></bsdf>',
+        "odd: it has 1 of the 2 BSDF",
+    ),
     "not UTF-8": ("point", "p\udce9int", "not in UTF-8"),
 }
 
