@@ -201,7 +201,7 @@ def _is_invertible(matrix: np.ndarray) -> bool:
 
 
 def _missing(graph: Graph, index: int) -> Iterator[str]:
-    """Yield what an element lacks without which Mitsuba does not refuse it, but ends the process."""
+    """Yield what an element lacks, where Mitsuba does not refuse it but ends the process."""
     plugin, props = graph.plugin(index), graph.props(index)
     if plugin == "bitmap" and not any(key in props for key in PICTURES):
         yield f"it has no picture: give one of {', '.join(PICTURES)}."
