@@ -15,7 +15,7 @@ from comparisons.cost.cost import quick
 from comparisons.fit.fit import fit
 from comparisons.options import LARGEST_SPP, Options
 from heuristic.errors import InputError
-from heuristic.meshes import FINEST
+from heuristic.interpolation import FINEST
 from reference.rendering.renderer import LARGEST_PASS
 from reference.scene import reading
 from tests import broken_scenes, corpus_files
@@ -139,7 +139,7 @@ def changed(before, after):
 
 
 @pytest.mark.guarantee(
-    "robustness",
+    "runs",
     "A scene with values that cannot be meant, or of which nothing is in view, is refused by the"
     " name of the element.",
 )
