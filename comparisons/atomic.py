@@ -118,6 +118,26 @@ def encoded(content: str | bytes) -> bytes:
     return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
 
+def put(path: Path, content: str | bytes) -> None:
+    """Write to what a user named: in place of a file, into a device, or a pipe that is read.
+
+    Raises
+    ------
+    OutputError
+        As for :func:`replacing`.
+    """
+    content = content.encode() if isinstance(content, str) else content
+    if not path.exists() or path.is_file():
+        write(Path(os.path.realpath(path)), content)  # a link stays one
+        return
+    with explained(path):
+        # Opening a pipe that nobody reads would wait for ever.
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+        os.set_blocking(descriptor, True)
+        with open(descriptor, "wb") as file:
+            file.write(content)
+
+
 def abandoned(folder: Path, kind: str = "partial") -> Iterator[tuple[Path, Path]]:
     """Yield what was left in a folder, and what it was to stand at.
 

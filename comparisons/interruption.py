@@ -12,6 +12,9 @@ SIGNALS = {
 }
 """Ctrl-C, what ends a job, and the end of a terminal."""
 
+PAUSE_S = 0.02
+"""Seconds after which a signal that came during an import is looked at again."""
+
 
 class Interrupted(KeyboardInterrupt):
     """A command was told to end; ``exit_code`` is what a shell expects then: 130, 143 or 129."""
@@ -33,11 +36,23 @@ def code_of(error: BaseException | None) -> int:
     return getattr(error, "exit_code", 128 + signal.SIGINT)
 
 
-def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
+def _interrupt(number: int, frame: FrameType | None) -> None:
     for each in SIGNALS:
         if signal.getsignal(each) is _interrupt:
             signal.signal(each, _leave)
-    raise Interrupted(number)
+    if not _is_importing(frame):
+        raise Interrupted(number)
+    # Native modules that are just loaded crash, or swallow what is raised: later, then.
+    signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))
+    signal.setitimer(signal.ITIMER_REAL, PAUSE_S)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _leave(number: int, frame: FrameType | None) -> NoReturn:

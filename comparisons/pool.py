@@ -8,6 +8,7 @@ for the work ends, in whatever way.
 
 import logging
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterable, Iterator
@@ -18,7 +19,8 @@ from itertools import count, islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
 from pathlib import Path
-from time import monotonic
+from tempfile import mkdtemp
+from time import monotonic, sleep
 from typing import Any, NoReturn
 
 from comparisons.interruption import SIGNALS
@@ -32,6 +34,9 @@ GUARD = ("/bin/sh", "-c", "read _; kill -9 0")
 
 GRACE_S = 1.0
 """Seconds in which a process may end by itself."""
+
+PAUSE_S = 0.01
+"""Seconds between looks at whether a process that was told to end has ended."""
 
 LOOK_S = 1.0
 """Seconds between looks at whether a process lives: what it forked may hold its pipe open."""
@@ -137,7 +142,10 @@ class Pool:
 
     def _fill(self, waiting: Iterator[Task]) -> None:
         """Give tasks to idle and new processes."""
-        self._idle = [worker for worker in self._idle if worker.process.is_alive()]
+        for worker in self._idle:
+            if not worker.process.is_alive():
+                worker.end()
+        self._idle = [worker for worker in self._idle if not worker.is_spent]
         for task in islice(waiting, self._count - len(self._busy)):
             worker = self._idle.pop() if self._idle else _Worker(self._prepare)
             self._busy.append(worker)
@@ -179,7 +187,9 @@ class _Worker:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
         self.is_spent = False
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self._folder = _temporary_folder()
+        words = (theirs, self._folder)
+        self.process = context.Process(target=_work, args=words, daemon=True)
         with _deaf():
             self.process.start()
         theirs.close()  # so that the end of the process is the end of the pipe
@@ -216,18 +226,23 @@ class _Worker:
 
     def lose(self, reason: str) -> None:
         """End the process, and say why as the outcome of its task."""
-        self.is_spent = True
         self.end()
         self.outcome.set_exception(LostProcessError(f"{self.task.name}: {reason}"))
 
     def end(self, grace_s: float = GRACE_S) -> int | None:
-        """End the process with its group, and return its exit code."""
+        """End the process with its group, and return its exit code; nothing of it is left."""
+        self.is_spent = True
         self.pipe.close()
-        self.process.join(grace_s)
+        until = monotonic() + grace_s
+        # Not by `join`, which waits for ever for a process that closed all its files.
+        while self.process.is_alive() and monotonic() < until:
+            sleep(PAUSE_S)
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
         self.process.join()
+        if self._folder:
+            shutil.rmtree(self._folder, ignore_errors=True)
         return self.process.exitcode
 
     def _send(self, message: object) -> None:
@@ -264,8 +279,18 @@ def _reason(code: int | None) -> str:
     return f"its process ended with exit code {code}."
 
 
-def _work(pipe: Any) -> NoReturn:
-    """Do what comes through the pipe, until it is closed."""
+def _temporary_folder() -> str | None:
+    """Make a folder for temporary files of one process; None where there is no place for any."""
+    try:
+        return mkdtemp(prefix="fotismos-")
+    except OSError:
+        return None
+
+
+def _work(pipe: Any, folder: str | None) -> NoReturn:
+    """Do what comes through the pipe, until it is closed; ``folder`` is for temporary files."""
+    if folder:
+        os.environ["TMPDIR"] = folder
     os.setpgid(0, 0)
     os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
     os.register_at_fork(after_in_child=pipe.close)  # only this process answers
@@ -308,7 +333,7 @@ def _answer(
         return "set_result", function(*arguments, *([progress] if with_progress else []))
     except FotismosError as error:
         return "set_exception", error
-    except Exception as error:  # whatever a task brings about is its own failure
+    except BaseException as error:  # Ctrl-C is ignored here: whatever comes is the task's own
         LOGGER.info("a task failed", exc_info=True)
         return "unexpected", f"{type(error).__name__}: {error}"
 

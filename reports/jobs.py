@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -61,8 +62,11 @@ def require_known(names: Iterable[str]) -> None:
 
     for name in names:
         path = Path(name)
-        if path.exists():
-            continue
+        try:
+            if name and path.exists():
+                continue
+        except OSError as error:
+            raise InputError(f"{name[:60]!r}: {error.strerror}. Give a scene's name.") from error
         if path.suffix in (".xml", ".py") or path.parent.name:
             siblings = {str(path.with_name(one)) for one in _names_in(path.parent)}
             raise InputError(
@@ -164,11 +168,27 @@ def _with(command, *options):
 scripts_option = click.option(
     "--scripts", is_flag=True, help="Run the Python scripts in folders too, which are code."
 )
+
+
+class Within(click.FloatRange):
+    """A number in an interval, where NaN never is."""
+
+    def convert(
+        self, value: Any, parameter: click.Parameter | None, context: click.Context | None
+    ) -> float:
+        number = super().convert(value, parameter, context)
+        if math.isnan(number):
+            self.fail(
+                f"{value!r} is not in the range {self._describe_range()}.", parameter, context
+            )
+        return number
+
+
 timeout_option = click.option(
     "--timeout",
     default=1800.0,
     show_default=True,
-    type=click.FloatRange(min=0, min_open=True),
+    type=Within(min=0, min_open=True),
     metavar="SECONDS",
     help="End a scene that makes no progress for so long.",
 )

@@ -130,6 +130,7 @@ def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):
         (("nix.json", "--spp", "4"), "--spp.*--update"),
         (("nix.json", "--scene", "fig-8-6b"), "--scene.*--update"),
         (("nix.json", "--significance", "0"), "range"),
+        (("nix.json", "--significance", "nan"), "range"),
     ],
 )
 def test_bad_words_are_refused(run, tmp_path, monkeypatch, words, expected):

@@ -99,6 +99,9 @@ def test_a_scene_that_cannot_be_used_is_refused_in_one_message(name, run, tmp_pa
         (("fig-8-9", "--spp", "1"), "range"),
         (("fig-8-9", "--pairing", "fit"), "literal"),
         ((), "Missing argument"),
+        (("",), "'' is neither a file nor"),  # an empty variable of a shell is not this folder
+        (("x" * 1000,), "File name too long"),
+        (("fig-8-9", "--timeout", "nan"), "'nan' is not in the range"),
     ],
 )
 def test_bad_words_are_refused(words, expected, run, tmp_path):

@@ -278,3 +278,26 @@ def test_a_folder_or_a_pipe_in_place_of_a_result_is_one_message(
     assert messages.startswith(f"fotismos: error: {place}: ")
     assert messages.count("\n") == 1
     assert [path.name for path in place.parent.iterdir()] == [name]
+
+
+def test_what_a_user_names_is_written_in_place_of_a_file_or_into_a_device(tmp_path):
+    """Never in place of a device or a link, which `/dev/stdout` is."""
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to("file")
+    atomic.put(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "new"
+    (tmp_path / "null").symlink_to("/dev/null")
+    atomic.put(tmp_path / "null", "gone")
+    (tmp_path / "full").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="No space left"):
+        atomic.put(tmp_path / "full", "too much")
+    assert os.readlink(tmp_path / "null") == "/dev/null"
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="pipe: No such device"):
+        atomic.put(tmp_path / "pipe", "nobody reads it")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    atomic.put(tmp_path / "pipe", "read")
+    assert os.read(reader, 100) == b"read"
+    os.close(reader)
+    assert (tmp_path / "pipe").is_fifo()

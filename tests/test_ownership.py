@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -256,3 +257,14 @@ def test_what_is_put_where_a_killed_run_was_about_to_write_is_not_ours(tmp_path)
         assert all(path.read_text(encoding="utf-8") == "mine" for path in mine)
         left = [path.name for path in folder.rglob("*") if "fotismos-" in path.name]
         assert left == [holding.LOCK], folder
+
+
+def test_a_list_of_gigabytes_is_refused_unread(run, scene_file):
+    out = scene_file.parent / "out"
+    out.mkdir()
+    with (out / listing.MARK).open("wb") as file:
+        file.truncate(2**40)
+    code, _, messages = run("compare", scene_file, "-o", out, *SMALL)
+    assert code == 2
+    assert re.search(r"\.fotismos: the list .* has more than .* Move it away", messages)
+    assert (out / listing.MARK).stat().st_size == 2**40

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from functools import partial
 from pathlib import Path
@@ -36,6 +37,10 @@ def die_of(number):
 
 def refuse(message):
     raise InputError(message)
+
+
+def stop(kind):
+    raise kind
 
 
 def note_once(path):
@@ -116,6 +121,47 @@ def test_a_task_that_kills_its_process_takes_no_other_along():
     assert messages["killed"].startswith("killed: its process was killed (SIGKILL)")
     assert messages["leaving"] == "leaving: its process ended with exit code 7."
     assert messages["dividing"].startswith("dividing: ZeroDivisionError: ")
+
+
+def close_all():
+    os.closerange(0, 100)
+    time.sleep(1000)
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit, GeneratorExit])
+def test_whatever_a_task_raises_is_its_own_failure(kind, capfd):
+    with Pool(1) as pool:
+        found = do(pool, Task("raising", stop, (kind,)), Task("sum", add, (1, 2)))
+    assert str(found["raising"]).startswith(f"raising: {kind.__name__}")
+    assert found["sum"] == 3
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_closed_all_its_files_is_ended():
+    begin = time.monotonic()
+    with Pool(1, limit_s=60) as pool:
+        found = do(pool, Task("closing", close_all, ()), Task("sum", add, (1, 2)))
+    assert isinstance(found["closing"], LostProcessError)
+    assert found["sum"] == 3
+    assert time.monotonic() - begin < 50
+
+
+def make_temporary(number):
+    tempfile.mkdtemp()
+    if number:
+        os.kill(os.getpid(), number)
+    return tempfile.mkstemp()[1]
+
+
+@pytest.mark.parametrize("number", [0, signal.SIGKILL])
+def test_temporary_files_go_with_their_process(number, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with Pool(1) as pool:
+        found = do(pool, Task("making", make_temporary, (number,)))["making"]
+        assert isinstance(found, LostProcessError if number else str)
+        if not number:
+            assert Path(found).is_relative_to(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_a_task_prints_is_no_result(capfd):

@@ -31,7 +31,7 @@ from reports.terminal import verbosity
     "--significance",
     default=0.01,
     show_default=True,
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    type=jobs.Within(0, 1, min_open=True, max_open=True),
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
 @jobs.json_option
@@ -117,6 +117,6 @@ def _require_consistent(update, scenes, images, given):
 def _write(path, content):
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.write(path, content)
+        atomic.put(path, content)
     except OSError as error:
         raise InputError(f"--junit {path}: {error.strerror or error}.") from error

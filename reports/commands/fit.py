@@ -86,7 +86,7 @@ def fit(scenes, output, form, as_json, markdown, timeout, **words):
                 ]
                 records = [outcome.result() for _, outcome in pool.each(wanted)]
     if markdown:
-        atomic.write(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
+        atomic.put(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
     if as_json:
         click.echo(json.dumps(plain(records), indent=2, ensure_ascii=False))
         return

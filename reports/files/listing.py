@@ -14,8 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from comparisons import atomic
+from heuristic.errors import OutputError
 
 MARK = ".fotismos"
+
+LARGEST = 2**28
+"""Bytes of a list: millions of names."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,11 @@ def _lines(path: Path) -> list[str]:
     """Return the whole lines of a list; one that a full disk cut short has no end."""
     if not path.is_file():  # a pipe would be waited for
         return []
+    if path.stat().st_size > LARGEST:
+        raise OutputError(
+            f"{atomic.printable(path)}: the list of what fotismos made has more than {LARGEST}"
+            " bytes, which it never has. Move it away, or choose another output folder with -o."
+        )
     try:
         return path.read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
     except OSError:

@@ -1,0 +1,1 @@
+"""Faults by kind: each module yields them from ``faults()``."""
