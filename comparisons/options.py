@@ -7,8 +7,7 @@ from numbers import Integral, Real
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic import heuristics
 from heuristic.errors import InputError
-from heuristic.interpolation import Interpolation
-from heuristic.meshes import FINEST
+from heuristic.interpolation import FINEST, Interpolation
 from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair
 from reference.scene.source import Source

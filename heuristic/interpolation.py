@@ -15,6 +15,9 @@ import drjit as dr
 
 from heuristic import vectors
 
+FINEST = 512
+"""Tessellation: a sphere then has four million triangles, which take half a gigabyte."""
+
 
 class Interpolation(Enum):
     """What is interpolated over a face: nothing, the intensity, or the normal."""

@@ -9,13 +9,11 @@ import drjit as dr
 import mitsuba as mi
 
 from heuristic.errors import InputError
+from heuristic.interpolation import FINEST
 from heuristic.normals import triangle_normal
 from heuristic.vertex_normals import Weighting, vertex_normals
 
 RESOLUTION = 16
-
-FINEST = 512
-"""A sphere then has four million triangles, which take half a gigabyte while they are made."""
 
 
 def to_mesh(shape, resolution=RESOLUTION):
@@ -41,7 +39,7 @@ def to_mesh(shape, resolution=RESOLUTION):
     ------
     InputError
         For a shape of any other type, or a resolution that is not a whole number from 1 to
-        :data:`FINEST`.
+        :data:`heuristic.interpolation.FINEST`.
     """
     if not isinstance(resolution, int) or not 1 <= resolution <= FINEST:
         raise InputError(

@@ -15,7 +15,7 @@ from comparisons.cost.cost import quick
 from comparisons.fit.fit import fit
 from comparisons.options import LARGEST_SPP, Options
 from heuristic.errors import InputError
-from heuristic.meshes import FINEST
+from heuristic.interpolation import FINEST
 from reference.rendering.renderer import LARGEST_PASS
 from reference.scene import reading
 from tests import broken_scenes, corpus_files
@@ -108,6 +108,16 @@ BROKEN = {
         "odd: a texture checkerboard gives bumpmap no slope",
     ),
     "bumps of nothing": (MATTE, '<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>', "Texture"),
+    "a bitmap of nothing": (
+        MATTE,
+        '<bsdf type="diffuse"><texture type="bitmap" name="reflectance" id="odd"/></bsdf>',
+        "odd: it has no picture",
+    ),
+    "a blend of one": (
+        MATTE,
+        '<bsdf type="blendbsdf" id="odd"><bsdf type="diffuse"/></bsdf>',
+        "odd: it has 1 of the 2 BSDF",
+    ),
     "not UTF-8": ("point", "p\udce9int", "not in UTF-8"),
 }
 
@@ -129,7 +139,7 @@ def changed(before, after):
 
 
 @pytest.mark.guarantee(
-    "robustness",
+    "runs",
     "A scene with values that cannot be meant, or of which nothing is in view, is refused by the"
     " name of the element.",
 )

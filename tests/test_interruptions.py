@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM at random moments: nothing torn, no orphan, and the same results afterwards."""
+"""Ctrl-C and SIGTERM at random moments: nothing torn, no orphan, the same results afterwards."""
 
 import os
 import signal

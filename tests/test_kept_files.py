@@ -291,7 +291,8 @@ def test_points_that_do_not_fit_are_done_again(study, tmp_path):
 SCENE_OF_FILES = SCENE.replace(
     '<shape type="sphere">',
     '<shape type="obj"><string name="filename" value="m.obj"/></shape>'
-    '<shape type="sphere" id="ball"><float name="radius" value="1"/>',
+    '<shape type="sphere"><bsdf type="diffuse" id="paint">'
+    '<rgb name="reflectance" value="0.5"/></bsdf></shape><shape type="sphere">',
 )
 
 
@@ -312,7 +313,7 @@ def test_a_study_is_done_again_once_a_file_of_its_scene_changes(script, rgb, tmp
     name = "s.py" if script else "s.xml"
     text = (
         f"[[part]]\nscene = '{name}'\nspp = 16\nresolution = [12, 12]\n"
-        "[part.parameters]\n'ball.radius' = [0.5, 1.0]"
+        "[part.parameters]\n'paint.reflectance' = [0.2, 0.8]"
     )
     wanted = design.parse(text, folder=tmp_path)
     write(0.5)
@@ -321,9 +322,14 @@ def test_a_study_is_done_again_once_a_file_of_its_scene_changes(script, rgb, tmp
     assert running.run(wanted, tmp_path / "out").done == 0
     write(2.0)
     second = running.run(wanted, tmp_path / "out")
-    assert (second.done, second.failed) == (2, 0)
-    before, after = (run.table["reference"].to_pylist() for run in (first, second))
-    assert (np.abs(np.subtract(before, after)) > 1e-3).all()
+    scene = tmp_path / name
+    scene.write_text(scene.read_text().replace("60", "20"))  # its lamp
+    third = running.run(wanted, tmp_path / "out")
+    values = []
+    for outcome in (first, second, third):
+        assert (outcome.done, outcome.failed) == (2, 0)
+        values.append(outcome.table["reference"].to_pylist())
+    assert (np.abs(np.diff(values, axis=0)) > 1e-3).all()
 
 
 def python_scene(mesh):
@@ -331,7 +337,15 @@ def python_scene(mesh):
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 3},
         "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 12, "height": 12}},
-        "ball": {"type": "sphere", "center": [0, 0, 6], "radius": 1.0},
+        "ball": {
+            "type": "sphere",
+            "center": [0, 0, 6],
+            "bsdf": {
+                "type": "diffuse",
+                "id": "paint",
+                "reflectance": {"type": "rgb", "value": 0.5},
+            },
+        },
         "mesh": {"type": "obj", "filename": str(mesh)},
         "lamp": {"type": "point", "position": [2, 2, -4], "intensity": 60.0},
         "sky": {"type": "constant", "radiance": 0.3},

@@ -1,7 +1,6 @@
 """The key of a result covers every file that was read for it."""
 
 import os
-from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -258,14 +257,17 @@ def read_by(path):
 
 
 @pytest.mark.parametrize("how", ["source", "compiled"])
-def test_what_a_script_reads_is_known_whether_or_not_it_is_compiled(how, script):
-    for _ in range(2 if how == "compiled" else 1):
+def test_what_a_script_reads_is_known_whether_or_not_it_is_compiled(how, script, monkeypatch):
+    monkeypatch.setattr("sys.dont_write_bytecode", how == "source")
+    for _ in range(2):
         _, files = read_by(script)
+    assert bool(list(script.parent.glob("__pycache__/first.*.pyc"))) == (how == "compiled")
     assert set(files) == {script.parent / name for name in READ}
 
 
 @pytest.mark.parametrize("name", READ)
-def test_a_file_that_a_script_reads_changes_the_key(name, script):
+def test_a_file_that_a_script_reads_changes_the_key(name, script, monkeypatch):
+    monkeypatch.setattr("sys.dont_write_bytecode", False)
     file = script.parent / name
     before, _ = read_by(script)
     assert read_by(script)[0] == before
@@ -325,14 +327,17 @@ def test_files_that_native_code_reads_for_a_script_count_by_what_is_made_of_them
         if at in (0, None):
             np.array([0, 0, 0, value, 0, 0, 0, 1, 0], float).tofile(names[0])
         if at in (1, None):
-            made = mi.Mesh("m", 3, 1)
+            # A corner moves inside the bounding box, which is what Mitsuba prints of a mesh.
+            made = mi.Mesh("m", 4, 2)
             parameters = mi.traverse(made)
-            parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 0, 0.5 + value / 4, 0]
-            parameters["faces"] = [0, 1, 2]
+            parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 0, 1, 0, value / 4, 0.2, 0]
+            parameters["faces"] = [0, 1, 3, 0, 3, 2]
             parameters.update()
             made.write_ply(names[1])
         if at in (2, None):
-            picture(Path(names[2]), value)
+            grey = np.full((4, 4, 3), 0.5, np.float32)
+            grey[0], grey[1] = value, 1 - value  # of one mean
+            mi.Bitmap(grey).write(names[2])
 
     write(None, 1.0)
     keys = [read_by(folder / "s.py")[0]]

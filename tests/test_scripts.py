@@ -1,4 +1,4 @@
-"""Scenes that are Python: what they do to their process reaches neither other scenes nor results."""
+"""Scenes that are Python: what they do to their process reaches no other scene and no result."""
 
 import json
 import os

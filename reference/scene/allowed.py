@@ -53,6 +53,9 @@ def _is_length(values: np.ndarray) -> bool:
     return bool(values.any())
 
 
+PICTURES = ("filename", "bitmap", "data")
+CHILDREN = {"blendbsdf": (mi.ObjectType.BSDF, 2), "volume": (mi.ObjectType.Volume, 1)}
+
 CAMERAS = ("perspective", "thinlens", "orthographic")
 FILMS = ("hdrfilm", "specfilm")
 
@@ -118,7 +121,7 @@ def check_node(graph: Graph, index: int) -> None:
     for key, value in props.items():
         for allowed in _objections(plugin, key, value):
             raise _refusal(graph, index, f"{key} = {_shown(value)} is not allowed: give {allowed}.")
-    for objection in _between(plugin, props):
+    for objection in (*_between(plugin, props), *_missing(graph, index)):
         raise _refusal(graph, index, objection)
 
 
@@ -195,6 +198,18 @@ def _is_invertible(matrix: np.ndarray) -> bool:
     if sizes[-1] < SMALLEST_RATIO * sizes[0]:
         return False
     return bool((np.abs(np.linalg.inv(matrix)) <= LARGEST).all())
+
+
+def _missing(graph: Graph, index: int) -> Iterator[str]:
+    """Yield what an element lacks, where Mitsuba does not refuse it but ends the process."""
+    plugin, props = graph.plugin(index), graph.props(index)
+    if plugin == "bitmap" and not any(key in props for key in PICTURES):
+        yield f"it has no picture: give one of {', '.join(PICTURES)}."
+    if plugin in CHILDREN:
+        kind, count = CHILDREN[plugin]
+        found = len(graph.children(index, kind))
+        if found != count:
+            yield f"it has {found} of the {count} {kind.name} elements that it takes: give {count}."
 
 
 def _between(plugin: str, props: mi.Properties) -> Iterator[str]:

@@ -8,6 +8,7 @@ import click
 
 from heuristic.errors import FotismosError
 from tests.benchmarks import (
+    batch,
     cost,
     guard,
     kernel,
@@ -21,6 +22,7 @@ from tests.benchmarks import (
 )
 
 BENCHMARKS = {
+    "batch": batch.run,
     "cost": cost.run,
     "guard": guard.run,
     "kernel": kernel.run,

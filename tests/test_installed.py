@@ -1,0 +1,96 @@
+"""The wheel in an environment of its own, and the pytest plugin in the suite of another project.
+
+Slow: it installs all dependencies from the package registry.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.small_scene import SCENE
+
+ROOT = Path(__file__).parents[1]
+
+SUITE = """
+import pytest
+
+SMALL = {"resolution": (16, 12), "spp": 32}
+
+def test_a_departure(fotismos):
+    assert 0 < fotismos.departure("scenes/ball.xml", **SMALL) < 100
+
+def test_nothing_moved(fotismos):
+    assert fotismos.unchanged("scenes/ball.xml", **SMALL)
+
+def test_nothing_in_view_is_an_error(fotismos):
+    with pytest.raises(Exception, match="no pixel sees a surface"):
+        fotismos.departure("scenes/empty.xml", **SMALL)
+
+@pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_spectral")
+def test_variants(fotismos):
+    assert fotismos.departure("fig-8-9", **SMALL) >= 0
+"""
+LOST = SCENE.replace('target="0, 0, 0"', 'target="0, -9, 4"')
+"""The small scene, its camera turned away."""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The folder of programs of an environment in which a wheel of this project is installed."""
+    folder = tmp_path_factory.mktemp("installed")
+    do(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT)
+    (wheel,) = folder.glob("fotismos-*.whl")
+    do(sys.executable, "-m", "venv", folder / "env")
+    programs = folder / "env/bin"
+    do(programs / "python", "-m", "pip", "install", "-q", wheel, "pytest")
+    return programs
+
+
+def do(*words, folder=None, code=0):
+    """Run a program away from the checkout, and return all that it printed."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "FOTISMOS"))}
+    done = subprocess.run(
+        list(map(str, words)),
+        cwd=folder or "/",
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=900,
+        check=False,
+    )
+    assert done.returncode == code, done.stdout
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_installed_commands_work(installed, tmp_path):
+    fotismos = installed / "fotismos"
+    assert "llvm_ad_spectral renders" in " ".join(do(fotismos, "doctor").split())
+    (tmp_path / "ball.xml").write_text(SCENE, encoding="utf-8")
+    words = ("--resolution", "16x16", "--spp", 8)
+    do(fotismos, "compare", "ball.xml", "fig-8-9", *words, folder=tmp_path)
+    assert (tmp_path / "out/ball/comparison.exr").is_file()
+    assert "viewer" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    do(fotismos, "check", "base", "--update", "--scene", "ball.xml", *words, folder=tmp_path)
+    assert "1 of 1 unmoved" in do(fotismos, "check", "base", folder=tmp_path)
+    assert "did you mean fig-8-9?" in do(fotismos, "compare", "fig-8-99", code=2)
+
+
+@pytest.mark.slow
+def test_a_foreign_suite_uses_the_plugin(installed, tmp_path):
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/ball.xml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "scenes/empty.xml").write_text(LOST, encoding="utf-8")
+    (tmp_path / "test_shading.py").write_text(SUITE, encoding="utf-8")
+    words = (installed / "python", "-m", "pytest", "-q")
+    assert "no such baseline" in do(*words, folder=tmp_path, code=1)
+    do(*words, "--fotismos-update", folder=tmp_path)
+    assert (tmp_path / "baselines/ball.json").is_file()
+    assert "5 passed" in do(*words, folder=tmp_path)
+    brighter = SCENE.replace('value="60"', 'value="66"')
+    (tmp_path / "scenes/ball.xml").write_text(brighter, encoding="utf-8")
+    assert "moved" in do(*words, folder=tmp_path, code=1)
