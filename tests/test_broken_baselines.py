@@ -312,3 +312,12 @@ def test_a_scene_in_python_is_checked_as_one_in_xml(run, tmp_path, monkeypatch):
     code, _, messages = run("check", folder, "-o", tmp_path / "out")
     assert code == 2
     assert "NameError" in messages
+
+
+def test_an_error_names_its_baseline_once():
+    path = Path("folder/b.json")
+    assert checks.failed(path, InputError("no scene")).message == "folder/b.json: no scene"
+    own = checks.failed(path, InputError("folder/b.json: cut short")).message
+    assert own == "folder/b.json: cut short"
+    other = checks.failed(path, ValueError("odd")).message
+    assert other == "folder/b.json: ValueError: odd"

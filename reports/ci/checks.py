@@ -162,8 +162,9 @@ def guarded(run, path, *more):
 
 def failed(path, error, seconds=0.0):
     """Return the result of a baseline that an exception kept from being judged."""
-    kind = "" if isinstance(error, FotismosError) else f"{path}: {type(error).__name__}: "
-    message = f"{kind}{error}"
+    kind = "" if isinstance(error, FotismosError) else f"{type(error).__name__}: "
+    where = "" if str(error).startswith(str(path)) else f"{path}: "
+    message = f"{where}{kind}{error}"
     return Result(path, "", "error", seconds=seconds, message=message, exit_code=ERROR)
 
 
