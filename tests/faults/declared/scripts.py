@@ -132,11 +132,11 @@ LIVES = {
     "a log level": "import mitsuba as mi\nmi.set_log_level(mi.LogLevel.Trace)",
     "no collection of garbage": "import gc\ngc.disable()",
     "SIGSTOP and SIGCONT": "os.system('(kill -STOP $PPID; sleep 1; kill -CONT $PPID) &')",
-    "its own file deleted": "os.remove(__file__)",
 }  # fmt: skip
 """What neither this scene nor another is to be hurt by."""
 
 SABOTAGES = {
+    "its own file deleted": "os.remove(__file__)",
     "print replaced": "import builtins\nbuiltins.print = builtins.open = None",
     "json.dumps replaced": "import json\njson.dumps = None",
     "NumPy's errors raised": "import numpy\nnumpy.seterr(all='raise')",
@@ -183,7 +183,8 @@ def faults() -> Iterator[Fault]:
     for name, code in SABOTAGES.items():
         prepare = then(_script(code, GOOD), written({"good.xml": SCENE}))
         words = compare("bad.py", "good.xml")
-        yield Fault(name, words, "bad", (0, 1, 2), prepare, RESULTS, ("out/good/comparison.json",))
+        leaves = ("out/good/comparison.json",)
+        yield Fault(name, words, "bad", (0, 1, 2), prepare, RESULTS, leaves, ours=("bad.py",))
     for name, code in NEVER_ENDS.items():
         words = (*one, "--timeout", "12")
         yield Fault(f"without end: {name}", words, "12 s without any progress", (1,), _script(code))
@@ -196,7 +197,7 @@ def faults() -> Iterator[Fault]:
 def _others() -> Iterator[Fault]:
     prepare = _script(f"{PARENT}os.kill(parent, signal.SIGKILL)\ntime.sleep(100)")
     yield Fault("SIGKILL to the command", compare("bad.py"), None, (-9, 137), prepare)
-    folder = then(_script("os._exit(0)"), written({"good.xml": SCENE}))
+    folder = then(_script("os._exit(0)", GOOD), written({"good.xml": SCENE}))
     there = lambda place: (place / "bad.py").rename(_made(place / "s") / "bad.py")  # noqa: E731
     for command in ("plan", "cost", "fit"):
         words = (command, "bad.py", *(() if command == "plan" else ("-o", "out")), *SMALL)
