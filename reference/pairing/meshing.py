@@ -8,7 +8,7 @@ from tempfile import mkdtemp
 import mitsuba as mi
 
 from heuristic import meshes
-from heuristic.errors import InputError
+from heuristic.errors import InputError, OutputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins.interpolated import viewpoint
 from reference.scene.graph import Reference, properties
@@ -36,6 +36,8 @@ def replace_shapes(graph, scene, resolution, interpolation):
     InputError
         Naming a shape that cannot be made into triangles, or a sensor without the one viewpoint
         that flat and Gouraud shading need.
+    OutputError
+        Where there is no room for the meshes.
     """
     if interpolation is not Interpolation.PHONG:
         viewpoint(scene.sensors()[0])  # refuses what has none before anything renders
@@ -55,7 +57,13 @@ def replace_shapes(graph, scene, resolution, interpolation):
         elif not mesh.has_vertex_normals():
             mesh = meshes.with_vertex_normals(mesh)
         path = folder.path / f"{index}.ply"
-        mesh.write_ply(str(path))
+        try:
+            mesh.write_ply(str(path))
+        except RuntimeError as error:
+            raise OutputError(
+                f"{graph.name}: {error}. Free some space, or name another folder for temporary"
+                " files in TMPDIR."
+            ) from error
         children = {key: value for key, value in given.items() if isinstance(value, Reference)}
         # The file holds world coordinates; flat faces are told by the lack of vertex normals.
         derived = properties("ply", filename=str(path), **children)
