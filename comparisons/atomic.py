@@ -127,10 +127,10 @@ def put(path: Path, content: str | bytes) -> None:
         As for :func:`replacing`.
     """
     content = content.encode() if isinstance(content, str) else content
-    if not path.exists() or path.is_file():
-        write(Path(os.path.realpath(path)), content)  # a link stays one
-        return
     with explained(path):
+        if not path.exists() or path.is_file():
+            write(Path(os.path.realpath(path)), content)  # a link stays one
+            return
         # Opening a pipe that nobody reads would wait for ever.
         descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
         os.set_blocking(descriptor, True)

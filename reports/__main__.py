@@ -11,6 +11,7 @@ from heuristic.program import VARIABLE
 def main() -> None:
     """Run the command line, which signals may end at any moment."""
     interruption.listen()
+    _open_standard_streams()
     if Path(sys.argv[0]).name == "__main__.py":
         os.environ.setdefault(VARIABLE, "python -m reports")
     try:
@@ -19,6 +20,15 @@ def main() -> None:
         cli.main()
     except KeyboardInterrupt as error:
         sys.exit(interruption.code_of(error))
+
+
+def _open_standard_streams() -> None:
+    """Give the streams that are closed to nobody, lest other files get their numbers."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
 
 if __name__ == "__main__":

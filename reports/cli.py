@@ -96,6 +96,10 @@ def main():
     except BrokenPipeError:  # who read our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
+    except OSError as error:  # standard output on a full disk, above all
+        click.echo(f"fotismos: error: {error.filename or 'output'}: {error.strerror}.", err=True)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(2)
     else:
         if code:  # what a command left with, which is None where it said nothing
             sys.exit(code)

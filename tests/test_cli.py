@@ -231,3 +231,16 @@ def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
     done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out/index.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("shell", "code", "said"),
+    [('exec "$@" >/dev/full', 2, "output: No space left on device"), ('exec "$@" >&-', 0, "")],
+)
+def test_an_output_that_is_full_or_closed_is_no_traceback(shell, code, said):
+    words = ["sh", "-c", shell, "sh", sys.executable, "-P", "-m", "reports", "scenes"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    assert done.returncode == code
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr

@@ -296,6 +296,8 @@ def test_what_a_user_names_is_written_in_place_of_a_file_or_into_a_device(tmp_pa
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OutputError, match="pipe: No such device"):
         atomic.put(tmp_path / "pipe", "nobody reads it")
+    with pytest.raises(OutputError, match="too long"):
+        atomic.put(tmp_path / ("x" * 300), "no file")
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     atomic.put(tmp_path / "pipe", "read")
     assert os.read(reader, 100) == b"read"
