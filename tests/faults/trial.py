@@ -167,7 +167,7 @@ def _judged(kind, fault, folder, before, ended, seconds, left) -> Trial:
     # Before Python listens, Ctrl-C ends it in its own way.
     has_traceback = code != -2 and any(word in out + said for word in MESSAGES)
     passed = code == 0 and (0 not in fault.codes or any("is not there" in note for note in notes))
-    mute = code not in (0, None) and fault.message is not None and not said.strip()
+    mute = code not in (0, None) and fault.message is not None and not (said + out).strip()
     return Trial(
         kind,
         fault.name,
