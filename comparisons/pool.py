@@ -188,9 +188,8 @@ class _Worker:
         self.is_spent = False
         self.pipe, theirs = context.Pipe()
         self._folder = _temporary_folder()
-        words = (theirs, self._folder)
-        self.process = context.Process(target=_work, args=words, daemon=True)
-        with _deaf():
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        with _deaf(), _temporary_files_in(self._folder):
             self.process.start()
         theirs.close()  # so that the end of the process is the end of the pipe
         self._send(prepare)
@@ -242,6 +241,9 @@ class _Worker:
         self.process.kill()
         self.process.join()
         if self._folder:
+            for pid in _processes_of(self._folder):
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
             shutil.rmtree(self._folder, ignore_errors=True)
         return self.process.exitcode
 
@@ -287,10 +289,32 @@ def _temporary_folder() -> str | None:
         return None
 
 
-def _work(pipe: Any, folder: str | None) -> NoReturn:
-    """Do what comes through the pipe, until it is closed; ``folder`` is for temporary files."""
+@contextmanager
+def _temporary_files_in(folder: str | None) -> Iterator[None]:
+    """Let processes that are started meanwhile, and theirs, put temporary files into a folder."""
+    before = os.environ.get("TMPDIR")
     if folder:
         os.environ["TMPDIR"] = folder
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop("TMPDIR", None)
+        else:
+            os.environ["TMPDIR"] = before
+
+
+def _processes_of(folder: str) -> Iterator[int]:
+    """Yield processes that began with that folder, in whatever group or session they are."""
+    mark = b"TMPDIR=" + os.fsencode(folder) + b"\0"
+    for place in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):
+            if mark in place.read_bytes():
+                yield int(place.parent.name)
+
+
+def _work(pipe: Any) -> NoReturn:
+    """Do what comes through the pipe, until it is closed."""
     os.setpgid(0, 0)
     os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
     os.register_at_fork(after_in_child=pipe.close)  # only this process answers

@@ -268,3 +268,17 @@ def test_a_list_of_gigabytes_is_refused_unread(run, scene_file):
     assert code == 2
     assert re.search(r"\.fotismos: the list .* has more than .* Move it away", messages)
     assert (out / listing.MARK).stat().st_size == 2**40
+
+
+@pytest.mark.parametrize("line", [".", "..", "../mine", "/etc/passwd", "a/b", '"../mine\\n"'])
+def test_a_list_never_leads_out_of_its_folder(tmp_path, line):
+    out = tmp_path / "out"
+    out.mkdir()
+    said = [
+        line,
+        *(f'{{"{kind}": "{line}", "as": "1", "of": "x"}}' for kind in ("coming", "place")),
+    ]
+    (out / listing.MARK).write_text("".join(f"{each}\n" for each in said))
+    assert listing.read(out) == listing.Listed()
+    with output.held(out, "test"):
+        pass

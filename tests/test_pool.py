@@ -146,6 +146,23 @@ def test_a_process_that_closed_all_its_files_is_ended():
     assert time.monotonic() - begin < 50
 
 
+def leave_daemon(path, number):
+    """Start a process in a session of its own, whose parent is gone."""
+    script = f"setsid sh -c 'echo $$ >{path}; exec sleep 1000' &"
+    subprocess.run(["/bin/sh", "-c", script])
+    while not path.exists() or not path.read_text():
+        time.sleep(0.01)
+    if number:
+        os.kill(os.getpid(), number)
+
+
+@pytest.mark.parametrize("number", [0, signal.SIGKILL])
+def test_a_session_of_its_own_does_not_outlive_the_pool(number, tmp_path):
+    with Pool(1) as pool:
+        do(pool, Task("leaving", leave_daemon, (tmp_path / "daemon", number)))
+    assert ends(int((tmp_path / "daemon").read_text()))
+
+
 def make_temporary(number):
     tempfile.mkdtemp()
     if number:

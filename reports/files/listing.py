@@ -134,6 +134,11 @@ def _apply(line: str, found: Listed) -> None:
     except ValueError:
         return
     match said:
+        # What would lead out of the folder, fotismos never wrote.
+        case {"gone": str(name)} | {"coming": str(name)} | {"place": str(name)} | str(name) if (
+            not _is_name(name)
+        ):
+            return
         case {"gone": str(name)}:
             found.made.discard(name)
             found.coming.pop(name, None)
@@ -141,9 +146,13 @@ def _apply(line: str, found: Listed) -> None:
             found.coming[name] = identity
         case {"place": str(name), "of": str(scene)}:
             found.places[name] = scene
-        case str(name) if name:
+        case str(name):
             found.coming.pop(name, None)
             found.made.add(name)
+
+
+def _is_name(name: str) -> bool:
+    return name not in ("", ".", "..") and "/" not in name and "\0" not in name
 
 
 def _name_line(name: str) -> str:

@@ -193,7 +193,12 @@ def _notes(fault: Fault, folder: Path, code: int | None, said: str, before: dict
     """Yield what is not as it is expected."""
     if code not in fault.codes:
         yield f"exit code {code}, not {' or '.join(map(str, fault.codes))}"
-    if code and code != KILLED and fault.message and not re.search(fault.message, said):
+    if (
+        code
+        and code != KILLED
+        and fault.message
+        and not re.search(fault.message, said, re.MULTILINE)
+    ):
         yield f"message without {fault.message!r}"
     for pattern in (*(fault.results if code == 0 else ()), *fault.leaves):
         if not any(folder.glob(pattern)):

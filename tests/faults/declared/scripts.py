@@ -119,21 +119,15 @@ LIVES = {
     "standard output closed": "sys.stdout.close()\nos.close(1)",
     "standard error closed": "sys.stderr = None",
     "standard input closed": "os.close(0)",
-    "print replaced": "import builtins\nbuiltins.print = builtins.open = None",
-    "json.dumps replaced": "import json\njson.dumps = None",
     "signals ignored":
         "for n in (signal.SIGTERM, signal.SIGINT): signal.signal(n, signal.SIG_IGN)",
     "an alarm later": "signal.signal(signal.SIGALRM, lambda *_: None)\nsignal.alarm(1)",
     "an atexit that raises": "import atexit\natexit.register(lambda: 1 / 0)",
-    "a limit of 60 open files":
-        "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (60, 60))",
-    "a recursion limit of 200": "sys.setrecursionlimit(200)",
     "a trace function": "sys.settrace(lambda *_: None)",
     "another variant": "import mitsuba as mi\nmi.set_variant('scalar_rgb')",
     "a plugin of its own":
         "import mitsuba as mi\n"
         "mi.register_bsdf('own', lambda p: mi.load_dict({'type': 'diffuse'}))",
-    "NumPy's errors raised": "import numpy\nnumpy.seterr(all='raise')",
     "the random seed": "import random\nrandom.seed(1)",
     "a log level": "import mitsuba as mi\nmi.set_log_level(mi.LogLevel.Trace)",
     "no collection of garbage": "import gc\ngc.disable()",
@@ -141,6 +135,16 @@ LIVES = {
     "its own file deleted": "os.remove(__file__)",
 }  # fmt: skip
 """What neither this scene nor another is to be hurt by."""
+
+SABOTAGES = {
+    "print replaced": "import builtins\nbuiltins.print = builtins.open = None",
+    "json.dumps replaced": "import json\njson.dumps = None",
+    "NumPy's errors raised": "import numpy\nnumpy.seterr(all='raise')",
+    "a recursion limit of 200": "sys.setrecursionlimit(200)",
+    "a limit of 60 open files":
+        "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (60, 60))",
+}  # fmt: skip
+"""What may hurt this scene, with a message, but no other."""
 
 NEVER_ENDS = {
     "a loop": "while True: pass",
@@ -176,6 +180,10 @@ def faults() -> Iterator[Fault]:
         words = compare("bad.py", "good.xml") if with_another else one
         leaves = ("out/good/comparison.json",) if with_another else ()
         yield Fault(name, words, "bad", (0,), prepare, RESULTS, leaves, ours=("bad.py",))
+    for name, code in SABOTAGES.items():
+        prepare = then(_script(code, GOOD), written({"good.xml": SCENE}))
+        words = compare("bad.py", "good.xml")
+        yield Fault(name, words, "bad", (0, 1, 2), prepare, RESULTS, ("out/good/comparison.json",))
     for name, code in NEVER_ENDS.items():
         words = (*one, "--timeout", "12")
         yield Fault(f"without end: {name}", words, "12 s without any progress", (1,), _script(code))
