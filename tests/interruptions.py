@@ -239,8 +239,8 @@ def _folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def trials(name: str, count: int, seed: int = 0) -> list[Trial]:
-    """Interrupt a command at so many random moments between its start and its end."""
+def trials(name: str, count: int, seed: int = 0) -> Iterator[Trial]:
+    """Interrupt a command at so many random moments between its start and its end, one by one."""
     with tempfile.TemporaryDirectory() as folder:
         own, random = prepare(Path(folder, "scenes")), Random(f"{name} {seed}")
         out, seconds = Path(folder, "whole"), []
@@ -252,17 +252,20 @@ def trials(name: str, count: int, seed: int = 0) -> list[Trial]:
             assert process.returncode == 0, messages
             seconds.append(time.perf_counter() - begin)
         whole = results(out)
-        return [interrupt(name, own, whole, seconds[-1], random) for _ in range(count)]
+        for _ in range(count):
+            yield interrupt(name, own, whole, seconds[-1], random)
 
 
 def main(name: str, count: str, seed: str = "0") -> None:
-    """Print what came of interrupting a command, and every fault."""
-    found = trials(name, int(count), int(seed))
-    codes = Counter(trial.code for trial in found)
-    faulty = [trial for trial in found if trial.faults]
-    print(f"{name}: {len(found)} interruptions, exit codes {dict(codes)}, faults {len(faulty)}")
-    for trial in faulty:
-        print(f"  {signal.Signals(trial.number).name} after {trial.moment:.2f} s: {trial.faults}")
+    """Print every fault as it shows, and then what came of interrupting a command."""
+    codes, faults = Counter(), 0
+    for trial in trials(name, int(count), int(seed)):
+        codes[trial.code] += 1
+        if trial.faults:
+            faults += 1
+            told = f"{signal.Signals(trial.number).name} after {trial.moment:.2f} s"
+            print(f"{name}, {told}: {trial.faults}", flush=True)
+        print(f"{name}: {codes.total()} interruptions, {dict(codes)}, faults {faults}", flush=True)
 
 
 if __name__ == "__main__":

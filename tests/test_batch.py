@@ -316,3 +316,49 @@ def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folde
     assert "Traceback" not in messages
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "b/comparison.json" in page
+
+
+def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tmp_path):
+    with_one = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')
+    (folder / "b.xml").write_text(with_one, encoding="utf-8")
+    words = ("compare", folder, "-o", tmp_path / "out", "--spp", 4, "--resolution", "8x8")
+    assert run(*words)[0] == 2
+    assert run(*words, "-D", "roughness=0.3")[0] == 0
+    commands = {
+        name: json.loads((tmp_path / f"out/{name}/comparison.json").read_text())["command"]
+        for name in "ab"
+    }
+    assert "-D roughness=0.3" in commands["b"]
+    assert "-D" not in commands["a"]
+    code, _, messages = run(*words, "-D", "roughness=0.3", "-D", "rougness=0.3")
+    assert code == 2
+    assert "-D rougness: no scene has such a placeholder" in messages
+
+
+def test_scenes_in_subfolders_are_found_and_scripts_only_where_asked(run, folder, tmp_path):
+    inner = folder / "inner" / "most"
+    inner.mkdir(parents=True)
+    (folder / ".hidden").mkdir()
+    (folder / "b.xml").rename(inner / "a.xml")
+    (folder / ".hidden" / "c.xml").write_text(SCENE, encoding="utf-8")
+    (inner / "deed.py").write_text(
+        f"from pathlib import Path; Path({str(tmp_path / 'done')!r}).touch(); scene = None"
+    )
+    words = ("compare", folder, "-o", tmp_path / "out", "--spp", 4, "--resolution", "8x8")
+    code, _, messages = run(*words)
+    assert code == 0
+    assert "inner/most/deed.py: scripts are code, which only --scripts runs" in messages
+    assert not (tmp_path / "done").exists()
+    found = {path.parent.name for path in (tmp_path / "out").glob("*/comparison.json")}
+    assert found == {"a", "a-2"}
+    assert run(*words, "--scripts")[0] == 2
+    assert (tmp_path / "done").exists()
+
+
+def test_printed_commands_begin_as_the_program_was_started(run, folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("FOTISMOS_PROGRAM", "'./my run'")
+    words = ("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)
+    assert run(*words)[0] == 0
+    record = json.loads((tmp_path / "out/a/comparison.json").read_text(encoding="utf-8"))
+    assert record["command"].startswith("'./my run' compare ")
+    assert "'./my run' scenes" in run("compare", "nowhere.xml")[2]

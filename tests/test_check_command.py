@@ -204,6 +204,23 @@ def test_a_broken_baseline_is_written_anew_once_its_scene_is_named(run, folder):
     assert run("check", path, "-o", folder / "out")[0] == 0
 
 
+def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.xml").write_text(SCENE, encoding="utf-8")
+    assert run("check", "base", "--update", "--scene", "a/x.xml", *FAST)[0] == 0
+    before = (tmp_path / "base/x.json").read_bytes()
+    code, _, messages = run("check", "base", "--update", "--scene", "b/x.xml", *FAST)
+    assert (code, (tmp_path / "base/x.json").read_bytes()) == (2, before)
+    assert "the baseline of ../a/x.xml, not of b/x.xml" in messages
+    other = tmp_path / "package.json"
+    for text in ('{"name": "mine"}', "[]", "mine"):
+        other.write_text(text)
+        assert run("check", other, "--update", "--scene", "a/x.xml", *FAST)[0] == 2
+        assert other.read_text() == text
+
+
 def test_a_baseline_follows_its_schema(folder):
     for path in folder.glob("*.json"):
         jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), SCHEMA)

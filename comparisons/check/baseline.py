@@ -18,6 +18,7 @@ from comparisons.case import Request
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
 from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
 from comparisons.records import VERSION, Amount, Record, Versions, laid_out
+from heuristic import program
 from heuristic.errors import InputError
 
 MOST_PASSES = 1024
@@ -123,7 +124,8 @@ def parse(text: str, name: str) -> Baseline:
     except (InputError, ValueError, OverflowError, RecursionError) as error:
         where = "" if str(error).startswith(name) else f"{name}: "
         raise InputError(
-            f"{where}{error} `fotismos check BASELINE --update --scene SCENE` writes it."
+            f"{where}{error} `{program.command('check', 'BASELINE', '--update', '--scene')} SCENE`"
+            " writes it."
         ) from error
     return baseline
 

@@ -9,9 +9,10 @@ from msgspec import structs
 
 from comparisons import atomic
 from comparisons.case import SUFFIXES, Request, file_of, open_case
-from comparisons.check.baseline import Baseline, parse
+from comparisons.check.baseline import FORMAT_0_1, Baseline, parse
 from comparisons.check.measurement import HALVES
 from comparisons.store import content, require_regular
+from heuristic import program
 from heuristic.errors import InputError
 from reports.files import exr
 
@@ -72,7 +73,10 @@ LARGEST = 2**24
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
 
-_HOW = "Make one with `fotismos check BASELINE --update --scene SCENE`."
+HEADS = ('{\n  "record_version"', "{\n  " + FORMAT_0_1)
+"""How baselines begin."""
+
+_HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`."
 
 
 def read(path):
@@ -88,6 +92,15 @@ def read(path):
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
     return BaselineFile(path, parse(text, str(path)))
+
+
+def was_ours(path):
+    """Tell whether a file that cannot be read begins as baselines do, if only with a part of it."""
+    try:
+        text = content(path, LARGEST).decode(errors="replace")
+    except OSError:
+        return False
+    return any(text.startswith(head) or head.startswith(text) for head in HEADS)
 
 
 def write(path, baseline, pictures=None):
@@ -163,5 +176,5 @@ def _read_pictures(path):
 def _unreadable(path, reason):
     return InputError(
         f"{path}: the baseline's pictures cannot be read: {reason}. Write them again with"
-        " `fotismos check BASELINE --update --images`."
+        f" `{program.command('check', 'BASELINE', '--update', '--images')}`."
     )

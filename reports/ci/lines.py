@@ -1,5 +1,6 @@
 """The results of checks as lines for a terminal."""
 
+from heuristic import program
 from reports.terminal.tables import printed
 
 SHOWN = 12
@@ -79,7 +80,7 @@ def _details(result):
     if result.folder is not None:
         yield f"  pictures: {result.folder}"
     if result.status == "failed":
-        yield f"  if this is meant: fotismos check {result.path} --update"
+        yield f"  if this is meant: {program.command('check', result.path, '--update')}"
     yield ""
 
 

@@ -100,6 +100,11 @@ def _update(path, scene, images, significance, given, progress):
             scene, given = baselines.scene_from(old.scene, path), dict(old.options) | given
             if Request.of(given).stated() == old.options:
                 return checks.update(file, file.open(), significance, images, progress)
+        else:
+            raise InputError(
+                f"{path}: this is the baseline of {old.scene}, not of {scene}. Name another file"
+                " for this scene, or delete that one."
+            )
         images = images or bool(old.images)
     case = open_case(scene, Request.of(given))
     named = baselines.scene_for(scene, path)
@@ -107,7 +112,13 @@ def _update(path, scene, images, significance, given, progress):
 
 
 def _readable(path, scene):
-    """Read a baseline; None where it is missing, or broken while its scene is given."""
+    """Read a baseline; None where it is missing, or broken while its scene is given.
+
+    Raises
+    ------
+    InputError
+        For a broken one without a scene, and for a file that never was a baseline.
+    """
     if not path.exists():
         return None
     try:
@@ -115,6 +126,10 @@ def _readable(path, scene):
     except InputError:
         if scene is None:
             raise
+        if not baselines.was_ours(path):
+            raise InputError(
+                f"{path}: this file is not a baseline, and is left as it is. Name another one."
+            ) from None
         return None
 
 

@@ -5,10 +5,15 @@ from importlib import metadata
 
 import click
 
+from comparisons.pool import Task
 from heuristic import backend
 from heuristic.version import __version__
+from reports import jobs
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
+
+TIMEOUT_S = 300
+"""Seconds for a test rendering, which takes some ten where nothing is compiled yet."""
 
 
 @click.command()
@@ -30,6 +35,8 @@ def examine(variants):
     ------
     InstallationError
         When Dr.Jit found no LLVM that it can work with.
+    LostProcessError
+        When rendering ends the process that does it.
     """
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
@@ -40,11 +47,12 @@ def examine(variants):
     yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
     if info.note:
         yield f"                {info.note}"
-    for variant in variants:
-        yield f"{variant:<15} {_render(variant)}"
+    with jobs.pool(TIMEOUT_S) as pool:
+        for variant in variants:
+            yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
 
 
-def _render(variant):
+def rendered(variant):
     """Render a small figure in a variant, and say how that went."""
     from reference.scene.graph import set_variant
 

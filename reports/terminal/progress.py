@@ -33,7 +33,7 @@ def shown(unit="passes"):
     """Show progress on standard error while the block runs, if that is a terminal."""
     console = Console(stderr=True)
     with Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),  # a name may hold brackets
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn(unit),
