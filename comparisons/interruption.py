@@ -2,6 +2,8 @@
 
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
@@ -12,8 +14,13 @@ SIGNALS = {
 }
 """Ctrl-C, what ends a job, and the end of a terminal."""
 
+HELD_BACK = SIGNALS | {signal.SIGALRM}
+"""What can raise an interruption: an alarm stands for a signal that came during an import."""
+
 PAUSE_S = 0.02
 """Seconds after which a signal that came during an import is looked at again."""
+
+_is_held_back = False
 
 
 class Interrupted(KeyboardInterrupt):
@@ -31,6 +38,22 @@ def listen() -> None:
             signal.signal(number, _interrupt)
 
 
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Let interruptions wait while the block runs, and by the mask in what is started there.
+
+    The mask is of this thread alone: another one may take a signal, and have it handled here.
+    """
+    global _is_held_back
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD_BACK)
+    _is_held_back = True
+    try:
+        yield
+    finally:
+        _is_held_back = False
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def code_of(error: BaseException | None) -> int:
     """Return the exit code for an interruption."""
     return getattr(error, "exit_code", 128 + signal.SIGINT)
@@ -40,7 +63,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     for each in SIGNALS:
         if signal.getsignal(each) is _interrupt:
             signal.signal(each, _leave)
-    if not _is_importing(frame):
+    if not (_is_held_back or _is_importing(frame)):
         raise Interrupted(number)
     # Native modules that are just loaded crash, or swallow what is raised: later, then.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))

@@ -23,7 +23,7 @@ from tempfile import mkdtemp
 from time import monotonic, sleep
 from typing import Any, NoReturn
 
-from comparisons.interruption import SIGNALS
+from comparisons.interruption import HELD_BACK, held_back
 from heuristic.errors import FotismosError, LostProcessError
 
 FIRST_VICTIM = Path("/proc/self/oom_score_adj")
@@ -189,7 +189,8 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self._folder = _temporary_folder()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
-        with _deaf(), _temporary_files_in(self._folder):
+        resource_tracker.ensure_running()  # here, for it lets signals through afterwards
+        with held_back(), _temporary_files_in(self._folder):
             self.process.start()
         theirs.close()  # so that the end of the process is the end of the pipe
         self._send(prepare)
@@ -252,17 +253,6 @@ class _Worker:
             self.pipe.send(message)
 
 
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Hold back signals, which a process that is started meanwhile never hears."""
-    resource_tracker.ensure_running()  # where it starts one, it lets signals through afterwards
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _done_here(task: Task) -> Future[Any]:
     outcome: Future[Any] = Future()
     try:
@@ -321,7 +311,7 @@ def _work(pipe: Any) -> NoReturn:
     os.dup2(2, 1)  # standard output is for the results of the process that asked
     guard = subprocess.Popen(GUARD, stdin=parent_process().sentinel)  # noqa: F841  lives as long
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, HELD_BACK)
     if FIRST_VICTIM.exists():
         FIRST_VICTIM.write_text("1000")
     waiting = [_asked(pipe)]  # what prepares, until it has
