@@ -48,12 +48,28 @@ def trials(faults: list[tuple[str, Fault]], at_once: int = 2) -> Iterator[trial.
         yield from pool.map(lambda each: trial.run(*each), faults)
 
 
+def _good(files: list[Path], faults: list[tuple[str, Fault]]) -> list[trial.Trial]:
+    """Return those of earlier trials in which nothing was wrong."""
+    declared = {(kind, fault.name) for kind, fault in faults}
+    rows = (row for file in files for row in json.loads(file.read_text(encoding="utf-8")))
+    found = {(row["kind"], row["fault"]): trial.Trial(**row) for row in rows}  # the last one counts
+    return [each for key, each in found.items() if each.is_good and key in declared]
+
+
 def main(words: list[str]) -> int:
     """Print the table; return 1 where something is wrong."""
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)}")
     parser.add_argument("--list", action="store_true", help="name the faults, and run none")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all trials")
+    parser.add_argument(
+        "--again",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="run what failed in these files of --json, and take the rest of them",
+    )
     parser.add_argument("--only", default="", metavar="TEXT", help="faults whose names have it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="one of N faults alone")
     chosen = parser.parse_args(words)
@@ -65,8 +81,9 @@ def main(words: list[str]) -> int:
         print(*(f"{kind}: {fault.name}" for kind, fault in faults), sep="\n")
         print(len(faults))
         return 0
-    done = []
-    for found in trials(faults):
+    done = _good(chosen.again, faults)
+    known = {(each.kind, each.fault) for each in done}
+    for found in trials([(kind, each) for kind, each in faults if (kind, each.name) not in known]):
         done.append(found)
         print("." if found.is_good else f"\n{next(table.failures([found]))}", end="",
               file=sys.stderr, flush=True)  # fmt: skip
@@ -74,6 +91,7 @@ def main(words: list[str]) -> int:
             rows = [asdict(each) for each in done]
             chosen.json.write_text(json.dumps(rows, indent=1, ensure_ascii=False))
     print(file=sys.stderr)
+    done.sort(key=lambda each: [*KINDS].index(each.kind))
     print(*table.lines(done), "", *table.failures(done), sep="\n")
     return int(not all(each.is_good for each in done))
 
