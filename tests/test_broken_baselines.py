@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from comparisons.pool import Pool
 from heuristic.errors import (
     FotismosError,
     InputError,
@@ -253,8 +254,8 @@ def test_an_interruption_passes_through(raised, folder, tmp_path, monkeypatch):
         raise raised
 
     monkeypatch.setattr(checks, "examine", examine)
-    with pytest.raises(raised):
-        suite.examine(folder, 0.01, None, tmp_path)
+    with pytest.raises(raised), Pool(0) as pool:
+        suite.examine(pool, folder, 0.01, None, tmp_path)
 
 
 def test_a_result_goes_from_one_process_to_another(folder, tmp_path):

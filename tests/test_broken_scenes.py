@@ -57,6 +57,21 @@ def film(inner):
 
 
 BROKEN = {
+    "an integrator that is none": (
+        'type="path"',
+        'type="no_such_thing"',
+        "no_such_thing.*not found",
+    ),
+    "a depth below none": (
+        'name="max_depth" value="3"',
+        'name="max_depth" value="-5"',
+        "max_depth",
+    ),
+    "a pixel format that is none": (
+        '<film type="hdrfilm">',
+        '<film type="hdrfilm"><string name="pixel_format" value="rgbx"/>',
+        "pixel_format = 'rgbx'",
+    ),
     "radius NaN": (*radius("nan"), "ball: radius = nan"),
     "radius infinite": (*radius("inf"), "ball: radius = inf"),
     "radius 0": (*radius("0"), "ball: radius = 0 .*other than 0"),

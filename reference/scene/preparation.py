@@ -17,6 +17,9 @@ FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
 PATHS = ("path", "volpath", "volpathmis")
 """Integrators whose light is the reference's: all paths up to a length."""
 
+PIXEL_FORMATS = ("luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza")
+"""Those of Mitsuba's films."""
+
 FILM_SIZES = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
@@ -144,6 +147,11 @@ def _prepare_film(graph, sensor, resolution, overridden):
     props = graph.props(film)
     pixel_format = "luminance" if mi.is_monochromatic else "rgb"
     given = props.get("pixel_format", "rgb")
+    if given.lower() not in PIXEL_FORMATS:
+        raise InputError(
+            f"{graph.name}: {graph.label(film)}: pixel_format = {given!r}: choose one of"
+            f" {', '.join(PIXEL_FORMATS)}."
+        )
     if given != pixel_format:
         overridden.append(Overridden("pixel format", given, pixel_format))
     props["pixel_format"] = pixel_format
@@ -190,6 +198,18 @@ def _take_integrator(graph, overridden):
     return settings
 
 
+def _require_made(graph, index):
+    """Refuse an integrator that Mitsuba does not know, or knows and would not make as it is.
+
+    What another one takes the place of may need a variant that this is not.
+    """
+    try:
+        graph.instantiate(index)
+    except InputError as error:
+        if graph.plugin(index) in (*PATHS, "direct") or "not found" in str(error):
+            raise
+
+
 def _settings(graph, index, overridden):
     plugin, props = graph.plugin(index), graph.props(index)
     hidden = props.get("hide_emitters", None)
@@ -203,6 +223,7 @@ def _settings(graph, index, overridden):
             occlusion=props.get("occlusion", False),
             overridden=overridden,
         )
+    _require_made(graph, index)
     if plugin not in (*PATHS, "direct"):
         used = "path: all light, which is what the comparison is with"
         overridden.append(Overridden("integrator", plugin, used))
