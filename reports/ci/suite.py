@@ -123,13 +123,13 @@ def _readable(path, scene):
         return None
     try:
         return baselines.read(path)
-    except InputError:
-        if scene is None:
+    except InputError as error:
+        if scene is None or not path.is_file():
             raise
         if not baselines.was_ours(path):
             raise InputError(
                 f"{path}: this file is not a baseline, and is left as it is. Name another one."
-            ) from None
+            ) from error
         return None
 
 
