@@ -269,6 +269,8 @@ def trials(name: str, count: int, seed: int = 0) -> Iterator[Trial]:
 
 def main(name: str, count: str, seed: str = "0") -> None:
     """Print every fault as it shows, and then what came of interrupting a command."""
+    # A shell lets what it starts in the background ignore it, and so would all that is tried here.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     codes, faults = Counter(), 0
     for trial in trials(name, int(count), int(seed)):
         codes[trial.code] += 1

@@ -14,6 +14,7 @@ from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.facts import examine
 from reference.planning.plan import wants_spectra
 from reference.planning.premises import Pruning, Ruling
+from reference.planning.shape_tree import Queries, ShapeTree
 from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
 
@@ -220,14 +221,14 @@ def test_which_shapes_are_convex(rgb, tmp_path):
     convex = {name: shape.is_convex for name, shape in found.items()}
     assert convex == {"ball": True, "floor": True, "cube": True, "bowl": False, "tube": False}
     assert found["floor"].plane is not None
-    assert not found["floor"].may_face(found["floor"])
 
 
 def test_what_lies_behind_a_one_sided_wall_does_not_face_it(rgb):
     below, above = ball((0, 0, -3), 0.5), ball((0, 0, 3), 0.5)
     found = facts({"floor": floor(0.0), "below": below, "above": above})
-    assert not found["floor"].may_face(found["below"])
-    assert found["floor"].may_face(found["above"])
+    tree = ShapeTree.of((found["below"], found["floor"], found["above"]))
+    assert tree.first(Queries.everywhere(np.array([1]))) == (0, 2)
+    assert not tree.holding(np.array([0, 1])).answered(Queries.everywhere(np.array([1])))
 
 
 def test_a_figure_is_planned_without_random_numbers(rgb):

@@ -4,9 +4,12 @@ Each is left out by a rule of pruning (:mod:`reference.planning.premises`): its 
 the premises that it rests on. Where one of these is not known to hold, the effect is simulated.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import or_
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference.effects.effect import Effect
 from reference.planning.facts import Facts, LightFacts, Structure
@@ -19,7 +22,7 @@ from reference.planning.premises import (
     Premise,
     Pruning,
 )
-from reference.planning.shapes import ShapeFacts
+from reference.planning.shape_tree import Queries
 
 KNOWN_SURFACES = (NO_MEDIUM, OPAQUE, STILL, CONVEX, SEEN_FROM_OUTSIDE)
 """What both rules rest on: light meets nothing but the outer sides of convex shapes."""
@@ -28,43 +31,86 @@ FAR = 1e6
 """Where the shadow of a directional light begins, in multiples of the scene's size."""
 
 
+@dataclass(frozen=True)
+class Ways:
+    """Where light passes on its way to a surface: in one box around several.
+
+    These are the surface's own box, the same moved towards the light, and the places that the light
+    comes from.
+
+    Attributes
+    ----------
+    low, high
+        Box of the places, (3,); inf and -inf for none.
+    back, forth
+        Least and largest move along each axis, (3,).
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    back: np.ndarray
+    forth: np.ndarray
+
+    @classmethod
+    def between(cls, low: ArrayLike, high: ArrayLike, move: ArrayLike = (0, 0, 0)) -> "Ways":
+        """Return the ways from the places in a box, or along one move."""
+        zero, ends = np.zeros(3), (np.asarray(low, float), np.asarray(high, float))
+        return cls(*ends, np.minimum(zero, move), np.maximum(zero, move))
+
+    @classmethod
+    def of(cls, structure: Structure, light: LightFacts) -> "Ways":
+        """Return those of one light."""
+        if light.position is not None:
+            return cls.between(light.position, light.position)
+        if light.toward is not None:
+            toward = light.toward / np.linalg.norm(light.toward)
+            move = FAR * max(structure.tree.largest_coordinate, 1.0) * toward
+            return cls.between(np.full(3, np.inf), np.full(3, -np.inf), move)
+        if light.shape is not None:
+            shape = structure.shapes[structure.numbers[light.shape]]
+            return cls.between(shape.low, shape.high)
+        # An environment comes from everywhere that the receiver faces.
+        return cls.between(np.full(3, -np.inf), np.full(3, np.inf))
+
+    def __or__(self, other: "Ways") -> "Ways":
+        """Return the least that holds both."""
+        return Ways(
+            np.minimum(self.low, other.low),
+            np.maximum(self.high, other.high),
+            np.minimum(self.back, other.back),
+            np.maximum(self.forth, other.forth),
+        )
+
+    def to(self, structure: Structure, receivers: np.ndarray, shining: int = -1) -> Queries:
+        """Return the questions what lies on the ways to some shapes, but for one that shines."""
+        own = structure.tree.shapes.take(receivers)
+        low = np.minimum(own.low + self.back, self.low)
+        high = np.maximum(own.high + self.forth, self.high)
+        return Queries(receivers, low, high, np.full(len(receivers), shining))
+
+
 def _between(facts: Facts) -> str | None:
     """Name an obstacle that may hide a light from a surface that reflects."""
-    structure = facts.structure
-    for light in structure.lights:
-        shining = structure.shape(light.shape) if light.shape is not None else None
-        if light.shape is not None and (shining is None or shining.hides_itself):
-            return f"{light.shape}: may hide its own light"
-        for receiver in structure.shapes:
-            if not receiver.reflects:
-                continue
-            for obstacle in structure.shapes:
-                if obstacle is receiver or obstacle is shining:
-                    continue  # neither hides its own near side
-                if _may_hide(structure, light, receiver, obstacle):
-                    return f"{obstacle.name} may stand between {light.name} and {receiver.name}"
-    return None
+    structure, tree = facts.structure, facts.structure.tree
+    hiding = next((light for light in structure.lights if _hides_itself(structure, light)), None)
+    judged = structure.lights[: structure.lights.index(hiding)] if hiding else structure.lights
+    ways = [Ways.of(structure, light) for light in judged]
+    if ways:
+        # One question about all lights answers most receivers.
+        receivers = structure.reflecting
+        receivers = receivers[tree.answered(reduce(or_, ways).to(structure, receivers))]
+        for light, way in zip(judged, ways, strict=True):
+            shining = structure.numbers.get(light.shape, -1)
+            if found := tree.first(way.to(structure, receivers, shining)):
+                receiver, obstacle = receivers[found[0]], found[1]
+                names = structure.shapes[obstacle].name, light.name, structure.shapes[receiver].name
+                return "{} may stand between {} and {}".format(*names)
+    return f"{hiding.shape}: may hide its own light" if hiding else None
 
 
-def _may_hide(
-    structure: Structure, light: LightFacts, receiver: ShapeFacts, obstacle: ShapeFacts
-) -> bool:
-    """Tell whether an obstacle may be met on the way from a light to a receiver."""
-    if not receiver.may_face(obstacle):
-        return False
-    if light.position is not None:
-        ends = light.position[None]
-    elif light.toward is not None:
-        size = max(np.max(np.abs([shape.low, shape.high])) for shape in structure.shapes)
-        toward = light.toward / np.linalg.norm(light.toward)
-        ends = receiver.corners() + FAR * max(size, 1.0) * toward
-    elif light.shape is not None:
-        ends = structure.shape(light.shape).corners()
-    else:  # an environment comes from everywhere that the receiver faces
-        return True
-    low = np.minimum(receiver.low, ends.min(axis=0))
-    high = np.maximum(receiver.high, ends.max(axis=0))
-    return bool(np.all(low <= obstacle.high) and np.all(obstacle.low <= high))
+def _hides_itself(structure: Structure, light: LightFacts) -> bool:
+    shape = structure.shape(light.shape)
+    return light.shape is not None and (shape is None or shape.hides_itself)
 
 
 NO_SHADOWS = Pruning(
@@ -104,12 +150,12 @@ OCCLUSION = Effect(
 
 def _facing(facts: Facts) -> str | None:
     """Name two shapes that may send each other light."""
-    reflecting = [shape for shape in facts.structure.shapes if shape.reflects]
-    for number, first in enumerate(reflecting):
-        for second in reflecting[number + 1 :]:
-            if first.may_face(second) and second.may_face(first):
-                return f"{first.name} and {second.name} may see each other"
-    return None
+    structure = facts.structure
+    found = structure.reflecting_tree.first(Queries.everywhere(structure.reflecting), mutual=True)
+    if found is None:
+        return None
+    first, second = (structure.shapes[i].name for i in (structure.reflecting[found[0]], found[1]))
+    return f"{first} and {second} may see each other"
 
 
 NO_SECOND_REFLECTION = Pruning(

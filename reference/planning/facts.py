@@ -17,6 +17,7 @@ from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.lights.kind import Given
 from reference.planning.cameras import CameraFacts, camera_of
+from reference.planning.shape_tree import ShapeTree
 from reference.planning.shapes import ShapeFacts, shape_facts
 from reference.scene import values
 from reference.scene.graph import Graph
@@ -53,15 +54,34 @@ class Structure:
         """Tell whether a camera ray may begin inside a closed shape that reflects there."""
         return shape.is_hollow and not self.camera.is_outside(shape.corners())
 
-    def shape(self, name: str) -> ShapeFacts | None:
+    @cached_property
+    def numbers(self) -> dict[str | None, int]:
+        """The place of each shape among them, by its name; the first of several alike."""
+        return {shape.name: i for i, shape in reversed(list(enumerate(self.shapes)))}
+
+    def shape(self, name: str | None) -> ShapeFacts | None:
         """Return the shape of a name, None where there is none."""
-        return next((shape for shape in self.shapes if shape.name == name), None)
+        return self.shapes[self.numbers[name]] if name in self.numbers else None
+
+    @cached_property
+    def reflecting(self) -> np.ndarray:
+        """The numbers of the shapes that reflect."""
+        return np.array([i for i, shape in enumerate(self.shapes) if shape.reflects], int)
+
+    @cached_property
+    def tree(self) -> ShapeTree:
+        """The shapes in a tree."""
+        return ShapeTree.of(self.shapes)
+
+    @cached_property
+    def reflecting_tree(self) -> ShapeTree:
+        """Those that reflect, in a tree."""
+        return self.tree.holding(self.reflecting)
 
 
 def examine(graph: Graph, scene: mi.Scene) -> Structure:
     """Return the :class:`Structure` of a physical half: its graph, and the same instantiated."""
-    nodes = {graph.props(index).id(): index for index in graph.nodes(SHAPE)}
-    shapes = tuple(shape_facts(graph, nodes.get(shape.id()), shape) for shape in scene.shapes())
+    shapes = shape_facts(graph, scene.shapes())
     plugins = ", ".join(graph.plugin(index) for index in graph.nodes(SENSOR))
     camera = camera_of(plugins, scene.sensors())
     return Structure(shapes, tuple(_lights(graph)), camera)
