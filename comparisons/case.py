@@ -11,12 +11,13 @@ from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.pool import end_after_task
 from heuristic import program
+from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
 from reference.planning.plan import wants_spectra
-from reference.scene.graph import VARIANTS, set_variant
+from reference.scene.graph import set_variant
 from reference.scene.source import Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"

@@ -66,7 +66,8 @@ class Task:
     """A call of ``function(*arguments)``, both of which can be pickled.
 
     ``name`` stands in messages. ``progress``, where it is given, is called in the process that
-    asked; the function takes what calls it as one more argument.
+    asked; the function takes what calls it as one more argument. A process that somebody kills
+    loses nothing: the task is given to another one, once.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Pool:
         self._count, self._prepare, self._limit_s = count, prepare, limit_s
         self._idle: list[_Worker] = []
         self._busy: list[_Worker] = []
+        self._given_again: list[Task] = []
 
     def __enter__(self) -> "Pool":
         return self
@@ -147,9 +149,12 @@ class Pool:
                 worker.end()
         self._idle = [worker for worker in self._idle if not worker.is_spent]
         for task in islice(waiting, self._count - len(self._busy)):
-            worker = self._idle.pop() if self._idle else _Worker(self._prepare)
-            self._busy.append(worker)
-            worker.give(task, self._limit_s)
+            self._give(task)
+
+    def _give(self, task: Task) -> None:
+        worker = self._idle.pop() if self._idle else _Worker(self._prepare)
+        self._busy.append(worker)
+        worker.give(task, self._limit_s)
 
     def _finished(self) -> list[tuple[Task, Future[Any]]]:
         """Wait for messages, or the end of somebody's time; return the tasks that are over."""
@@ -167,6 +172,11 @@ class Pool:
                 worker.lose(f"it took {self._limit_s:g} s without any progress, and was ended.")
         over = [worker for worker in self._busy if worker.outcome.done()]
         self._busy = [worker for worker in self._busy if worker not in over]
+        for worker in [worker for worker in over if worker.was_killed]:
+            if not any(worker.task is task for task in self._given_again):
+                self._given_again.append(worker.task)
+                over.remove(worker)
+                self._give(worker.task)
         for worker in over:
             if worker.is_spent:
                 worker.end()
@@ -185,7 +195,7 @@ class _Worker:
 
     def __init__(self, prepare: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
-        self.is_spent = False
+        self.is_spent = self.was_killed = False
         self.pipe, theirs = context.Pipe()
         self._folder = _temporary_folder()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
@@ -222,7 +232,9 @@ class _Worker:
 
     def gone(self) -> None:
         """Say as the outcome of the task that the process ended."""
-        self.lose(_reason(self.end()))
+        code = self.end()
+        self.was_killed = code == -signal.SIGKILL
+        self.lose(_reason(code))
 
     def lose(self, reason: str) -> None:
         """End the process, and say why as the outcome of its task."""

@@ -26,6 +26,10 @@ VARIABLE = "DRJIT_LIBLLVM_PATH"
 WHEEL = "karellen-llvm-core"
 OLDEST_USABLE = 17
 
+FEWEST_THREADS = 2
+"""Of Dr.Jit in a process: with a single one Mitsuba waits for ever when it reads or writes images,
+for its own task to be done by another thread."""
+
 _HOW_TO_GET_IT = f"""\
   On Linux x86-64:  pip install {WHEEL}
   On Debian 13, Ubuntu 24.04 or newer:  apt-get install libllvm19
@@ -103,6 +107,18 @@ def check() -> LLVMInfo:
     if not _is_usable(found.version):
         raise InstallationError(_message(found))
     return found
+
+
+def use_threads(count: int | None = None) -> None:
+    """Let Dr.Jit compute with so many threads, at least :data:`FEWEST_THREADS`.
+
+    If omitted, with as many as it has, which on a machine of one core are too few.
+    """
+    import drjit as dr
+
+    enough = max(count or dr.thread_count(), FEWEST_THREADS)
+    if dr.thread_count() != enough:
+        dr.set_thread_count(enough)
 
 
 def inspect() -> LLVMInfo:

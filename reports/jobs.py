@@ -6,7 +6,7 @@ import logging
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from comparisons.pool import Pool
+from comparisons.pool import Pool, cores
 from heuristic import program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, suggestion
@@ -126,7 +126,7 @@ def rendering_options(command):
         click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
                      help="Seed of the run; each pass hashes its own from it."),
         click.option("--spp", type=click.IntRange(min=2),
-                     help="Samples a pixel, over all passes. [default: the plan's]"),
+                     help="Samples per pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=_resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
         click.option("--heuristic", metavar="NAME",
@@ -193,22 +193,48 @@ timeout_option = click.option(
     help="End a scene that makes no progress for so long.",
 )
 
-PROCESSES = 1
-"""Processes of a command that read and render scenes; with 0 it does so itself, as tests do."""
+workers_option = click.option(
+    "--workers",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes that render at the same time, each with its share of the cores.",
+)
+
+IN_PROCESSES = True
+"""Whether scenes are read and rendered in processes apart; tests do so in their own."""
 
 
-def pool(timeout: float, processes: int | None = None) -> Pool:
+def pool(timeout: float, workers: int = 1) -> Pool:
     """Return where scenes are read and rendered: apart from the process that the user sees.
 
-    A scene may run code of its own, and native code may crash or hang. ``timeout`` is the time in
-    seconds that a task may take without any progress.
+    A scene may run code of its own, and native code may crash or hang.
+
+    Parameters
+    ----------
+    timeout
+        Seconds that a task may take without any progress.
+    workers
+        Processes at the same time.
     """
-    count = PROCESSES if processes is None or not PROCESSES else processes
-    return Pool(count, partial(prepare, verbosity.level()), timeout)
+    return Pool(workers if IN_PROCESSES else 0, ready(workers), timeout)
 
 
-def prepare(level: int) -> None:
-    """Get a process ready to render: what Mitsuba says is heard where ``level`` is 1, verbose.
+def ready(workers: int) -> Callable[[], None]:
+    """Return what gets one of so many processes ready to render."""
+    return partial(prepare, verbosity.level(), cores() // workers if workers > 1 else None)
+
+
+def prepare(level: int, threads: int | None) -> None:
+    """Get a process ready to render.
+
+    Parameters
+    ----------
+    level
+        Of the user's output: at 1, verbose, what Mitsuba says is heard.
+    threads
+        Of Dr.Jit; if omitted, one per core.
 
     Raises
     ------
@@ -218,6 +244,7 @@ def prepare(level: int) -> None:
     from heuristic import backend
 
     backend.check()
+    backend.use_threads(threads)
     from reference.scene import messages
 
     messages.divert(_print if level > 0 else _pass_over)
@@ -282,10 +309,8 @@ def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
         return [whole] * len(scenes)
     from reference.scene.reading import placeholders
 
-    own = [
-        {key: value for key, value in whole.define.items() if key in placeholders(Path(scene))}
-        for scene in scenes
-    ]
+    known = (placeholders(Path(scene)) for scene in scenes)
+    own = [{key: value for key, value in whole.define.items() if key in names} for names in known]
     if unused := set(whole.define) - {key for each in own for key in each}:
         raise InputError(
             f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"

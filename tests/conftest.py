@@ -41,13 +41,13 @@ def spectral():
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch):
     """Let commands render in this process, which has loaded all that they need."""
-    monkeypatch.setattr(jobs, "PROCESSES", 0)
+    monkeypatch.setattr(jobs, "IN_PROCESSES", False)
 
 
 @pytest.fixture
 def apart(monkeypatch, in_this_process):
     """Let commands render in a process apart, as they do for their users."""
-    monkeypatch.setattr(jobs, "PROCESSES", 1)
+    monkeypatch.setattr(jobs, "IN_PROCESSES", True)
 
 
 @pytest.fixture

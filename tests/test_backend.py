@@ -185,6 +185,27 @@ def test_the_library_in_a_wheel(monkeypatch, tmp_path, listed, present, expected
     assert found == (expected and tmp_path.resolve() / "lib" / expected)
 
 
+IMAGES = """
+import os, sys
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+import heuristic
+import mitsuba as mi
+from reference.scene.graph import set_variant
+
+set_variant("llvm_ad_rgb")
+mi.Bitmap(mi.TensorXf([0.5] * 64 * 64 * 3, (64, 64, 3))).write(sys.argv[1])
+print(mi.Bitmap(sys.argv[1]).size())
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to have a single core")
+def test_images_are_written_and_read_on_a_machine_of_one_core(tmp_path):
+    command = [sys.executable, "-c", IMAGES, tmp_path / "image.exr"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    assert "64, 64" in done.stdout, done.stderr
+
+
 def pins(name):
     """Name, version and marker of every package of a requirements file."""
     lines = (ROOT / name).read_text().splitlines()

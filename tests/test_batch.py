@@ -14,6 +14,7 @@ from random import Random
 import jsonschema
 import pytest
 
+from tests.interruptions import results
 from tests.schemas import schema
 from tests.small_scene import SCENE
 
@@ -300,6 +301,18 @@ def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
         return lambda: time.perf_counter() > end
 
     _kill(box_filtered, tmp_path, 50, somewhere_within)
+
+
+def test_several_workers_write_what_one_writes(run, apart, box_filtered, tmp_path):
+    slow = SCENE.replace("</film>", '<rfilter type="box"/></film>').replace('"24"', '"96"')
+    (box_filtered / "0-slow.xml").write_text(slow, encoding="utf-8")
+    for workers in (1, 2):
+        out = tmp_path / str(workers)
+        assert run("compare", box_filtered, "-o", out, "--spp", 8, "--workers", workers)[0] == 0
+    assert results(tmp_path / "1") == results(tmp_path / "2")
+    tables = [(tmp_path / workers / "tables/metrics.csv").read_text() for workers in "12"]
+    names = [[line.split(",")[0] for line in table.splitlines()] for table in tables]
+    assert names[0] == names[1]
 
 
 def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):

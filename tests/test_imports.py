@@ -19,7 +19,7 @@ MOST = 145
 COMPARE = """
 import sys
 from reports import cli, jobs
-jobs.PROCESSES = 0
+jobs.IN_PROCESSES = False
 sys.argv = ["fotismos", "compare", "fig-8-9", "--resolution", "16x16", "-o", sys.argv[1], "-q"]
 cli.main()
 print(*sorted(sys.modules))

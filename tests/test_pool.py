@@ -123,6 +123,20 @@ def test_a_task_that_kills_its_process_takes_no_other_along():
     assert messages["dividing"].startswith("dividing: ZeroDivisionError: ")
 
 
+def die_once(path):
+    if not path.exists():
+        path.write_text("")
+        die_of(signal.SIGKILL)
+    return "done"
+
+
+def test_a_process_that_somebody_kills_loses_nothing(tmp_path):
+    with Pool(2) as pool:
+        tasks = [Task("equal", die_once, (tmp_path / str(i // 2),)) for i in range(6)]
+        results = [outcome.result() for _, outcome in pool.each(tasks)]
+    assert results == 6 * ["done"]
+
+
 def close_all():
     os.closerange(0, 100)
     time.sleep(1000)

@@ -135,24 +135,31 @@ def test_points_that_two_parts_share_are_done_once(rgb, tmp_path):
     assert table["dE2000"].to_pylist()[:2] == table["dE2000"].to_pylist()[2:]
 
 
-def test_processes_give_the_same_and_a_killed_one_ends_the_run(rgb, tmp_path, monkeypatch):
+def ending_processes(number):
+    """Return what spreads blocks over processes, which all get a signal after the third block."""
+
+    def spread(given):
+        for count, done in enumerate(running.processes(2)(given)):
+            yield done
+            if count == 2:
+                for child in multiprocessing.active_children():
+                    os.kill(child.pid, number)
+
+    return spread
+
+
+def test_processes_give_the_same_and_a_dead_one_ends_the_run(rgb, tmp_path, monkeypatch):
     monkeypatch.setattr(running, "WORTH_A_PROCESS", 1)
     wanted = study("alpha = [0.1, 0.3]\nlight_angle = {from=0, to=85, steps=7}", "lobe", "")
     alone = running.run(wanted, tmp_path / "a")
-
-    def killing(given):
-        for number, done in enumerate(running.processes(2)(given)):
-            yield done
-            if number == 2:
-                for child in multiprocessing.active_children():
-                    os.kill(child.pid, signal.SIGKILL)
-
     with pytest.raises(LostProcessError, match="run the same command again"):
-        running.run(wanted, tmp_path / "b", killing)
+        running.run(wanted, tmp_path / "b", ending_processes(signal.SIGABRT))
     outcome = running.run(wanted, tmp_path / "b")
     assert outcome.at_hand >= 3
     assert 0 < outcome.done <= 11
     assert outcome.table.equals(alone.table)
+    killed = running.run(wanted, tmp_path / "c", ending_processes(signal.SIGKILL))
+    assert killed.table.equals(alone.table)
 
 
 def test_other_values_and_options_are_other_points(tmp_path):

@@ -14,6 +14,7 @@ from threading import Lock
 
 from comparisons.pool import cores
 from comparisons.study import point
+from heuristic import backend
 from heuristic.errors import InstallationError, LostProcessError
 
 NEEDED = ("dask", "distributed")
@@ -33,11 +34,9 @@ _one_at_a_time = Lock()
 
 def rows(block, threads):
     """Do one block in a worker; one at a time in a process, since Mitsuba uses its threads."""
-    import drjit as dr
-
     with _one_at_a_time:
-        if threads and dr.thread_count() != threads:
-            dr.set_thread_count(threads)
+        if threads:
+            backend.use_threads(threads)
         return point.rows(block)
 
 

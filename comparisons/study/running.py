@@ -5,11 +5,10 @@ So a run that ends early loses nothing, and the next one repeats nothing.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from pathlib import Path
 
-from comparisons.pool import Pool, Task, cores
+from comparisons.pool import Pool, Task
 from comparisons.store import Entry
 from comparisons.study import dataset, point
 from comparisons.study.point import Block
@@ -98,11 +97,11 @@ def run(study, folder, spread=None, progress=None, blocks=None):
     return Outcome(dataset.table(study, rows), done - at_hand, at_hand, _failed(rows))
 
 
-def processes(count, prepare=tuple, limit_s=inf):
+def processes(count, ready=lambda workers: tuple, limit_s=inf):
     """Return what spreads blocks over so many processes of this machine, as `run` takes it.
 
-    ``prepare`` and ``limit_s`` are as of :class:`comparisons.pool.Pool`; with a ``count`` of 0 this
-    process does all.
+    ``ready(workers)`` returns what gets one of so many ready to render, and ``limit_s`` is as of
+    :class:`comparisons.pool.Pool`; with a ``count`` of 0 this process does all.
 
     A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
     several processes keep all of them busy.
@@ -116,8 +115,7 @@ def processes(count, prepare=tuple, limit_s=inf):
     def spread(blocks):
         workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
         tasks = [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
-        ready = partial(_prepare, prepare, cores() // workers if workers else 0)
-        with Pool(workers, ready, limit_s) as pool:
+        with Pool(workers, ready(workers), limit_s) as pool:
             for task, rows in pool.each(tasks):
                 try:
                     yield task.arguments[0], rows.result()
@@ -128,14 +126,6 @@ def processes(count, prepare=tuple, limit_s=inf):
                     ) from error
 
     return spread
-
-
-def _prepare(prepare, threads):
-    prepare()
-    if threads:
-        import drjit as dr
-
-        dr.set_thread_count(threads)
 
 
 def _named(block: Block, rows):

@@ -10,8 +10,7 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 
-from heuristic import light
-from heuristic.backend import VARIANTS
+from heuristic import backend, light
 from heuristic.errors import InputError, unknown
 from heuristic.plugins import mapped
 
@@ -39,8 +38,9 @@ def set_variant(variant):
     InputError
         For any other name.
     """
-    if variant not in VARIANTS:
-        raise unknown("variant", variant, VARIANTS)
+    if variant not in backend.VARIANTS:
+        raise unknown("variant", variant, backend.VARIANTS)
+    backend.use_threads()
     mi.set_variant(variant)
 
 

@@ -14,6 +14,7 @@ from reports.terminal import verbosity
 @jobs.fresh_option
 @jobs.scripts_option
 @jobs.timeout_option
+@jobs.workers_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
@@ -22,13 +23,13 @@ from reports.terminal import verbosity
     type=float,
     metavar="DE",
     help="Go on until 95 % of pixels have noise under this ΔE2000; --spp is then the most samples"
-    " a pixel. [default limit: 4096]",
+    " per pixel. [default limit: 4096]",
 )
 @jobs.scene_options
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, **rendering):
+def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, workers, **rendering):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
@@ -51,4 +52,4 @@ def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, **rende
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
-    batch.run(scenes, output, wanted, timeout)
+    batch.run(scenes, output, wanted, jobs.pool(timeout, workers))

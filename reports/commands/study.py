@@ -2,7 +2,6 @@
 
 import os
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
 
 import click
@@ -77,9 +76,8 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
         elif workers:
             spreading = cluster.local(workers)
         else:
-            count = (processes or cores()) if jobs.PROCESSES else 0
-            prepare = partial(jobs.prepare, verbosity.level())
-            spreading = nullcontext(running.processes(count, prepare, timeout))
+            count = (processes or cores()) if jobs.IN_PROCESSES else 0
+            spreading = nullcontext(running.processes(count, jobs.ready, timeout))
         with spreading as spread, progress.shown("points") as bar:
             outcome = running.run(wanted, folder, spread, bar.of(wanted.name), blocks)
         places = list(study_files.write(wanted, outcome, folder, page))

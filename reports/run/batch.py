@@ -26,7 +26,7 @@ More = Callable[[Pool, "Run"], dict[str, Any]]
 
 
 def run(
-    names: Iterable[str], folder: Path, wanted: Wanted, timeout: float, more: More | None = None
+    names: Iterable[str], folder: Path, wanted: Wanted, pool: Pool, more: More | None = None
 ) -> None:
     """Compare scenes, and write the results of each, then page and tables of all.
 
@@ -38,17 +38,17 @@ def run(
         For the results.
     wanted
         What of each scene.
-    timeout
-        Seconds that a scene may take without any progress.
+    pool
+        Where they are compared; it is ended.
     more
-        Does what else the page shows in the given pool, counts its time, and returns it by name.
+        Does what else the page shows in the pool, counts its time, and returns it by name.
 
     Raises
     ------
     FotismosError
         The gravest of the errors that kept a scene from being compared.
     """
-    with jobs.pool(timeout) as pool:
+    with pool:
         pool.start()
         from reports.files import ownership
         from reports.run import output, stages
@@ -69,9 +69,9 @@ def run(
                 pool.end()  # before its half written files are cleared away
                 ownership.recover(folder)
                 if views or failures:
-                    _write(record, folder, views, failures, wanted.figures, shown)
+                    _write(record, folder, found, views, failures, wanted.figures, shown)
                 raise
-            _write(record, folder, views, failures, wanted.figures, shown)
+            _write(record, folder, found, views, failures, wanted.figures, shown)
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
         count = f"{len(failures)} of {len(found)} scenes failed, "
@@ -110,19 +110,20 @@ def _compare(pool, record, places, folder, wanted, requests, views, failures):
             verbosity.remark(progress.details(view.record))
 
 
-def _write(run, folder, views, failures, with_figures, shown):
-    """Write what is about all scenes, and say what came of them."""
+def _write(run, folder, places, views, failures, with_figures, shown):
+    """Write what is about all scenes, in the order of their places, and say what came of them."""
     from reports.run import output
     from reports.run.stages import Failure
     from reports.terminal import progress, tables
 
-    run.failures = [Failure(scene=n, error=str(error)) for n, error in failures.items()]
+    # Of several processes the one with the shorter scene is ready first.
+    views = [views[place] for place in places if place in views]
+    failed = [place for place in places if place in failures]
+    run.failures = [Failure(scene=place, error=str(failures[place])) for place in failed]
     run.begin_page()
-    records = [view.record for view in views.values()]
+    records = [view.record for view in views]
     steps = [
-        lambda: output.write_page(
-            folder, list(views.values()), failures=run.failures, run=run, **shown
-        ),
+        lambda: output.write_page(folder, views, failures=run.failures, run=run, **shown),
         lambda: output.write_run(folder, run.record()),
     ]
     if views:

@@ -51,13 +51,14 @@ def _killed() -> Iterator[Fault]:
                     sent=(Sent(kill, when),))  # fmt: skip
     yield Fault("SIGKILL, and once more", compare("a.xml", "b.xml"), None, (0,), PREPARED, RESULTS,
                 shell='"$@" & sleep 9; kill -9 $!; wait; exec "$@"')  # fmt: skip
-    for number in (kill, TERM, Signals.SIGSEGV, Signals.SIGBUS, Signals.SIGABRT, Signals.SIGUSR1):
+    for number in (TERM, Signals.SIGSEGV, Signals.SIGBUS, Signals.SIGABRT, Signals.SIGUSR1):
         # Before it has begun with a scene, another process takes its place.
         yield Fault(f"{number.name} to a worker that begins", compare(), number.name, (0, 1),
                     PREPARED, RESULTS, sent=(Sent(number, 0.05, "worker"),))  # fmt: skip
         yield Fault(f"{number.name} to the worker", compare("slow.py"), number.name, (1,),
                     PREPARED, sent=(Sent(number, UNDER_WAY, "worker"),))  # fmt: skip
-    for number in (INT, Signals.SIGCHLD, Signals.SIGWINCH, Signals.SIGCONT):
+    # What a killed process did is done by another one.
+    for number in (kill, INT, Signals.SIGCHLD, Signals.SIGWINCH, Signals.SIGCONT):
         yield Fault(f"{number.name} to the worker", compare("slow.py"), "", (0,), PREPARED, RESULTS,
                     sent=(Sent(number, UNDER_WAY, "worker"),))  # fmt: skip
     stop = Sent(Signals.SIGSTOP, UNDER_WAY, "worker")
@@ -65,12 +66,14 @@ def _killed() -> Iterator[Fault]:
                 (1,), PREPARED, sent=(stop,))  # fmt: skip
     yield Fault("SIGSTOP to the worker, and Ctrl-C", compare("slow.py"), SAID, (130,), PREPARED,
                 sent=(stop, Sent(INT, 1.0)))  # fmt: skip
-    yield Fault("SIGKILL to the worker of a batch", compare("slow.py", "b.xml"), "SIGKILL", (1,),
+    yield Fault("SIGKILL to a worker that begins", compare(), "", (0,), PREPARED, RESULTS,
+                sent=(Sent(kill, 0.05, "worker"),))  # fmt: skip
+    yield Fault("SIGKILL to the worker of a batch", compare("slow.py", "b.xml"), "", (0,),
                 PREPARED, leaves=("out/b/comparison.json", "out/index.html", "out/run.json"),
                 sent=(Sent(kill, UNDER_WAY, "worker"),))  # fmt: skip
     for command in ("plan", "cost", "fit"):
         words = tuple("slow.py" if word == "a.xml" else word for word in LIMITED[command])
-        yield Fault(f"SIGKILL to the worker of {command}", words, "SIGKILL", (1,),
+        yield Fault(f"SIGKILL to the worker of {command}", words, "", (0,),
                     PREPARED, sent=(Sent(kill, UNDER_WAY, "worker"),))  # fmt: skip
 
 
