@@ -1,8 +1,10 @@
 """What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
 
 import gc
+import shutil
 import sys
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import heuristic  # noqa: F401  isort: skip
 
@@ -13,6 +15,7 @@ import pytest
 from heuristic import plugins
 from reference.rendering import direct
 from reports import jobs
+from tests import small_baselines
 from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
@@ -74,6 +77,27 @@ def scene_file(tmp_path):
     path = tmp_path / "my scene.xml"
     path.write_text(SCENE, encoding="utf-8")
     return path
+
+
+@pytest.fixture
+def no_service(monkeypatch):
+    """No CI service."""
+    for name in small_baselines.SERVICES:
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(scope="session")
+def made_baselines(tmp_path_factory):
+    """The two small baselines, in a folder that stays as it is."""
+    folder = tmp_path_factory.mktemp("made") / "baselines"
+    small_baselines.make(folder)
+    return folder
+
+
+@pytest.fixture
+def baselines_folder(made_baselines, no_service, tmp_path):
+    """A copy of the two small baselines, outside of any CI service."""
+    return Path(shutil.copytree(made_baselines, tmp_path / "baselines"))
 
 
 @pytest.fixture

@@ -5,8 +5,6 @@ import json
 import os
 import pickle
 import random
-import shutil
-import sys
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,11 +20,10 @@ from heuristic.errors import (
     LostProcessError,
     NonFiniteError,
 )
-from reports import cli
 from reports.ci import baselines, checks, suite
+from tests.small_baselines import FAST, change
 
 WHOLE = Path(__file__).parent / "baselines/cornell-box-llvm_ad_rgb.json"
-FAST = ("--spp", 32, "--resolution", "16x12")
 ODD = (
     None, True, "x", "", -1, 0, 1e308, -1e308, 10**400, 10**30, float("nan"), float("inf"), [], {},
     "é\ud800", "a\0b", [[[]]], 1e-320, -0.5,
@@ -103,27 +100,11 @@ def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(count, tmp_path):
 # --- One command over all of them ------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Two baselines with pictures."""
-    folder = tmp_path_factory.mktemp("made") / "baselines"
-    words = ["check", folder, "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b", "--images"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["fotismos", *map(str, words), *map(str, FAST)])
-        cli.main()
-    return folder
-
-
 @pytest.fixture
-def folder(made, tmp_path, monkeypatch):
-    """A copy of the two, one of which seems to have moved."""
-    for name in ("GITHUB_ACTIONS", "GITLAB_CI", "TF_BUILD", "TEAMCITY_VERSION"):
-        monkeypatch.delenv(name, raising=False)
-    copied = Path(shutil.copytree(made, tmp_path / "baselines"))
-    data = json.loads((copied / "fig-8-6b.json").read_text())
-    data["reference"]["blocks"][1][2]["mean"][0] *= 1.5
-    (copied / "fig-8-6b.json").write_text(json.dumps(data))
-    return copied
+def folder(baselines_folder):
+    """The two small baselines, one of which seems to have moved."""
+    change(baselines_folder / "fig-8-6b.json")
+    return baselines_folder
 
 
 def other(folder, name, **changes):

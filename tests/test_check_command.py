@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -15,45 +13,20 @@ from PIL import Image
 
 from comparisons.check.moved import Move
 from heuristic.errors import InputError
-from reports import cli
 from reports.ci import annotations, junit
 from tests.schemas import schema
+from tests.small_baselines import FAST, SERVICES, change
 from tests.small_scene import SCENE
 
 SCHEMA = schema("baseline")
-FAST = ("--spp", 32, "--resolution", "16x12")
-SERVICES = ("GITHUB_ACTIONS", "GITLAB_CI", "TF_BUILD", "TEAMCITY_VERSION")
 
 
-@pytest.fixture(autouse=True)
-def no_service(monkeypatch):
-    """These tests may themselves run in a CI service."""
-    for name in SERVICES:
-        monkeypatch.delenv(name, raising=False)
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Two baselines, made by the command."""
-    folder = tmp_path_factory.mktemp("made") / "baselines"
-    words = ["check", folder, "--update", "--scene", "fig-8-6a", "--scene", "fig-8-6b", "--images"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["fotismos", *map(str, words), *map(str, FAST)])
-        cli.main()
-    return folder
+pytestmark = pytest.mark.usefixtures("no_service")
 
 
 @pytest.fixture
-def folder(made, tmp_path):
-    """A copy of the two."""
-    return Path(shutil.copytree(made, tmp_path / "baselines"))
-
-
-def change(path, half="reference", factor=1.5):
-    """Change a baseline so that its scene seems to have moved in one block."""
-    data = json.loads(path.read_text(encoding="utf-8"))
-    data[half]["blocks"][1][2]["mean"][0] *= factor
-    path.write_text(json.dumps(data), encoding="utf-8")
+def folder(baselines_folder):
+    return baselines_folder
 
 
 # --- Checking --------------------------------------------------------------------------------

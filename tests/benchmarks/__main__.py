@@ -10,6 +10,7 @@ from heuristic.errors import FotismosError
 from tests.benchmarks import (
     batch,
     cost,
+    growth,
     guard,
     kernel,
     lights,
@@ -24,6 +25,7 @@ from tests.benchmarks import (
 BENCHMARKS = {
     "batch": batch.run,
     "cost": cost.run,
+    "growth": growth.run,
     "guard": guard.run,
     "kernel": kernel.run,
     "lights": lights.run,
