@@ -28,6 +28,9 @@ from reference.pairing.coat import Interface
 
 NODES = 96
 
+KEPT = coat.KEPT
+"""Materials of which results are kept."""
+
 LARGEST_ALPHA = 100.0
 LARGEST_RATIO = 20.0
 """Of indices of refraction, either way. Rougher surfaces and larger ratios are the plugin's own."""
@@ -95,22 +98,21 @@ def of_smooth_plastic(
 
     The latter is Fresnel's at normal incidence, ``((n_i - n_e) / (n_i + n_e))^2``.
     """
-    bsdf = mi.load_dict(
-        {
-            "type": "plastic",
-            "diffuse_reflectance": float(level),
-            "int_ior": float(int_ior),
-            "ext_ior": float(ext_ior),
-            "nonlinear": nonlinear,
-        }
-    )
+    eta = int_ior / ext_ior
     theta, weight = nodes(1.0)
-    si, wo = _head_on(theta)
-    value = bsdf.eval(mi.BSDFContext(), si, wo)
-    # Next to nothing comes out rounded, to either side of 0.
-    return max(float(weight @ np.array(value[0])), 0.0), (
-        (int_ior - ext_ior) / (int_ior + ext_ior)
-    ) ** 2
+    cosine = np.cos(theta)
+    mirror = ((int_ior - ext_ior) / (int_ior + ext_ior)) ** 2
+    leaving = weight @ ((1 - _fresnel(cosine, eta)) * cosine) / np.pi / eta**2
+    returned = _smooth_return(eta)
+    base = level / (1 - (level if nonlinear else 1) * returned)
+    # Beyond an index of 4 the fit throws back more than all, and the plugin's base is below 0.
+    return max(float(base * (1 - mirror) * leaving), 0.0), mirror
+
+
+@lru_cache(maxsize=KEPT)
+def _smooth_return(eta: float) -> float:
+    """Return what a smooth coat throws back of diffuse light from within, by Mitsuba's fit."""
+    return float(mi.fresnel_diffuse_reflectance(mi.Float(1 / eta))[0])
 
 
 def by_plugin(plastic: RoughPlastic) -> Albedo:
@@ -200,7 +202,7 @@ def _parts(plastic, level):
     return tuple(float(weight @ np.array(part[0], float).ravel()) for part in parts)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=KEPT)
 def nodes(alpha: float) -> tuple[np.ndarray, np.ndarray]:
     """Return polar angles and weights of the quadrature, ``sin(theta)`` included in the weights."""
     points, weights = coat.legendre(NODES)

@@ -118,7 +118,8 @@ def _sums(
         labels=("index", "total"),
     )
     total *= dr.gather(mi.Float, rule.first, node)
-    return np.array(dr.block_sum(total, size), float).reshape(len(alphas), ROWS)
+    sums = np.array(dr.block_sum(total, size), float).reshape(len(alphas), ROWS)
+    return sums * rule.rounded if distribution == "beckmann" else sums
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,9 @@ class Rule:
     """Nodes and weights of a rule as arrays, with the rows' cosines and sines.
 
     ``place`` are the nodes in (0, 1), ``normal`` Beckmann's slopes at the second half of them,
-    ``disc`` (x, y) GGX's points of the unit disc, first axis by half of the second.
+    ``disc`` (x, y) GGX's points of the unit disc, first axis by half of the second. ``rounded`` is
+    what all weights come to in the plugin, which adds one after the other in single precision:
+    Beckmann's terms are mostly bare weights, and 1e-6 off ``R`` is 1e-5 of a bright base.
     """
 
     cosine: mi.Float
@@ -136,6 +139,7 @@ class Rule:
     second: mi.Float
     normal: mi.Float
     disc: tuple[mi.Float, mi.Float]
+    rounded: float
 
 
 def _rule(size: int) -> Rule:
@@ -158,6 +162,7 @@ def _rule_in(variant: str, size: int) -> Rule:
         mi.Float(weights[half:]),  # half of a weight, for either sign
         mi.Float(erfinv(nodes[half:])),
         (disc.x, disc.y),
+        float(np.cumsum(np.float32(np.outer(weights, weights) / 4), dtype=np.float32)[-1]),
     )
     dr.eval(found.cosine, found.sine, found.place, found.first, found.second, found.normal, disc)
     return found

@@ -29,9 +29,10 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 ``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cache
+from functools import cache, lru_cache
 from math import exp, log, sqrt
 
 import numpy as np
@@ -152,19 +153,21 @@ def to_roughplastic(phong, convention):
         rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
         return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
-    alpha = alpha_of(phong.n, phong.form)
-    strength = max(phong.k_s)
-    tint = tuple(k_s / strength for k_s in phong.k_s)
-    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
+    white = _white(phong)
     wanted = Albedo(np.array(phong.k_d), specular_albedo(phong))
-    int_ior = _ior_for(white, max(wanted.specular))
-    passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    passed = albedo.of_roughplastic(white).diffuse
     if any(wanted.diffuse > passed):
-        int_ior = _nearest_ior(white, wanted, int_ior)
-        passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+        white = replace(white, int_ior=_nearest_ior(white, wanted, white.int_ior))
+        passed = albedo.of_roughplastic(white).diffuse
     rho = np.minimum(wanted.diffuse / passed, 1)  # the diffuse albedo is linear in rho
-    plastic = replace(white, int_ior=int_ior, diffuse_reflectance=tuple(map(float, rho)))
+    plastic = replace(white, diffuse_reflectance=tuple(map(float, rho)))
     return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
+
+
+def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
+    """Compute together what :func:`to_roughplastic` needs for each of these."""
+    if convention is Convention.MATCHED:
+        albedo.prepare(map(_white, phongs))
 
 
 def to_phong(plastic, convention):
@@ -186,16 +189,26 @@ def to_phong(plastic, convention):
     return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
 
 
+@lru_cache(maxsize=albedo.KEPT)
+def _white(phong):
+    """Return the white plastic with a phong's lobe, of the same specular albedo if it can."""
+    alpha = alpha_of(phong.n, phong.form)
+    strength = max(phong.k_s)
+    tint = tuple(k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
+    return replace(white, int_ior=_ior_for(white, max(specular_albedo(phong))))
+
+
 def _ior_for(plastic, wanted):
     """Return the IOR at which the specular albedo is ``wanted``, or the nearest one allowed.
 
     The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
-    1))^2``: its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
+    1))^2``: its inverse is where the search begins.
     """
 
     def reached(log_ior):
         int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(LARGEST_IOR)))
-        return max(albedo.of_roughplastic(replace(plastic, int_ior=int_ior)).specular)
+        return max(albedo.specular_of(replace(plastic, int_ior=int_ior)))
 
     if wanted <= 0:
         return LITERAL_IOR
