@@ -103,12 +103,13 @@ def _sums(
     thread = dr.arange(mi.UInt32, len(alphas) * ROWS * size)
     node, row, surface = thread % size, (thread // size) % ROWS, thread // (size * ROWS)
     alpha, eta = (dr.gather(mi.Float, mi.Float(given), surface) for given in (alphas, etas))
+    inverse = 1 / eta
     mu, sine = (dr.gather(mi.Float, given, row) for given in (rule.cosine, rule.sine))
     slopes = _slopes(distribution, rule, alpha, mu, sine, node)
 
     def step(index, total):
         x, y = slopes(index)
-        value = _value(distribution, alpha, eta, mu, sine, x, y, is_refracted)
+        value = _value(distribution, alpha, eta, inverse, mu, sine, x, y, is_refracted)
         return index + 1, dr.fma(value, dr.gather(mi.Float, rule.second, index), total)
 
     _, total = dr.while_loop(
@@ -201,12 +202,11 @@ def _slopes(distribution, rule, alpha, mu, sine, node):
     return visible
 
 
-def _value(distribution, alpha, eta, mu, sine, x, y, is_refracted):
+def _value(distribution, alpha, eta, inverse, mu, sine, x, y, is_refracted):
     """Return ``G(o) (1 - F)`` or ``G(o) F`` of a facet with slopes against ``x`` and ``y``."""
     normal = dr.rsqrt(1 + dr.square(x) + dr.square(y))
     cosine = dr.fma(sine, x, mu) * normal
-    inside_square = 1 - (1 - dr.square(cosine)) / dr.square(eta)
-    inside = dr.safe_sqrt(inside_square)
+    inside = dr.safe_sqrt(1 - (1 - dr.square(cosine)) * dr.square(inverse))
     across, along = dr.fma(eta, inside, cosine), dr.fma(eta, cosine, inside)
     # Both of Fresnel's equations over one denominator.
     reflected = (
@@ -214,20 +214,20 @@ def _value(distribution, alpha, eta, mu, sine, x, y, is_refracted):
         + dr.square(dr.fma(eta, cosine, -inside) * across)
     ) / (2 * dr.square(across * along))
     if is_refracted:
-        turn, keep, share = (cosine / eta - inside) * normal, 1 / eta, 1 - reflected
+        turn, keep, share = (inside - cosine * inverse) * normal, -inverse, 1 - reflected
     else:
         turn, keep, share = 2 * cosine * normal, 1, reflected
-    height = turn - keep * mu
-    side = dr.sqrt(dr.square(turn * x - keep * sine) + dr.square(turn * y))
-    height = -height if is_refracted else height
-    leaves = (height > 0) & (inside > 0 if is_refracted else cosine > 0)
-    return dr.select(leaves, share * _masking(distribution, height, alpha * side), 0)
+    # Away from the surface, on either side of it.
+    height = dr.fma(-keep, mu, turn)
+    side = dr.square(dr.fma(turn, x, -keep * sine)) + dr.square(turn * y)
+    leaves = (height > 0) & ((inside if is_refracted else cosine) > 0)
+    return dr.select(leaves, share * _masking(distribution, alpha, height, side), 0)
 
 
-def _masking(distribution, height, side):
-    """Return Smith's masking of a direction, ``side / height`` the tangent times the roughness."""
+def _masking(distribution, alpha, height, side):
+    """Return Smith's masking of a direction, ``side / height^2`` the square of its tangent."""
     if distribution == "ggx":
-        return 2 / (1 + dr.sqrt(1 + dr.square(side / height)))
-    a = dr.minimum(height / side, 1.6)
-    rational = (3.535 * a + 2.181 * dr.square(a)) / (1 + 2.276 * a + 2.577 * dr.square(a))
+        return 2 / (1 + dr.sqrt(1 + side * dr.square(alpha / height)))
+    a = dr.minimum(height * dr.rsqrt(side * dr.square(alpha)), 1.6)
+    rational = a * dr.fma(2.181, a, 3.535) / dr.fma(a, dr.fma(2.577, a, 2.276), 1)
     return dr.select(a < 1.6, rational, 1)
