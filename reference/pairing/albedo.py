@@ -130,15 +130,17 @@ def by_plugin(plastic: RoughPlastic) -> Albedo:
 
 def _interface(plastic: RoughPlastic) -> Interface | None:
     """Return the surface of a plastic, None where it is the plugin's to say what comes out."""
-    # The plugin keeps it in single precision, which tells near 1.
-    eta = float(np.divide(*np.float32([plastic.int_ior, plastic.ext_ior])))
+    # The plugin keeps both in single precision, which tells near an IOR of 1.
+    alpha = float(np.float32(plastic.alpha))
+    with np.errstate(all="ignore"):
+        eta = float(np.divide(*np.float32([plastic.int_ior, plastic.ext_ior])))
     is_known = (
         plastic.distribution in DISTRIBUTIONS
-        and SMALLEST_ALPHA <= plastic.alpha <= LARGEST_ALPHA
+        and np.float32(SMALLEST_ALPHA) <= alpha <= LARGEST_ALPHA
         and 1 / LARGEST_RATIO <= eta <= LARGEST_RATIO
         and eta != 1
     )
-    return Interface(plastic.alpha, eta, plastic.distribution) if is_known else None
+    return Interface(alpha, eta, plastic.distribution) if is_known else None
 
 
 def _lobe(interface: Interface) -> float:
@@ -148,7 +150,7 @@ def _lobe(interface: Interface) -> float:
     slope = np.tan(theta / 2)
     if interface.distribution == "beckmann":
         density = np.exp(-((slope / alpha) ** 2))
-        height = np.minimum(1 / (alpha * np.tan(theta)), 1.6)  # sign
+        height = np.minimum(1 / (alpha * np.tan(theta)), 1.6)
         height = np.where(theta < np.pi / 2, height, 0)
         masking = (3.535 * height + 2.181 * height**2) / (1 + 2.276 * height + 2.577 * height**2)
         masking = np.where(height < 1.6, masking, 1)

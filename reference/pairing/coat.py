@@ -85,10 +85,15 @@ def _keep(chunk: list[Interface], distribution: str, is_denser: bool) -> None:
     inward, outward = (COARSE, FINE) if is_denser else (FINE, COARSE)
     passed = _sums(distribution, alphas, etas, inward, is_refracted=True)
     thrown = _sums(distribution, alphas, 1 / etas, outward, is_refracted=False)
-    while len(_found) + len(chunk) > KEPT:
-        del _found[next(iter(_found))]
-    for one, transmittance, rows in zip(chunk, passed, thrown, strict=True):
-        _found[one] = Coat(transmittance, float(2 * np.mean(rows * COSINES)))
+    returned = 2 * np.mean(thrown * COSINES, axis=1)
+    keep(_found, dict(zip(chunk, map(Coat, passed, returned.tolist()), strict=True)))
+
+
+def keep(found: dict, more: dict) -> None:
+    """Add results to those that are kept, and forget the oldest beyond :data:`KEPT`."""
+    found.update(more)
+    for one in list(found)[: max(len(found) - max(KEPT, len(more)), 0)]:
+        del found[one]
 
 
 def _sums(
@@ -171,6 +176,7 @@ def _rule_in(variant: str, size: int) -> Rule:
 
 @lru_cache
 def legendre(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes in (-1, 1) and weights of the Gauss-Legendre rule, computed once."""
     return np.polynomial.legendre.leggauss(size)
 
 
