@@ -22,7 +22,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing import coat
 from reference.pairing.coat import Interface
 
@@ -31,9 +30,10 @@ NODES = 96
 KEPT = coat.KEPT
 """Materials of which results are kept."""
 
-LARGEST_ALPHA = 100.0
+SHARPEST, ROUGHEST = 1e-3, 100.0
+"""Roughness for which the plugin's albedos are given to 1e-5; outside it is asked itself."""
 LARGEST_RATIO = 20.0
-"""Of indices of refraction, either way. Rougher surfaces and larger ratios are the plugin's own."""
+"""The same of indices of refraction, either way."""
 
 DISTRIBUTIONS = ("beckmann", "ggx")
 
@@ -136,7 +136,7 @@ def _interface(plastic: RoughPlastic) -> Interface | None:
         eta = float(np.divide(*np.float32([plastic.int_ior, plastic.ext_ior])))
     is_known = (
         plastic.distribution in DISTRIBUTIONS
-        and np.float32(SMALLEST_ALPHA) <= alpha <= LARGEST_ALPHA
+        and np.float32(SHARPEST) <= alpha <= ROUGHEST
         and 1 / LARGEST_RATIO <= eta <= LARGEST_RATIO
         and eta != 1
     )
