@@ -22,6 +22,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing import coat
 from reference.pairing.coat import Interface
 
@@ -31,7 +32,8 @@ KEPT = coat.KEPT
 """Materials of which results are kept."""
 
 SHARPEST, ROUGHEST = 1e-3, 100.0
-"""Roughness for which the plugin's albedos are given to 1e-5; outside it is asked itself."""
+"""Roughness for which the plugin's albedos are given to 1e-5; outside it is asked itself, though
+for the diffuse part alone below."""
 LARGEST_RATIO = 20.0
 """The same of indices of refraction, either way."""
 
@@ -65,7 +67,7 @@ class Albedo:
 
 def of_roughplastic(plastic: RoughPlastic) -> Albedo:
     """Return the :class:`Albedo` of a :class:`RoughPlastic` at normal incidence."""
-    interface = _interface(plastic)
+    interface = _coated(plastic)
     if interface is None:
         return by_plugin(plastic)
     found = coat.of(interface)
@@ -88,7 +90,7 @@ def specular_of(plastic: RoughPlastic) -> np.ndarray:
 
 def prepare(plastics: Iterable[RoughPlastic]) -> None:
     """Compute what takes kernels for many surfaces at once (:func:`coat.prepare`)."""
-    coat.prepare(one for one in map(_interface, plastics) if one is not None)
+    coat.prepare(one for one in map(_coated, plastics) if one is not None)
 
 
 def of_smooth_plastic(
@@ -136,11 +138,17 @@ def _interface(plastic: RoughPlastic) -> Interface | None:
         eta = float(np.divide(*np.float32([plastic.int_ior, plastic.ext_ior])))
     is_known = (
         plastic.distribution in DISTRIBUTIONS
-        and np.float32(SHARPEST) <= alpha <= ROUGHEST
+        and np.float32(SMALLEST_ALPHA) <= alpha <= ROUGHEST
         and 1 / LARGEST_RATIO <= eta <= LARGEST_RATIO
         and eta != 1
     )
     return Interface(alpha, eta, plastic.distribution) if is_known else None
+
+
+def _coated(plastic: RoughPlastic) -> Interface | None:
+    """Return the surface of a plastic if its diffuse part is computed too."""
+    found = _interface(plastic)
+    return found if found is not None and found.alpha >= np.float32(SHARPEST) else None
 
 
 def _lobe(interface: Interface) -> float:

@@ -170,7 +170,7 @@ def _rough(graph: Graph, index: int) -> RoughPlastic | None:
         return None
     try:
         return _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
-    except InputError:
+    except (InputError, RuntimeError):
         return None
 
 
