@@ -23,7 +23,7 @@ def drawn(seed, number):
             (10 ** rng.uniform(-3, 2), rng.uniform(1.02, 3)),
             (10 ** rng.uniform(-2, 0.2), 1 + 10 ** rng.uniform(-4, -1)),
             (10 ** rng.uniform(-2, 0.2), rng.uniform(3, 20)),
-            (10 ** rng.uniform(-2, 0.2), rng.uniform(0.1, 0.98)),
+            (10 ** rng.uniform(-2, 0.2), rng.uniform(0.71, 0.98)),
         ][rng.integers(5)]
         ext_ior = rng.uniform(1, 1.5)
         yield RoughPlastic(
@@ -39,7 +39,7 @@ def drawn(seed, number):
 
 def assert_as_by_plugin(plastic):
     found, expected = albedo.of_roughplastic(plastic), albedo.by_plugin(plastic)
-    np.testing.assert_allclose(found.diffuse, expected.diffuse, rtol=0, atol=1.5e-5)
+    np.testing.assert_allclose(found.diffuse, expected.diffuse, rtol=0, atol=1e-5)
     np.testing.assert_allclose(found.specular, expected.specular, rtol=2e-6, atol=2e-7)
 
 
@@ -56,13 +56,13 @@ def test_the_albedos_of_a_roughplastic_are_what_its_plugin_reflects(variant, num
 
 @pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
 @pytest.mark.parametrize("alpha", [1e-3, 1.0, 100.0])
-@pytest.mark.parametrize("ratio", [1.0001, 20.0, 0.05])
+@pytest.mark.parametrize("ratio", [1.0001, 20.0, 0.71])
 def test_the_edges_of_what_is_computed_are_the_plugins_too(rgb, distribution, alpha, ratio):
     assert_as_by_plugin(RoughPlastic(GREY, alpha, ratio, distribution=distribution))
 
 
 @pytest.mark.parametrize(
-    "beyond", [{"alpha": 5e-4}, {"alpha": 300.0}, {"int_ior": 25.0}, {"int_ior": 0.04}]
+    "beyond", [{"alpha": 5e-4}, {"alpha": 300.0}, {"int_ior": 25.0}, {"int_ior": 0.7}]
 )
 def test_beyond_them_the_plugin_itself_is_asked(rgb, beyond):
     plastic = replace(RoughPlastic(GREY, 0.1, 1.5), **beyond)

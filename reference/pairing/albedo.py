@@ -34,8 +34,9 @@ KEPT = coat.KEPT
 SHARPEST, ROUGHEST = 1e-3, 100.0
 """Roughness for which the plugin's albedos are given to 1e-5; outside it is asked itself, though
 for the diffuse part alone below."""
-LARGEST_RATIO = 20.0
-"""The same of indices of refraction, either way."""
+LEAST_RATIO, LARGEST_RATIO = 0.71, 20.0
+"""The same of indices of refraction. Below ``sqrt(1/2)`` facets reflect totally head on, and single
+precision tells which nodes see it."""
 
 DISTRIBUTIONS = ("beckmann", "ggx")
 
@@ -139,7 +140,7 @@ def _interface(plastic: RoughPlastic) -> Interface | None:
     is_known = (
         plastic.distribution in DISTRIBUTIONS
         and np.float32(SMALLEST_ALPHA) <= alpha <= ROUGHEST
-        and 1 / LARGEST_RATIO <= eta <= LARGEST_RATIO
+        and LEAST_RATIO <= eta <= LARGEST_RATIO
         and eta != 1
     )
     return Interface(alpha, eta, plastic.distribution) if is_known else None
