@@ -76,6 +76,20 @@ def test_only_what_has_no_plugin_in_python_is_made_in_parallel(rgb):
         assert graph.config.parallel is expected
 
 
+def test_a_part_of_a_scene_is_a_node_and_what_it_refers_to(rgb):
+    nested = {"type": "twosided", "inner": DIFFUSE}
+    description = {"type": "scene"} | {f"s{k}": {"type": "sphere", "b": nested} for k in range(9)}
+    graph = Source("a test", description).parse()
+    wall = min(one for one in graph.nodes(BSDF) if graph.plugin(one) == "twosided")
+    part = graph.part(wall)
+    plugins = [part.plugin(one) for one in range(len(part.state.nodes))]
+    assert plugins == ["twosided", "diffuse", "checkerboard"]
+    assert part.location(1) == graph.location(wall + 1)
+    assert isinstance(part.instantiate(), mi.BSDF)
+    part.props(1)["reflectance"] = 0.25
+    assert not isinstance(graph.props(wall + 1)["reflectance"], float)
+
+
 # --- Exact pairs -----------------------------------------------------------------------------
 
 DIFFUSE = {"type": "diffuse", "reflectance": CHECKS}

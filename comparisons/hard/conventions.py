@@ -11,7 +11,8 @@ import heuristic
 from comparisons.departure.metrics import delta_e_2000
 from comparisons.hard import cases
 from heuristic import vectors
-from reference.pairing.factors import SMALLEST_IOR, Convention, Phong, to_roughplastic
+from reference.pairing.factors import Convention, Phong, to_roughplastic
+from reference.pairing.refraction import SMALLEST_IOR
 
 FAINT = Phong(k_d=(0.5,) * 3, k_s=(1e-12,) * 3, n=9.0)
 

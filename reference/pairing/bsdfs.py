@@ -5,9 +5,9 @@ from functools import lru_cache
 
 import mitsuba as mi
 
-from reference.pairing import factors
+from reference.pairing import albedo, factors
 from reference.pairing.factors import Convention, Phong
-from reference.pairing.nearest import WRAPPERS, nearest_of
+from reference.pairing.nearest import WRAPPERS, nearest_of, simple
 from reference.scene import values
 from reference.scene.graph import properties
 
@@ -71,6 +71,7 @@ def to_heuristic(graph, convention):
         One for each BSDF that was not ``phong``, nested ones included, those around them not.
     """
     nodes = graph.nodes(BSDF)
+    simple.prepare(graph, convention)
     found = {}
     for shape in graph.nodes(mi.ObjectType.Shape):
         for _, index in graph.children(shape, BSDF):
@@ -95,6 +96,12 @@ def to_heuristic(graph, convention):
 
 def to_physical(graph, convention):
     """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
+    glossy = [
+        phong(graph, index)
+        for index in graph.nodes(BSDF)
+        if graph.plugin(index) == "phong" and any(values.colour(graph, index, "k_s", 0.0))
+    ]
+    factors.prepare(glossy, convention)
     records = []
     for index in graph.nodes(BSDF):
         converted = _physical_properties(graph, index, convention)
@@ -180,6 +187,6 @@ def phong(graph, index):
     )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=albedo.KEPT)
 def _roughplastic_of(phong: Phong, convention: Convention):
     return factors.to_roughplastic(phong, convention)

@@ -29,29 +29,24 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 ``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cache
-from math import exp, log, sqrt
+from math import sqrt
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.terms import normalisation
-from reference.pairing import albedo
+from reference.pairing import albedo, refraction
 from reference.pairing.albedo import Albedo, RoughPlastic
+from reference.pairing.coat import keep
+from reference.pairing.refraction import LITERAL_IOR
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
 
 CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
-
-LITERAL_IOR = 1.5
-SMALLEST_IOR = exp(1e-4)
-"""Reflects 2.5e-9 at normal incidence. Less is taken for that: Mitsuba refuses an IOR of 1."""
-LARGEST_IOR = 10.0
-"""No dielectric comes near it; a larger specular albedo than it gives is recorded as missed."""
 
 MATCHING_TOLERANCE = 1e-5
 """Relative; a match that is farther off is recorded as a miss."""
@@ -152,19 +147,33 @@ def to_roughplastic(phong, convention):
         rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
         return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
-    alpha = alpha_of(phong.n, phong.form)
-    strength = max(phong.k_s)
-    tint = tuple(k_s / strength for k_s in phong.k_s)
-    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
-    wanted = Albedo(np.array(phong.k_d), specular_albedo(phong))
-    int_ior = _ior_for(white, max(wanted.specular))
-    passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
-    if any(wanted.diffuse > passed):
-        int_ior = _nearest_ior(white, wanted, int_ior)
-        passed = albedo.of_roughplastic(replace(white, int_ior=int_ior)).diffuse
+    if phong not in _whites:
+        prepare([phong], convention)
+    white, wanted = _whites[phong], _wanted(phong)
+    passed = albedo.of_roughplastic(white).diffuse
     rho = np.minimum(wanted.diffuse / passed, 1)  # the diffuse albedo is linear in rho
-    plastic = replace(white, int_ior=int_ior, diffuse_reflectance=tuple(map(float, rho)))
+    plastic = replace(white, diffuse_reflectance=tuple(map(float, rho)))
     return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
+
+
+_whites: dict[Phong, RoughPlastic] = {}
+
+
+def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
+    """Find together the white plastics whose reflectance :func:`to_roughplastic` then chooses."""
+    if convention is Convention.LITERAL:
+        return
+    found = {phong: _white(phong) for phong in phongs if phong not in _whites}
+    albedo.prepare(found.values())
+    dark = [
+        phong
+        for phong, white in found.items()
+        if any(_wanted(phong).diffuse > albedo.of_roughplastic(white).diffuse)
+    ]
+    iors = refraction.nearest([found[phong] for phong in dark], [_wanted(one) for one in dark])
+    for phong, int_ior in zip(dark, iors, strict=True):
+        found[phong] = replace(found[phong], int_ior=int_ior)
+    keep(_whites, found)
 
 
 def to_phong(plastic, convention):
@@ -186,64 +195,17 @@ def to_phong(plastic, convention):
     return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
 
 
-def _ior_for(plastic, wanted):
-    """Return the IOR at which the specular albedo is ``wanted``, or the nearest one allowed.
-
-    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
-    1))^2``: its inverse is where the search begins, since each step costs Mitsuba a new BSDF.
-    """
-
-    def reached(log_ior):
-        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(LARGEST_IOR)))
-        return max(albedo.of_roughplastic(replace(plastic, int_ior=int_ior)).specular)
-
-    if wanted <= 0:
-        return LITERAL_IOR
-    if wanted >= reached(log(LARGEST_IOR)):
-        return LARGEST_IOR
-    if wanted <= reached(log(SMALLEST_IOR)):
-        return SMALLEST_IOR
-    root = min(sqrt(wanted), 0.8)
-    guess = log((1 + root) / (1 - root))
-    found = root_scalar(
-        lambda log_ior: log(reached(log_ior) / wanted),
-        x0=guess,
-        x1=1.1 * guess,
-        method="secant",
-        xtol=1e-7,
-    )
-    return exp(found.root)
+def _white(phong):
+    """Return the white plastic with a phong's lobe, of the same specular albedo if it can."""
+    alpha = alpha_of(phong.n, phong.form)
+    strength = max(phong.k_s)
+    tint = tuple(k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
+    return replace(white, int_ior=refraction.of_lobe(white, max(specular_albedo(phong))))
 
 
-def _nearest_ior(plastic, wanted, highest):
-    """Return the IOR whose albedos come nearest to the wanted ones, both parts taken together.
-
-    A high index reflects more, and lets less through to the diffuse base and out again: no index
-    gives both parts. Nearest is the least sum of squares over the parts and channels.
-    """
-
-    def distance(log_ior):
-        reached = albedo.of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
-        diffuse = np.minimum(wanted.diffuse, reached.diffuse)
-        return np.sum((diffuse - wanted.diffuse) ** 2 + (reached.specular - wanted.specular) ** 2)
-
-    # Where it is least is where it is level, values a step to either side being equal: the least
-    # value itself is too flat for single precision to tell its place.
-    step = 1.02
-
-    @cache
-    def slope(log_log_ior):
-        return distance(exp(log_log_ior) * step) - distance(exp(log_log_ior) / step)
-
-    smallest, high = log(log(SMALLEST_IOR) * step), log(log(highest) / step)
-    if slope(high) <= 0:
-        return exp(exp(high))
-    low = max(high - 1, smallest)
-    while slope(low) >= 0:
-        if low == smallest:
-            return exp(exp(low))
-        low, high = max(low - 1, smallest), low
-    return exp(exp(root_scalar(slope, bracket=(low, high), xtol=1e-4).root))
+def _wanted(phong):
+    return Albedo(np.array(phong.k_d), specular_albedo(phong))
 
 
 def _misses(wanted, reached):

@@ -66,6 +66,26 @@ class Graph:
         copy.resolver = self.resolver
         return copy
 
+    def part(self, index: int) -> "Graph":
+        """Return a graph of a node, which comes first, and of copies of all that it refers to."""
+        part = Graph(self.name, self.config, Parser.ParserState())
+        part.state.files = self.state.files
+        part.folders, part.kinds, part.resolver = list(self.folders), self.kinds, self.resolver
+        given = [index, *(one for one in self.nodes_in_use(index) if one != index)]
+        places = {one: place for place, one in enumerate(given)}
+        paths = list(self.state.node_paths)  # none of files, and of nodes that were added
+        if paths:
+            part.state.node_paths = [paths[one] if one < len(paths) else "" for one in given]
+        for one in given:
+            node = Parser.SceneNode(self.state.nodes[one])
+            node.props = mi.Properties(node.props)
+            part.state.nodes.append(node)
+        for node in part.state.nodes:
+            for key, value in list(node.props.items()):
+                if isinstance(value, Reference):
+                    node.props[key] = Reference(places[value.index()])
+        return part
+
     def instantiate(self, index=0):
         """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
 
@@ -220,9 +240,9 @@ class Graph:
         node.type, node.props = self.kind(index), props
         self.state.nodes[index] = node
 
-    def nodes_in_use(self):
-        """Return the indices of all nodes that the scene refers to, directly or not."""
-        seen, queue = set(), [0]
+    def nodes_in_use(self, root=0):
+        """Return the indices of all nodes that the scene, or another, refers to, and its own."""
+        seen, queue = set(), [root]
         while queue:
             index = queue.pop()
             if index in seen:

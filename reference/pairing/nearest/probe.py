@@ -16,6 +16,7 @@ Textures are averaged.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import cos, log, pi, radians, sin
 
 import drjit as dr
@@ -88,6 +89,7 @@ def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> object:
     )
 
 
+@cache
 def lattice(size: int, generator: Sequence[int] = LATTICE) -> np.ndarray:
     """Return the points of a rank-1 lattice in the unit cube, (len(generator), size)."""
     return (np.outer(generator, np.arange(size)) / size + 0.5 / size) % 1
@@ -130,6 +132,7 @@ def _at(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     sin_phi, cos_phi = dr.sincos(around)
     beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
     level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
+    dr.eval(bs, weight, up, straight, level)  # one kernel for all that is read below
     reflected, passed, scattered, diffuse = (
         _means(value)
         for value in (
@@ -214,13 +217,12 @@ def with_values(context: Context, index: int, **values: object) -> White | None:
 
     Only parameters that are given are changed: what has its default keeps it.
     """
-    graph = context.graph.copy()
-    props = mi.Properties(graph.props(index))
+    part = context.graph.part(index)
+    props = part.props(0)
     for key, value in values.items():
         if key in props:
             props[key] = value
-    graph.replace(index, props)
-    found = probe(graph.instantiate(index))
+    found = probe(part.instantiate())
     if found is None:
         return None
     parts = (found.reflected, found.diffuse, found.specular, found.passed, found.scattered)

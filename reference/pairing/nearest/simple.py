@@ -8,12 +8,13 @@ such surfaces on each path.
 from dataclasses import asdict
 from functools import lru_cache
 
+from heuristic.errors import InputError
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.factors import Convention, Phong, exponent_of
 from reference.pairing.nearest import operations, probe
-from reference.pairing.nearest.material import Context, Nearest, rule
+from reference.pairing.nearest.material import BSDF, Context, Nearest, rule
 from reference.scene import values
 from reference.scene.graph import Graph
 
@@ -156,6 +157,23 @@ def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
     )
 
 
+def prepare(graph: Graph, convention: Convention) -> None:
+    """Compute together what the rules need for each rough plastic of a graph."""
+    if convention is Convention.MATCHED:
+        found = (_rough(graph, index) for index in graph.nodes(BSDF))
+        albedo.prepare(one for one in found if one is not None)
+
+
+def _rough(graph: Graph, index: int) -> RoughPlastic | None:
+    """Return a white roughplastic, None for what is none or is refused once it is paired."""
+    if graph.plugin(index) != "roughplastic":
+        return None
+    try:
+        return _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
+    except (InputError, RuntimeError):
+        return None
+
+
 def _smooth_exponent() -> float:
     return exponent_of(probe.SMOOTH_ALPHA)
 
@@ -176,7 +194,7 @@ def _roughplastic(
     )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=albedo.KEPT)
 def _phong_of(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list]:
     return factors.to_phong(plastic, convention)
 
