@@ -14,7 +14,7 @@ from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.facts import examine
 from reference.planning.plan import wants_spectra
 from reference.planning.premises import Pruning, Ruling
-from reference.rendering.direct import AlbedoTable
+from reference.rendering.albedo_table import AlbedoTable
 from reference.scene.source import Source
 
 WHITE = {"type": "diffuse", "reflectance": 0.7}

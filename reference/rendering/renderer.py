@@ -17,7 +17,7 @@ import numpy as np
 
 from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
-from reference.rendering.direct import AlbedoTable
+from reference.rendering.albedo_table import AlbedoTable
 from reference.rendering.gbuffer import image_size
 from reference.scene.preparation import PATHS
 
