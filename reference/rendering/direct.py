@@ -5,7 +5,8 @@ Indirect light is added where it is asked for.
 Mitsuba's ``direct`` picks one emitter at random for each sample, so that two point lights already
 make noise. This one asks each emitter in turn: point, spot and directional lights, which need no
 random number, are then exact at each camera ray, and only what has an extent is sampled, by emitter
-and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mitsuba's.
+and by BSDF, with the balance heuristic. Of thousands of lights it can pick some, in proportion to
+what they give. BSDFs, emitters and visibility are Mitsuba's.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
@@ -17,13 +18,21 @@ Parameter           Type (default)      Meaning
                                         ray meets what hides a light: without shadows, 0 where
                                         something does. Mirrors and glass take theirs all the same,
                                         since nothing else finds a light in them
+``light_samples``   integer (0)         lights that are picked at random for each sample, of points
+                                        and directions and of the others, where there are more
+                                        (:mod:`reference.rendering.light_choice`); 0 asks each
 ``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================
 """
 
+from operator import is_
+
 import drjit as dr
 import mitsuba as mi
+
+from reference.rendering import light_sums
+from reference.rendering.light_choice import LightChoice
 
 _registered = set()
 
@@ -44,34 +53,39 @@ def _define():
             self.shadows = props.get("shadows", True)
             self.bsdf_samples = props.get("bsdf_samples", 1)
             self.max_depth = props.get("max_depth", 2)
+            self.light_samples = props.get("light_samples", 0)
+            self._choices = {}
             self.environment_albedo = None
             """An `AlbedoTable` in place of sampling the environment,
             for a scene of one BSDF that nothing hides from it; set after construction."""
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
+            delta, others = _parted(scene.emitters())
             si = self._first_surface(scene, ray, active)
-            seen = active & (si.is_valid() | (not self.hide_emitters))
-            colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
+            colour = mi.Spectrum(0)
+            if others or len(delta) <= light_sums.UNROLLED:  # no ray meets points or directions
+                seen = active & (si.is_valid() | (not self.hide_emitters))
+                colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
             hit = active & si.is_valid()
-            context = mi.BSDFContext()
             bsdf = si.bsdf(ray)
-            extended = []
-            for emitter in scene.emitters():
-                if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
-                    colour += self._from_emitter(
-                        scene, si, bsdf, context, emitter, mi.Point2f(0.5), hit
-                    )
-                elif emitter.is_environment() and self.environment_albedo is not None:
+            given = scene, si, bsdf, sampler, hit, self.shadows, self.bsdf_samples
+            extended = [e for e in others if not self._is_tabulated(e)]
+            if len(delta) > light_sums.UNROLLED:
+                colour += light_sums.of_many(delta, True, *given, self._choice(scene, delta, True))
+            for emitter in scene.emitters() if len(delta) <= light_sums.UNROLLED else others:
+                if _is_delta(emitter):
+                    colour += light_sums.of_one(emitter, True, *given)
+                elif self._is_tabulated(emitter):
                     albedo = self.environment_albedo.at(si.wi.z)
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
-                else:
-                    extended.append(emitter)
-            for emitter in extended:
-                colour += self._from_emitter(
-                    scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
-                )
+            choice = self._choice(scene, extended, False)
+            if len(extended) > light_sums.UNROLLED:
+                colour += light_sums.of_many(extended, False, *given, choice)
+            else:
+                for emitter in extended:
+                    colour += light_sums.of_one(emitter, False, *given)
             if extended and (self.bsdf_samples or _has_delta(scene)):
-                colour += _from_bsdf(scene, si, bsdf, context, sampler, hit, self.bsdf_samples)
+                colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples, choice)
             if self.max_depth != 2:
                 colour += indirect_light(
                     scene, sampler, si, bsdf, self.max_depth, hit, self.shadows, self.bsdf_samples
@@ -88,22 +102,32 @@ def _define():
                 pi[skip] = beyond
             return pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
 
-        def _from_emitter(self, scene, si, bsdf, context, emitter, sample, active):
-            """One sample of an emitter, weighted against sampling the BSDF if that can find it."""
-            ds, weight = emitter.sample_direction(si, sample, active)
-            active = active & (ds.pdf > 0)
-            if self.shadows:
-                active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
-            wo = si.to_local(ds.d)
-            if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) or not self.bsdf_samples:
-                return dr.select(active, bsdf.eval(context, si, wo, active) * weight, 0)
-            value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
-            return dr.select(active, value * weight * ds.pdf / (ds.pdf + bsdf_pdf), 0)
+        def _is_tabulated(self, emitter):
+            return self.environment_albedo is not None and emitter.is_environment()
+
+        def _choice(self, scene, lights, is_delta):
+            """Return what picks lights of a list, None where each is asked."""
+            if not 0 < self.light_samples < len(lights):
+                return None
+            known = self._choices.get(is_delta)
+            if known is None or not all(map(is_, known.lights, lights)):
+                known = self._choices[is_delta] = LightChoice(scene, lights, self.light_samples)
+            return known
 
         def to_string(self):
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
 
     mi.register_integrator("direct_all", DirectAllIntegrator)
+
+
+def _is_delta(emitter):
+    return mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
+
+
+def _parted(emitters):
+    """Return the points and directions, and the other emitters."""
+    delta = [emitter for emitter in emitters if _is_delta(emitter)]
+    return delta, [emitter for emitter in emitters if not _is_delta(emitter)]
 
 
 def _has_delta(scene):
@@ -112,11 +136,12 @@ def _has_delta(scene):
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
-def _from_bsdf(scene, si, bsdf, context, sampler, active, bsdf_samples):
+def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples, choice):
     """One sample of the BSDF, for the emitter that it happens to meet.
 
     Without ``bsdf_samples`` only directions count that no sample of an emitter takes.
     """
+    context = mi.BSDFContext()
     bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
     active = active & (bs.pdf > 0)
     hit = scene.ray_intersect(si.spawn_ray(si.to_world(bs.wo)), active)
@@ -124,6 +149,8 @@ def _from_bsdf(scene, si, bsdf, context, sampler, active, bsdf_samples):
     ds = mi.DirectionSample3f(scene, hit, si)
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
+    if choice is not None:
+        emitter_pdf *= choice.expected(emitter, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     active &= is_delta | (bsdf_samples > 0)
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
