@@ -246,7 +246,8 @@ def physical_integrator(plan, scene, hide_emitters):
     description["max_depth"] = plan.max_depth
     if plan.integrator in PATHS:
         return mi.load_dict(description | {"rr_depth": plan.rr_depth})
-    own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
+    names = ("shadows", "bsdf_samples", "light_samples")
+    own = {name: getattr(plan, name) for name in names}
     integrator = mi.load_dict(description | own)
     # An effect that is left out may be the environment itself.
     if plan.tabulate_environment and scene.environment() is not None:
