@@ -71,14 +71,14 @@ def _define():
             given = scene, si, bsdf, sampler, hit, self.shadows, self.bsdf_samples
             extended = [e for e in others if not self._is_tabulated(e)]
             if len(delta) > light_sums.UNROLLED:
-                colour += light_sums.of_many(delta, True, *given, self._choice(scene, delta, True))
+                colour += light_sums.of_many(delta, True, *given, self._choice(scene, delta))
             for emitter in scene.emitters() if len(delta) <= light_sums.UNROLLED else others:
                 if _is_delta(emitter):
                     colour += light_sums.of_one(emitter, True, *given)
                 elif self._is_tabulated(emitter):
                     albedo = self.environment_albedo.at(si.wi.z)
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
-            choice = self._choice(scene, extended, False)
+            choice = self._choice(scene, extended)
             if len(extended) > light_sums.UNROLLED:
                 colour += light_sums.of_many(extended, False, *given, choice)
             else:
@@ -87,9 +87,9 @@ def _define():
             if extended and (self.bsdf_samples or _has_delta(scene)):
                 colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples, choice)
             if self.max_depth != 2:
-                colour += indirect_light(
-                    scene, sampler, si, bsdf, self.max_depth, hit, self.shadows, self.bsdf_samples
-                )
+                parameters = self.max_depth, hit, self.shadows, self.bsdf_samples
+                choice = self._choice(scene, scene.emitters(), 1)
+                colour += indirect_light(scene, sampler, si, bsdf, *parameters, choice)
             environment = scene.environment() is not None and not self.hide_emitters
             return colour, active if environment else hit, []
 
@@ -105,13 +105,15 @@ def _define():
         def _is_tabulated(self, emitter):
             return self.environment_albedo is not None and emitter.is_environment()
 
-        def _choice(self, scene, lights, is_delta):
+        def _choice(self, scene, lights, picks=None):
             """Return what picks lights of a list, None where each is asked."""
             if not 0 < self.light_samples < len(lights):
                 return None
-            known = self._choices.get(is_delta)
+            key = picks, len(lights), _is_delta(lights[0])
+            known = self._choices.get(key)
             if known is None or not all(map(is_, known.lights, lights)):
-                known = self._choices[is_delta] = LightChoice(scene, lights, self.light_samples)
+                known = LightChoice(scene, lights, picks or self.light_samples)
+                self._choices[key] = known
             return known
 
         def to_string(self):
@@ -166,11 +168,13 @@ SURVIVAL = 0.95
 
 
 @dr.syntax
-def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1):
+def indirect_light(
+    scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1, choice=None
+):
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Paths begin with a sample of the BSDF there. The direct light takes every light in turn; this
-    picks one at random at each later vertex, as Mitsuba's ``path`` does everywhere.
+    picks one at random at each later vertex: as Mitsuba's ``path`` does everywhere, or by a choice.
 
     Parameters
     ----------
@@ -180,6 +184,8 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         As Mitsuba counts: 2 is direct light, for which the result is 0; -1 is no limit.
     shadows, bsdf_samples
         Parameters of the integrator, at every later vertex too.
+    choice
+        :class:`reference.rendering.light_choice.LightChoice` of one pick among all emitters.
 
     Returns
     -------
@@ -205,18 +211,22 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         ds = mi.DirectionSample3f(scene, si, previous)
         seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
         # No sample of an emitter takes a direction that a mirror, glass or a mask demands.
-        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        emitter_pdf = light_sums.density(scene, previous, ds, seen & ~previous_delta, choice)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
-        direct &= ds.pdf > 0
-        wo = si.to_local(ds.d)
+        sample = sampler.next_2d(direct)
+        direction, emitter_pdf, is_delta, weight = light_sums.any_one(
+            scene, si, sample, shadows, direct, choice
+        )
+        direct &= emitter_pdf > 0
+        wo = si.to_local(direction)
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
-        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        share = emitter_pdf / (emitter_pdf + bsdf_pdf)
+        share = dr.select(is_delta | (bsdf_samples == 0), 1, share)
         light += dr.select(direct, throughput * value * weight * share, 0)
 
         bs, weight = vertex.sample(

@@ -54,12 +54,18 @@ class LightChoice:
         share = UNIFORM_SHARE
         self.chances = share * even + (1 - share) * given / total if known else even
         self.distribution = mi.DiscreteDistribution(mi.Float(self.chances))
+        are_delta = [mi.has_flag(light.flags(), mi.EmitterFlags.Delta) for light in lights]
+        self._delta = mi.UInt32(np.array(are_delta, np.uint32))
         self._by_pointer = _by_pointer(lights, self.chances)
 
     def pick(self, number, active):
         """Return a light's number, and how often it is expected, for a random number."""
         index, chance = self.distribution.sample_pmf(number, active)
         return index, self.picks * chance
+
+    def is_delta(self, number, active):
+        """Tell whether the light of a number is a point or direction."""
+        return dr.gather(mi.UInt32, self._delta, number, active) > 0
 
     def expected(self, emitter, active):
         """Return how often a light is expected that a ray has met, 0 for any other."""

@@ -46,6 +46,30 @@ def sampled(lights, number, si, sample, active):
     return dr.switch(number, [partial(_sampled, light) for light in lights], si, sample, active)
 
 
+def any_one(scene, si, sample, shadows, active, choice=None):
+    """Sample the direction to one light of the scene: direction, density, whether it is a delta.
+
+    The fourth is the weight. Without a ``choice`` Mitsuba picks the light, most often evenly.
+    """
+    if choice is None:
+        ds, weight = scene.sample_emitter_direction(si, sample, shadows, active)
+        return ds.d, ds.pdf, ds.delta, weight
+    number, rest, chance = choice.distribution.sample_reuse_pmf(sample.x, active)
+    sample = mi.Point2f(rest, sample.y)
+    point, direction, found, weight = sampled(choice.lights, number, si, sample, active)
+    if shadows:
+        weight &= ~scene.ray_test(si.spawn_ray_to(point), active & (found > 0))
+    return direction, found * chance, choice.is_delta(number, active), weight / chance
+
+
+def density(scene, reference, ds, active, choice=None):
+    """Return the density of :func:`any_one` for a direction in which a ray met a light."""
+    if choice is None:
+        return scene.pdf_emitter_direction(reference, ds, active)
+    found = ds.emitter.pdf_direction(reference, ds, active)
+    return found * choice.expected(ds.emitter, active) / choice.picks
+
+
 def _sampled(light, si, sample, active):
     ds, weight = light.sample_direction(si, sample, active)
     return ds.p, ds.d, ds.pdf, weight
