@@ -182,14 +182,16 @@ def test_picked_lights_have_the_mean_of_all(rgb):
     check_mean(radiance(made, REPEATS, light_samples=8), radiance(made))
 
 
-@pytest.mark.parametrize("light_samples", [0, 8])
-@pytest.mark.parametrize("bsdf_samples", [0, 1])
+@pytest.mark.parametrize(
+    ("lamps", "bsdf_samples", "light_samples"),
+    [(20, 0, 0), (20, 1, 0), (20, 0, 8), (20, 1, 8), (10, 1, 8)],
+)
 def test_sampled_lights_have_the_mean_of_unrolled_ones(
-    rgb, monkeypatch, light_samples, bsdf_samples
+    rgb, monkeypatch, lamps, bsdf_samples, light_samples
 ):
     """Small spheres and the sky beside points; some of the spheres stand before others."""
     sky = {"type": "constant", "radiance": 0.3}
-    made = mi.load_dict(floor(**lights(point, 20), **lights(lamp, 20), sky=sky))
+    made = mi.load_dict(floor(**lights(point, 20), **lights(lamp, lamps), sky=sky))
     options = {"bsdf_samples": bsdf_samples}
     found = radiance(made, REPEATS, light_samples=light_samples, **options)
     monkeypatch.setattr(light_sums, "UNROLLED", 100)

@@ -19,8 +19,9 @@ Parameter           Type (default)      Meaning
                                         something does. Mirrors and glass take theirs all the same,
                                         since nothing else finds a light in them
 ``light_samples``   integer (0)         lights that are picked at random for each sample, of points
-                                        and directions and of the others, where there are more
-                                        (:mod:`reference.rendering.light_choice`); 0 asks each
+                                        and directions and of the others, where there are more, and
+                                        more than 16 (:mod:`reference.rendering.light_choice`); 0
+                                        asks each
 ``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================
@@ -107,7 +108,8 @@ def _define():
 
         def _choice(self, scene, lights, picks=None):
             """Return what picks lights of a list, None where each is asked."""
-            if not 0 < self.light_samples < len(lights):
+            most = max(self.light_samples, light_sums.UNROLLED)
+            if not self.light_samples or len(lights) <= most:
                 return None
             key = picks, len(lights), _is_delta(lights[0])
             known = self._choices.get(key)
