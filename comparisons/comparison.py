@@ -79,6 +79,13 @@ class Simulation(Record):
     passes: Size
     sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
     rules: tuple[RuleRecord, ...] = ()
+    light_samples: Annotated[
+        Count,
+        Meta(
+            description="Lights that the reference picks for each sample, in proportion to what"
+            " they give; 0 where it asks each."
+        ),
+    ] = 0
 
 
 class GuardRecord(Record):

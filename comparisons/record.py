@@ -139,6 +139,7 @@ def simulation(plan, spp, passes):
         "max_depth": plan.max_depth,
         "shadows": plan.shadows,
         "tabulated_environment": plan.tabulate_environment,
+        "light_samples": plan.light_samples,
         "spp": spp,
         "passes": passes,
         "sampler": plan.sampler,

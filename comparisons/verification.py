@@ -264,4 +264,5 @@ def _word(plan):
     depth = "" if plan.max_depth == 2 else f" {plan.max_depth}"
     extra = "" if plan.shadows else ", no shadow rays"
     extra += ", tabulated environment" if plan.tabulate_environment else ""
+    extra += f", {plan.light_samples} lights a sample" if plan.light_samples else ""
     return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

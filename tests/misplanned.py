@@ -3,7 +3,7 @@
 import mitsuba as mi
 
 from reference.planning.premises import Pruning, Ruling
-from reference.rendering.direct import AlbedoTable
+from reference.rendering.albedo_table import AlbedoTable
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
 TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}

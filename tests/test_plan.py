@@ -15,7 +15,7 @@ from reference.planning.facts import examine
 from reference.planning.plan import wants_spectra
 from reference.planning.premises import Pruning, Ruling
 from reference.planning.shape_tree import Queries, ShapeTree
-from reference.rendering.direct import AlbedoTable
+from reference.rendering.albedo_table import AlbedoTable
 from reference.scene.source import Source
 
 WHITE = {"type": "diffuse", "reflectance": 0.7}

@@ -84,7 +84,8 @@ def scope(plan: Plan, differences: Collection[Effect], kernel_shadows: bool) -> 
         effects=frozenset(differences) | shadows,
         kernel_shadows=kernel_shadows,
         max_depth=plan.scene_depth,
-        random=any(plan.calls_for(effect) or effect in differences for effect in sampled),
+        random=plan.light_samples > 0
+        or any(plan.calls_for(effect) or effect in differences for effect in sampled),
     )
 
 

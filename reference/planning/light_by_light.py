@@ -4,6 +4,7 @@ from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.planning.facts import BSDF, EMITTER, Facts
 from reference.planning.premises import NO_MEDIUM, OPAQUE, Premise, Pruning
+from reference.rendering.light_choice import MOST_ASKED, PICKS
 
 
 def _shallow(facts: Facts) -> str | None:
@@ -21,8 +22,8 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
 
 
 LIGHT_BY_LIGHT = Pruning(
-    name="every light at every sample",
-    absent="noise of picking a light: the sum over all has the mean of one over its chance",
+    name="light by light",
+    absent="noise of picking one light: the sum over all has the mean of one over its chance",
     proof="Mitsuba picks a light at random and divides by the chance of that. The mean is the sum"
     " over all lights, which `direct_all` takes at each sample. The two are equal where each"
     " estimate of a light has the right mean, however a sample of the BSDF is weighted against it.",
@@ -35,6 +36,29 @@ LIGHT_BY_LIGHT = Pruning(
             " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF does"
             " not, so that its mean depends on how both are weighted.",
             _seen_inside_a_lamp,
+        ),
+    ),
+)
+
+
+def _many(facts: Facts) -> str | None:
+    count = len(facts.structure.lights)
+    if count <= MOST_ASKED:
+        return None
+    return f"{count:,} lights: {PICKS} a sample are picked, in proportion to what they give"
+
+
+EVERY_LIGHT = Pruning(
+    name="every light at every sample",
+    absent="noise of picking some of the lights",
+    proof="Where each light is asked at each sample, none is picked. Where some are, what a light"
+    " gives is divided by how often it is expected to be picked, which is never 0: the mean is the"
+    " sum over all lights.",
+    premises=(
+        Premise(
+            f"The scene has at most {MOST_ASKED:,} lights: of more, asking each takes longer than"
+            " the noise of picking some.",
+            _many,
         ),
     ),
 )

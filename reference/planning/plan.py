@@ -12,6 +12,8 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
+thousands of lights, whatever else      ``direct_all``, which picks some of them for each sample in
+                                        proportion to what they give; ``path`` picks them evenly
 a BSDF that may let light through       ``path``, whatever the depth
 participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
                                         or its extinction has a colour
@@ -43,10 +45,11 @@ from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.nearest.operations import plain
 from reference.planning.facts import BSDF, Facts, examine
-from reference.planning.light_by_light import LIGHT_BY_LIGHT
+from reference.planning.light_by_light import EVERY_LIGHT, LIGHT_BY_LIGHT
 from reference.planning.premises import Pruning, Ruling
 from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.direct import RR_DEPTH
+from reference.rendering.light_choice import PICKS
 from reference.scene.graph import Graph
 from reference.scene.sampler import SAMPLER, STOCK_SAMPLER
 
@@ -79,7 +82,7 @@ class Plan:
         ray alone, and their difference has no noise.
     rr_depth
         Of ``path``: where Russian roulette begins to end paths.
-    shadows, bsdf_samples, tabulate_environment
+    shadows, bsdf_samples, tabulate_environment, light_samples
         Parameters of ``direct_all``.
     rulings
         Of :data:`RULES`: whether each applies, and if not, which premise failed.
@@ -99,12 +102,13 @@ class Plan:
     shadows: bool = True
     bsdf_samples: int = 1
     tabulate_environment: bool = False
+    light_samples: int = 0
     rulings: tuple[Ruling, ...] = ()
 
     @property
     def simulated(self) -> tuple:
         """What tells its integrator from that of another plan for the same scene."""
-        own = (self.shadows, self.bsdf_samples, self.tabulate_environment)
+        own = (self.shadows, self.bsdf_samples, self.tabulate_environment, self.light_samples)
         if self.integrator != "direct_all":
             own = (self.rr_depth,)
         return self.integrator, self.max_depth, *own
@@ -165,7 +169,7 @@ class Plan:
         )
 
 
-RULES = (LIGHT_BY_LIGHT, NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
+RULES = (LIGHT_BY_LIGHT, EVERY_LIGHT, NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
 """The rules of pruning."""
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
@@ -217,15 +221,18 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
     )
     if not _holds(stock, LIGHT_BY_LIGHT):
         return stock
+    if not _holds(stock, EVERY_LIGHT):
+        stock = replace(stock, light_samples=PICKS)
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
         exact = [light for light in facts.structure.lights if lights.of(light.kind).exact]
-        if len(exact) > 1 and _diffuse(graph):
+        if stock.light_samples or (len(exact) > 1 and _diffuse(graph)):
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
         return replace(stock, integrator="path")
     tabulated = _holds(stock, TABULATED_ENVIRONMENT)
     has_lens = facts.structure.camera.plugin not in ("perspective", "orthographic")
     is_random = (
-        has_lens
+        stock.light_samples > 0
+        or has_lens
         or mi.is_spectral
         or any(
             not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)

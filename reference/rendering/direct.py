@@ -5,7 +5,8 @@ Indirect light is added where it is asked for.
 Mitsuba's ``direct`` picks one emitter at random for each sample, so that two point lights already
 make noise. This one asks each emitter in turn: point, spot and directional lights, which need no
 random number, are then exact at each camera ray, and only what has an extent is sampled, by emitter
-and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mitsuba's.
+and by BSDF, with the balance heuristic. Of thousands of lights it can pick some, in proportion to
+what they give. BSDFs, emitters and visibility are Mitsuba's.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
@@ -17,16 +18,22 @@ Parameter           Type (default)      Meaning
                                         ray meets what hides a light: without shadows, 0 where
                                         something does. Mirrors and glass take theirs all the same,
                                         since nothing else finds a light in them
+``light_samples``   integer (0)         lights that are picked at random for each sample, of points
+                                        and directions and of the others, where there are more, and
+                                        more than 16 (:mod:`reference.rendering.light_choice`); 0
+                                        asks each
 ``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================
 """
 
+from operator import is_
+
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
-from reference.pairing.nearest.probe import lattice
+from reference.rendering import light_sums
+from reference.rendering.light_choice import LightChoice
 
 _registered = set()
 
@@ -47,38 +54,43 @@ def _define():
             self.shadows = props.get("shadows", True)
             self.bsdf_samples = props.get("bsdf_samples", 1)
             self.max_depth = props.get("max_depth", 2)
+            self.light_samples = props.get("light_samples", 0)
+            self._choices = {}
             self.environment_albedo = None
             """An `AlbedoTable` in place of sampling the environment,
             for a scene of one BSDF that nothing hides from it; set after construction."""
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
+            delta, others = _parted(scene.emitters())
             si = self._first_surface(scene, ray, active)
-            seen = active & (si.is_valid() | (not self.hide_emitters))
-            colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
+            colour = mi.Spectrum(0)
+            if others or len(delta) <= light_sums.UNROLLED:  # no ray meets points or directions
+                seen = active & (si.is_valid() | (not self.hide_emitters))
+                colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
             hit = active & si.is_valid()
-            context = mi.BSDFContext()
             bsdf = si.bsdf(ray)
-            extended = []
-            for emitter in scene.emitters():
-                if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta):
-                    colour += self._from_emitter(
-                        scene, si, bsdf, context, emitter, mi.Point2f(0.5), hit
-                    )
-                elif emitter.is_environment() and self.environment_albedo is not None:
+            given = scene, si, bsdf, sampler, hit, self.shadows, self.bsdf_samples
+            extended = [e for e in others if not self._is_tabulated(e)]
+            if len(delta) > light_sums.UNROLLED:
+                colour += light_sums.of_many(delta, True, *given, self._choice(scene, delta))
+            for emitter in scene.emitters() if len(delta) <= light_sums.UNROLLED else others:
+                if _is_delta(emitter):
+                    colour += light_sums.of_one(emitter, True, *given)
+                elif self._is_tabulated(emitter):
                     albedo = self.environment_albedo.at(si.wi.z)
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
-                else:
-                    extended.append(emitter)
-            for emitter in extended:
-                colour += self._from_emitter(
-                    scene, si, bsdf, context, emitter, sampler.next_2d(hit), hit
-                )
+            choice = self._choice(scene, extended)
+            if len(extended) > light_sums.UNROLLED:
+                colour += light_sums.of_many(extended, False, *given, choice)
+            else:
+                for emitter in extended:
+                    colour += light_sums.of_one(emitter, False, *given)
             if extended and (self.bsdf_samples or _has_delta(scene)):
-                colour += _from_bsdf(scene, si, bsdf, context, sampler, hit, self.bsdf_samples)
+                colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples, choice)
             if self.max_depth != 2:
-                colour += indirect_light(
-                    scene, sampler, si, bsdf, self.max_depth, hit, self.shadows, self.bsdf_samples
-                )
+                parameters = self.max_depth, hit, self.shadows, self.bsdf_samples
+                choice = self._choice(scene, scene.emitters(), 1)
+                colour += indirect_light(scene, sampler, si, bsdf, *parameters, choice)
             environment = scene.environment() is not None and not self.hide_emitters
             return colour, active if environment else hit, []
 
@@ -91,22 +103,35 @@ def _define():
                 pi[skip] = beyond
             return pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
 
-        def _from_emitter(self, scene, si, bsdf, context, emitter, sample, active):
-            """One sample of an emitter, weighted against sampling the BSDF if that can find it."""
-            ds, weight = emitter.sample_direction(si, sample, active)
-            active = active & (ds.pdf > 0)
-            if self.shadows:
-                active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
-            wo = si.to_local(ds.d)
-            if mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) or not self.bsdf_samples:
-                return dr.select(active, bsdf.eval(context, si, wo, active) * weight, 0)
-            value, bsdf_pdf = bsdf.eval_pdf(context, si, wo, active)
-            return dr.select(active, value * weight * ds.pdf / (ds.pdf + bsdf_pdf), 0)
+        def _is_tabulated(self, emitter):
+            return self.environment_albedo is not None and emitter.is_environment()
+
+        def _choice(self, scene, lights, picks=None):
+            """Return what picks lights of a list, None where each is asked."""
+            most = max(self.light_samples, light_sums.UNROLLED)
+            if not self.light_samples or len(lights) <= most:
+                return None
+            key = picks, len(lights), _is_delta(lights[0])
+            known = self._choices.get(key)
+            if known is None or not all(map(is_, known.lights, lights)):
+                known = LightChoice(scene, lights, picks or self.light_samples)
+                self._choices[key] = known
+            return known
 
         def to_string(self):
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
 
     mi.register_integrator("direct_all", DirectAllIntegrator)
+
+
+def _is_delta(emitter):
+    return mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
+
+
+def _parted(emitters):
+    """Return the points and directions, and the other emitters."""
+    delta = [emitter for emitter in emitters if _is_delta(emitter)]
+    return delta, [emitter for emitter in emitters if not _is_delta(emitter)]
 
 
 def _has_delta(scene):
@@ -115,11 +140,12 @@ def _has_delta(scene):
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
-def _from_bsdf(scene, si, bsdf, context, sampler, active, bsdf_samples):
+def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples, choice):
     """One sample of the BSDF, for the emitter that it happens to meet.
 
     Without ``bsdf_samples`` only directions count that no sample of an emitter takes.
     """
+    context = mi.BSDFContext()
     bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
     active = active & (bs.pdf > 0)
     hit = scene.ray_intersect(si.spawn_ray(si.to_world(bs.wo)), active)
@@ -127,51 +153,12 @@ def _from_bsdf(scene, si, bsdf, context, sampler, active, bsdf_samples):
     ds = mi.DirectionSample3f(scene, hit, si)
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
+    if choice is not None:
+        emitter_pdf *= choice.expected(emitter, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     active &= is_delta | (bsdf_samples > 0)
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     return dr.select(active, weight * emitter.eval(hit, active) * share, 0)
-
-
-NODES = 256
-SAMPLES = 8192
-
-
-class AlbedoTable:
-    """The albedo of a uniform, isotropic BSDF over the cosine of the view direction, RGB.
-
-    Where nothing stands between a surface and a constant environment of radiance ``L``, the
-    reflected radiance is ``L a(mu)``: the albedo for the view direction of cosine ``mu``. It is
-    tabulated once, by Mitsuba's own sampling of the BSDF on a rank-1 lattice, and looked up at each
-    camera ray, without Monte Carlo in the image.
-
-    Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most. A BSDF that reflects
-    on its back too does so as on its front.
-    """
-
-    def __init__(self, bsdf):
-        self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
-        mu = np.linspace(1e-3, 1, NODES) ** 2
-        grid_mu = mi.Float(np.repeat(mu, SAMPLES))
-        points = [mi.Float(np.tile(row, NODES)) for row in lattice(SAMPLES)[:3]]
-        si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
-        si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
-        _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))
-        # Thousands of equal terms lose four digits in single precision.
-        means = [
-            mi.Float(dr.block_sum(mi.Float64(channel), SAMPLES) / SAMPLES) for channel in weight
-        ]
-        self.table = dr.ravel(mi.Color3f(*means))
-        dr.eval(self.table)
-
-    def at(self, mu):
-        """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
-        mu = abs(mu) if self.has_back else mu
-        place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
-        place = dr.clip(place, 0, NODES - 1)
-        below = dr.minimum(mi.UInt32(place), NODES - 2)
-        low, high = (dr.gather(mi.Color3f, self.table, below + i) for i in (0, 1))
-        return dr.select(mu > 0, dr.lerp(low, high, place - mi.Float(below)), 0)
 
 
 RR_DEPTH = 3
@@ -183,11 +170,13 @@ SURVIVAL = 0.95
 
 
 @dr.syntax
-def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1):
+def indirect_light(
+    scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1, choice=None
+):
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Paths begin with a sample of the BSDF there. The direct light takes every light in turn; this
-    picks one at random at each later vertex, as Mitsuba's ``path`` does everywhere.
+    picks one at random at each later vertex: as Mitsuba's ``path`` does everywhere, or by a choice.
 
     Parameters
     ----------
@@ -197,6 +186,8 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         As Mitsuba counts: 2 is direct light, for which the result is 0; -1 is no limit.
     shadows, bsdf_samples
         Parameters of the integrator, at every later vertex too.
+    choice
+        :class:`reference.rendering.light_choice.LightChoice` of one pick among all emitters.
 
     Returns
     -------
@@ -222,18 +213,22 @@ def indirect_light(scene, sampler, si, bsdf, max_depth, active, shadows=True, bs
         ds = mi.DirectionSample3f(scene, si, previous)
         seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
         # No sample of an emitter takes a direction that a mirror, glass or a mask demands.
-        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        emitter_pdf = light_sums.density(scene, previous, ds, seen & ~previous_delta, choice)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
-        direct &= ds.pdf > 0
-        wo = si.to_local(ds.d)
+        sample = sampler.next_2d(direct)
+        direction, emitter_pdf, is_delta, weight = light_sums.any_one(
+            scene, si, sample, shadows, direct, choice
+        )
+        direct &= emitter_pdf > 0
+        wo = si.to_local(direction)
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
-        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        share = emitter_pdf / (emitter_pdf + bsdf_pdf)
+        share = dr.select(is_delta | (bsdf_samples == 0), 1, share)
         light += dr.select(direct, throughput * value * weight * share, 0)
 
         bs, weight = vertex.sample(

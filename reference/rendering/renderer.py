@@ -17,7 +17,7 @@ import numpy as np
 
 from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
-from reference.rendering.direct import AlbedoTable
+from reference.rendering.albedo_table import AlbedoTable
 from reference.rendering.gbuffer import image_size
 from reference.scene.preparation import PATHS
 
@@ -246,7 +246,8 @@ def physical_integrator(plan, scene, hide_emitters):
     description["max_depth"] = plan.max_depth
     if plan.integrator in PATHS:
         return mi.load_dict(description | {"rr_depth": plan.rr_depth})
-    own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
+    names = ("shadows", "bsdf_samples", "light_samples")
+    own = {name: getattr(plan, name) for name in names}
     integrator = mi.load_dict(description | own)
     # An effect that is left out may be the environment itself.
     if plan.tabulate_environment and scene.environment() is not None:

@@ -61,6 +61,8 @@ def lines(plan):
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     rays = "" if plan.shadows else ", no shadow rays"
     rays += ", environment from a table" if plan.tabulated_environment else ""
+    picks = plan.light_samples
+    rays += f", {picks} lights a sample in proportion to what they give" if picks else ""
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.integrator}{rays}"

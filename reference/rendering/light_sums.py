@@ -1,0 +1,126 @@
+"""Direct light of a list of lights, at the points that rays meet.
+
+Up to :data:`UNROLLED` lights are unrolled: each is code of its own in the kernel. For more of them
+LLVM would take longer than in proportion, so that they become the targets of one call in a loop.
+Dr.Jit merges targets whose code is the same: the kernel grows with the kinds of lights, not with
+their number.
+
+Each function takes ``scene``, ``si``, ``bsdf``, ``sampler`` and ``active`` as Mitsuba's integrators
+do, and ``shadows`` and ``bsdf_samples`` as :mod:`reference.rendering.direct`. ``is_delta`` tells
+whether the lights are points or directions, which need no random number.
+"""
+
+from functools import partial
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic import numerics
+
+UNROLLED = 16
+"""Lights of a list that are code of their own."""
+
+
+def of_one(light, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
+    """Return what a light gives."""
+    drawn = _sampled(light, si, _numbers(sampler, is_delta, active), active)
+    return _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples)
+
+
+def of_many(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples, choice=None):
+    """Return what a list of lights gives.
+
+    ``choice`` picks some of them (:class:`reference.rendering.light_choice.LightChoice`); without
+    it each is asked.
+    """
+    given = is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples
+    return _each(lights, *given) if choice is None else _picked(choice, *given)
+
+
+def sampled(lights, number, si, sample, active):
+    """Sample the direction to lights by their numbers: point, direction, density and weight.
+
+    Through the emitters' pointers Dr.Jit would trace every emitter that is alive, those of the
+    heuristic half included.
+    """
+    return dr.switch(number, [partial(_sampled, light) for light in lights], si, sample, active)
+
+
+def any_one(scene, si, sample, shadows, active, choice=None):
+    """Sample the direction to one light of the scene: direction, density, whether it is a delta.
+
+    The fourth is the weight. Without a ``choice`` Mitsuba picks the light, most often evenly.
+    """
+    if choice is None:
+        ds, weight = scene.sample_emitter_direction(si, sample, shadows, active)
+        return ds.d, ds.pdf, ds.delta, weight
+    number, rest, chance = choice.distribution.sample_reuse_pmf(sample.x, active)
+    sample = mi.Point2f(rest, sample.y)
+    point, direction, found, weight = sampled(choice.lights, number, si, sample, active)
+    if shadows:
+        weight &= ~scene.ray_test(si.spawn_ray_to(point), active & (found > 0))
+    return direction, found * chance, choice.is_delta(number, active), weight / chance
+
+
+def density(scene, reference, ds, active, choice=None):
+    """Return the density of :func:`any_one` for a direction in which a ray met a light."""
+    if choice is None:
+        return scene.pdf_emitter_direction(reference, ds, active)
+    found = ds.emitter.pdf_direction(reference, ds, active)
+    return found * choice.expected(ds.emitter, active) / choice.picks
+
+
+def _sampled(light, si, sample, active):
+    ds, weight = light.sample_direction(si, sample, active)
+    return ds.p, ds.d, ds.pdf, weight
+
+
+def _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples, expected=1):
+    """Return what a sample of a light gives.
+
+    Where a sample of the BSDF can find the light too, it is weighted against that by the balance
+    heuristic. ``expected`` is how many samples of the light are taken on average.
+    """
+    point, direction, density, weight = drawn
+    active = active & (density > 0)
+    if shadows:
+        active &= ~scene.ray_test(si.spawn_ray_to(point), active)
+    wo, context = si.to_local(direction), mi.BSDFContext()
+    if is_delta or not bsdf_samples:
+        return dr.select(active, bsdf.eval(context, si, wo, active) * weight / expected, 0)
+    value, bsdf_density = bsdf.eval_pdf(context, si, wo, active)
+    return dr.select(active, value * weight * density / (expected * density + bsdf_density), 0)
+
+
+@dr.syntax
+def _each(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
+    """Ask one light after the other."""
+    number = mi.UInt32(0)
+    # A sum of thousands would lose what is smaller than its last digit (Neumaier).
+    total, lost = mi.Spectrum(0), mi.Spectrum(0)
+    while number < len(lights):
+        drawn = sampled(lights, number, si, _numbers(sampler, is_delta, active), active)
+        given = _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples)
+        total, lost = numerics.add(total, lost, given)
+        number += 1
+    return numerics.summed(total, lost)
+
+
+@dr.syntax
+def _picked(choice, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
+    """Ask lights that are picked at random."""
+    # One random number for all: stratified, and each pick by itself is as it should be.
+    start = sampler.next_1d(active)
+    number, total = mi.UInt32(0), mi.Spectrum(0)
+    while number < choice.picks:
+        index, expected = choice.pick((mi.Float(number) + start) / choice.picks, active)
+        drawn = sampled(choice.lights, index, si, _numbers(sampler, is_delta, active), active)
+        total += _reflected(
+            scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples, expected
+        )
+        number += 1
+    return total
+
+
+def _numbers(sampler, is_delta, active):
+    return mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
