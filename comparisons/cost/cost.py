@@ -91,7 +91,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         effort = replace(effort, largest=options.spp)
     ready = guarded(source, replace(options, spp=None, allow_empty=False))
     width, height = image_size(ready.scene)
-    counted = ready.surface.hit
+    counted = ready.counted
     reference, groups = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)
 

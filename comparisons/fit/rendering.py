@@ -54,4 +54,4 @@ def render(ready, options, progress):
         recorder.render(one.seed)
     before, reference, difference = (total.estimate() for total in sums)
     with variant(VARIANT):
-        return Rendered(before.mean, reference, difference, recorder.surface(), ready.surface.hit)
+        return Rendered(before.mean, reference, difference, recorder.surface(), ready.counted)
