@@ -18,9 +18,9 @@ from comparisons.comparison import NoiseTarget
 from comparisons.departure.blocks import bands
 from comparisons.departure.metrics import LEADING
 from comparisons.store import Lazy
-from reference.rendering.moments import DifferenceEstimate, DifferenceSums
+from reference.rendering.moments import DifferenceEstimate, SumsOfHalves
 from reference.rendering.passes import passes
-from reference.rendering.renderer import Deviations, Mean, add_difference
+from reference.rendering.sums import Deviations, Mean, add_difference
 
 WAVEFRONT = 2**24
 """Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
@@ -107,7 +107,8 @@ def render(ready, options, counted, progress, kept=None):
     Rendered
     """
     halves = (ready.heuristic, ready.reference)
-    sums = [Mean(), Deviations(), DifferenceSums(counted)]
+    sums = [Mean(), Deviations(compact=True)]
+    sums.append(SumsOfHalves(counted, tuple(sums), compact=True))
     state = kept.load() if kept else None
     if not _fits(state or {}, sums, halves, counted.shape, ready.passes):
         state = None

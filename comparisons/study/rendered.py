@@ -18,7 +18,8 @@ from reference.planning.plan import plan, sampler
 from reference.rendering.gbuffer import gbuffer, image_size, require_surface
 from reference.rendering.guard import Verdict, examine_plan
 from reference.rendering.passes import passes
-from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
+from reference.rendering.renderer import Renderer, physical_integrator
+from reference.rendering.sums import Accumulator
 from reference.scene.sampler import with_sampler
 from reference.scene.source import Source
 

@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.rendering.renderer import Accumulator, Estimate, flattened, values
+from reference.rendering.sums import Accumulator, Estimate, flattened, values
 
 GROUPS = 8
 """Of passes, at most: seven degrees of freedom for an interval."""
@@ -79,12 +79,14 @@ class DifferenceSums(Accumulator):
     ----------
     counted
         (H, W): the pixels from which blocks are sampled.
+    compact
+        As for :class:`reference.rendering.sums.Mean`.
     """
 
     SUMS = (*Accumulator.SUMS, "cubes")
 
-    def __init__(self, counted):
-        super().__init__()
+    def __init__(self, counted, compact=False):
+        super().__init__(compact)
         self._sample = sample(counted)
         flat = 3 * self._sample[0][:, None] + np.arange(3)
         self._index = mi.UInt32(flat.ravel().astype(np.uint32))
@@ -135,6 +137,41 @@ class DifferenceSums(Accumulator):
         shape = (len(sizes), len(places), 3)
         sampled = int(blocks.max()) + 1 if len(blocks) else 0
         return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+
+
+class SumsOfHalves(DifferenceSums):
+    """Running sums of a difference that has no mean of its own: it is that of the halves' means.
+
+    Each pass is added to it before it is added to those.
+
+    Parameters
+    ----------
+    counted, compact
+        As for :class:`DifferenceSums`.
+    halves
+        The :class:`Mean` of each half.
+    """
+
+    SUMS = tuple(name for name in DifferenceSums.SUMS if name != "mean")
+
+    def __init__(self, counted, halves, compact=False):
+        super().__init__(counted, compact)
+        self._halves = halves
+
+    def mean(self, dtype=float, last=False):
+        """Return the mean of the passes so far; with ``last`` too, the halves keep theirs."""
+        test, reference = self._halves
+        found = test.mean()
+        found -= reference.mean()
+        return found.astype(dtype, copy=False)
+
+    def _sums(self, number, size):
+        if not self._halves[0].count:
+            mean = dr.zeros(mi.Float64, size)
+        else:
+            test, reference = (half.part("mean", number) for half in self._halves)
+            mean = test - reference
+        return super()._sums(number, size) | {"mean": mean}
 
 
 def block_numbers(counted):
