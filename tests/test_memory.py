@@ -39,7 +39,7 @@ def test_what_does_not_fit_is_refused_with_what_does(monkeypatch):
     with pytest.raises(InputError) as refused:
         memory.require("large", 4096, 2048)
     text = str(refused.value)
-    assert text.startswith("large: an image of 4096x2048 pixels needs 2.7 GB of memory, and 2 GB")
+    assert text.startswith("large: an image of 4096x2048 pixels needs 2.3 GB of memory, and 2 GB")
     wide, high = map(int, re.search(r"At most (\d+)x(\d+) pixels", text).groups())
     memory.require("fits", wide, high)
     assert wide == pytest.approx(2 * high, abs=2)
@@ -55,7 +55,7 @@ def test_nothing_is_rendered_of_what_is_refused(rgb, monkeypatch, tmp_path):
 
     monkeypatch.setattr(memory, "available", lambda: memory.BASE + 10**6)
     monkeypatch.setattr(Renderer, "render", lambda *_: pytest.fail("it was rendered"))
-    with pytest.raises(InputError, match="At most 57x57 pixels"):
+    with pytest.raises(InputError, match="At most 63x63 pixels"):
         compare.compare(SCENES["cornell-box"].source(), Options(resolution=(64, 64)))
 
 

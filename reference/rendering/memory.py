@@ -11,7 +11,7 @@ from pathlib import Path
 
 from heuristic.errors import InputError
 
-BYTES_A_PIXEL = 300
+BYTES_A_PIXEL = 250
 """At the peak of a comparison, while it renders: `tests/benchmarks/scaling.py` measures it."""
 
 BASE = 200 * 2**20
