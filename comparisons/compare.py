@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 from msgspec import structs
 
 from comparisons import record, render
@@ -24,7 +26,8 @@ from comparisons.records import Pixels
 from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
-from reference.rendering.gbuffer import GBuffer, gbuffer, image_size
+from reference.rendering import memory
+from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
 from reference.rendering.guard import Guard, Verdict, examine_plan
 from reference.rendering.renderer import LARGEST_PASS, Renderer, physical_integrator, variant
 from reference.scene import messages
@@ -46,10 +49,17 @@ class Prepared:
     planning_seconds: float
     guard: Guard | None = None
 
-    @cached_property
+    @property
     def surface(self) -> GBuffer:
-        """What each pixel sees; the pixels that count are those that see a surface."""
-        return gbuffer(self.scene, *image_size(self.scene))
+        """What each pixel sees, traced each time: it is large beside the sums of the passes."""
+        found = gbuffer(self.scene, *image_size(self.scene))
+        dr.flush_malloc_cache()
+        return found
+
+    @cached_property
+    def counted(self) -> np.ndarray:
+        """The pixels (H, W) that count, which are those that see a surface."""
+        return self.surface.hit
 
 
 def prepare(source, options=None):
@@ -63,6 +73,7 @@ def prepare(source, options=None):
             f"{source.name}: an image of {width}x{height} pixels is too large:"
             f" {LARGEST_PASS} pixels are allowed. Give a smaller one with --resolution."
         )
+    memory.require(source.name, width, height)
     begin = perf_counter()
     chosen = plan(pair, physical, options.interpolation, options.everything)
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
@@ -94,7 +105,7 @@ def guarded(source, options=None):
     options = options or Options()
     ready = _probed(source, options)
     if not options.allow_empty:
-        ready.surface.require_surface(source.name)
+        require_surface(ready.counted, source.name)
     return ready
 
 
@@ -154,17 +165,16 @@ def _compare(source, options, progress, command, kept):
     stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
     stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
     width, height = image_size(ready.scene)
-    surface = ready.surface
-    estimates = render.render(ready, options, surface.hit, progress, kept)
+    estimates = render.render(ready, options, ready.counted, progress, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
-    numbers, images = _measure(estimates, surface, options, ready.plan.exact)
+    numbers, images = _measure(estimates, ready.surface, options, ready.plan.exact)
     stages.done("metrics")
-    faults = limits.find(
-        limits.of_scene(ready.scene, width, height),
-        estimates.reference.mean,
-        estimates.reference.standard_error,
+    faults = limits.count(
+        ready.scene,
+        estimates.reference,
+        estimates.standard_error,
         images.counted,
     )
     stages.done("limits of the reference")
@@ -179,7 +189,7 @@ def _compare(source, options, progress, command, kept):
         plan=record.plan_record(ready, estimates.passes),
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
-        limits=faults.counts(),
+        limits=faults,
         regions=regions.find(images.maps[LEADING.name], images.counted),
         histograms={name: histogram(images.maps[name][images.counted]) for name in drawn()},
         pairing=record.pairing(ready.pair),
@@ -218,7 +228,7 @@ def _measure(estimates, surface, options, exact):
 
     The doubt in question is that of the difference: what both halves share cancels in it.
     """
-    test, reference = estimates.heuristic, estimates.reference.mean
+    test, reference = estimates.heuristic, estimates.reference
     noise = estimates.difference.noise
     counted = surface.hit
     metrics, maps = {}, {}
@@ -241,7 +251,7 @@ def _measure(estimates, surface, options, exact):
     images = Images(
         heuristic=test,
         reference=reference,
-        reference_stderr=estimates.reference.standard_error,
+        reference_stderr=estimates.standard_error,
         position=surface.position,
         normal=surface.normal,
         maps=maps,

@@ -10,15 +10,17 @@ same order, interrupted or not: the result is the same bit for bit.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
-import drjit as dr
 import numpy as np
 
 from comparisons.comparison import NoiseTarget
+from comparisons.departure.blocks import bands
 from comparisons.departure.metrics import LEADING
-from reference.rendering.moments import DifferenceEstimate, DifferenceSums
+from comparisons.store import Lazy
+from reference.rendering.moments import DifferenceEstimate, SumsOfHalves
 from reference.rendering.passes import passes
-from reference.rendering.renderer import Accumulator, Estimate, Mean, add_difference
+from reference.rendering.sums import Deviations, Mean, add_difference
 
 WAVEFRONT = 2**24
 """Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
@@ -69,12 +71,14 @@ def schedule(plan, pixels, spp=None, noise=None):
 class Rendered:
     """The passes of both halves and of their difference, and where they stopped (or None).
 
-    ``heuristic`` is a mean alone, (H, W, 3), since the doubt in question is the difference's.
+    Of the halves there are means (H, W, 3) and the reference's standard error alone, since the
+    doubt in question is the difference's.
     ``passes`` counts all of them, ``new`` those that were rendered now and not kept before.
     """
 
     heuristic: np.ndarray
-    reference: Estimate
+    reference: np.ndarray
+    standard_error: np.ndarray
     difference: DifferenceEstimate
     passes: int
     new: int
@@ -103,7 +107,8 @@ def render(ready, options, counted, progress, kept=None):
     Rendered
     """
     halves = (ready.heuristic, ready.reference)
-    sums = [Mean(), Accumulator(), DifferenceSums(counted)]
+    sums = [Mean(), Deviations(compact=True)]
+    sums.append(SumsOfHalves(counted, tuple(sums), compact=True))
     state = kept.load() if kept else None
     if not _fits(state or {}, sums, halves, counted.shape, ready.passes):
         state = None
@@ -113,6 +118,7 @@ def render(ready, options, counted, progress, kept=None):
     for one in loop:
         add_difference(sums, one.images)
         done = one.number + 1
+        del one
         if kept:
             kept.offer(done, lambda: _state(sums, halves))
         if options.noise is not None and is_checked(done, ready.passes):
@@ -131,11 +137,11 @@ def render(ready, options, counted, progress, kept=None):
             stopped_by=by,
             limit_spp=ready.passes * ready.reference.spp,
         )
-    # The sums of a large image go one by one as their estimates come.
-    difference, reference = (sums.pop().estimate() for _ in range(2))
-    heuristic = sums.pop().mean()
-    dr.flush_malloc_cache()
-    return Rendered(heuristic, reference, difference, done, done - before, stop)
+    # Images are single precision from here on, as the files are; each sum goes as it becomes one.
+    difference = sums[2].estimate(np.float32, last=True)
+    error = sums[1].standard_error(np.float32, last=True)
+    heuristic, reference = (total.mean(np.float32, last=True) for total in sums[:2])
+    return Rendered(heuristic, reference, error, difference, done, done - before, stop)
 
 
 def is_checked(done, passes):
@@ -154,22 +160,26 @@ def noise_percentile(sums, counted, viewing):
     The noise image is that of the difference of the halves, what both share cancelled.
     """
     metric = LEADING
-    reference, noise = sums[1].mean()[counted], sums[2].noise()[counted]
-    if not counted.any() or not noise.any():
+    reference, noise = sums[1].mean(np.float32), sums[2].noise(np.float32)
+    if not noise[counted].any():
         return 0.0
-    coordinates = [metric.coordinates(image, viewing) for image in (reference, reference + noise)]
-    return float(np.percentile(metric.difference(*coordinates), PERCENTILE))
+    distances = []
+    for rows in bands(len(counted)):
+        truth = reference[rows][counted[rows]].astype(np.float64)
+        images = truth, truth + noise[rows][counted[rows]]
+        distances.append(metric.difference(*(metric.coordinates(each, viewing) for each in images)))
+    return float(np.percentile(np.concatenate(distances), PERCENTILE))
 
 
 def _state(sums, halves):
-    """Return all that later passes build upon, as arrays."""
+    """Return all that later passes build upon, as arrays that are made one at a time."""
     state = {}
     for number, total in enumerate(sums):
-        state |= {f"sum{number}_{name}": array for name, array in total.state().items()}
+        state |= {f"sum{number}_{name}": made for name, made in total.state().items()}
     for number, half in enumerate(halves):
-        state[f"times{number}"] = np.array(half.times)
-        state[f"compilation{number}"] = np.array(half.compilation)
-    return state
+        state[f"times{number}"] = partial(np.array, half.times)
+        state[f"compilation{number}"] = partial(np.array, half.compilation)
+    return Lazy(state)
 
 
 def _fits(state, sums, halves, size, passes):
@@ -198,7 +208,11 @@ def _restore(state, sums, halves):
     for number, total in enumerate(sums):
         prefix = f"sum{number}_"
         total.restore(
-            {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
+            {
+                name.removeprefix(prefix): state.pop(name)
+                for name in list(state)
+                if name.startswith(prefix)
+            }
         )
     for number, half in enumerate(halves):
         half.times = state[f"times{number}"].tolist()

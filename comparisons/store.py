@@ -8,7 +8,7 @@ checksum (that of ZIP for arrays) tells what was damaged, which is computed agai
 import json
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from hashlib import sha256
 from math import prod
 from pathlib import Path
@@ -36,6 +36,25 @@ def content(path: str | Path, largest: int = LARGEST) -> bytes:
     require_regular(path, largest)
     with Path(path).open("rb") as file:
         return file.read(largest)
+
+
+class Lazy(Mapping[str, Any]):
+    """A mapping whose values are made by functions without arguments, each time they are asked for.
+
+    So the arrays of a large content need not be in memory together.
+    """
+
+    def __init__(self, makers: Mapping[str, Callable[[], Any]]) -> None:
+        self._makers = makers
+
+    def __getitem__(self, name: str) -> Any:
+        return self._makers[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
 
 
 class Entry:
@@ -78,7 +97,7 @@ class Entry:
             with atomic.replacing(self.path) as partial:
                 if self._is_arrays():
                     with partial.open("wb") as file:
-                        np.savez(file, **content, **{KEY: self.key})
+                        _write_arrays(file, content, self.key)
                 else:
                     body = json.dumps(content, ensure_ascii=False).encode()
                     partial.write_bytes(self._head(body) + body + b"}")
@@ -121,6 +140,15 @@ class Entry:
                 with archive.open(member) as file:
                     found[member.filename.removesuffix(".npy")] = _array(file)
         return found if str(found.pop(KEY)) == self.key else None
+
+
+def _write_arrays(file: BinaryIO, content: Mapping[str, Any], key: str) -> None:
+    """Write arrays as ``np.savez`` does, but one at a time."""
+    with ZipFile(file, "w", ZIP_STORED) as archive:
+        for name in (*content, KEY):
+            value = key if name == KEY else content[name]
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(value), allow_pickle=False)
 
 
 def _array(file: BinaryIO) -> np.ndarray:

@@ -20,7 +20,8 @@ from comparisons.records import VERSION, Record
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import Stream, pass_seed, passes
-from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
+from reference.rendering.renderer import Renderer, physical_integrator
+from reference.rendering.sums import Accumulator
 from reference.scene.sampler import with_sampler
 
 LEVEL = 0.01

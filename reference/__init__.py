@@ -10,7 +10,8 @@ if mi.variant() is None:
 from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair
 from reference.planning.plan import Plan, plan
-from reference.rendering.renderer import Estimate, PassTimes
+from reference.rendering.renderer import PassTimes
+from reference.rendering.sums import Estimate
 from reference.scene.source import Source
 
 __all__ = ["Convention", "Estimate", "Pair", "PassTimes", "Plan", "Source", "pair", "plan"]

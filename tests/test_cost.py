@@ -23,7 +23,7 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.obstacles import OCCLUSION
-from reference.rendering.renderer import Accumulator
+from reference.rendering.sums import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
 from reports import cli

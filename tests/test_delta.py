@@ -12,7 +12,8 @@ import pytest
 from scipy import stats
 
 from reference.rendering.passes import Stream, pass_seed
-from reference.rendering.renderer import Accumulator, Renderer
+from reference.rendering.renderer import Renderer
+from reference.rendering.sums import Accumulator
 from tests.test_physics import look_at
 
 SIDE, SPP, PASSES = 24, 256, 8

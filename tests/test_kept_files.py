@@ -17,7 +17,7 @@ from comparisons.store import Entry
 from comparisons.study import dataset, design, point, running
 from heuristic.errors import InputError
 from reference.rendering.moments import DifferenceSums
-from reference.rendering.renderer import Accumulator, Mean
+from reference.rendering.sums import Accumulator, Mean
 from reports.run import finished
 from reports.run.kept import KeptPasses
 from tests.small_scene import SCENE

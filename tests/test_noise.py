@@ -17,7 +17,7 @@ from comparisons.departure.metrics import METRICS
 from comparisons.departure.statistics import noise_floor
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
-from reference.rendering.renderer import Accumulator
+from reference.rendering.sums import Accumulator
 
 SIZE, PASSES, SPP, FEW = 12, 16, 64, 4
 

@@ -7,7 +7,7 @@ from comparisons.cost.timing import Judge
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.effects.noiseless import Noiseless
-from reference.rendering.renderer import Estimate
+from reference.rendering.sums import Estimate
 
 SIZE, REPLICATES, NOISE = 32, 8, 0.05
 """Noise of one replicate, linear, on a grey of 0.3: ΔE2000 of some 4."""

@@ -11,7 +11,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import NonFiniteError
 from reference.pairing import halves
-from reference.rendering import passes, renderer
+from reference.rendering import passes, renderer, sums
 from tests import checks
 from tests.test_physics import look_at
 
@@ -60,7 +60,7 @@ def lamp():
 
 def estimate(made, integrator, spp, passes, first_seed=0):
     half = renderer.Renderer(made, integrator, spp, "a test")
-    total = renderer.Accumulator()
+    total = sums.Accumulator()
     for seed in range(passes):
         total.add(half.render(first_seed + seed))
     return total.estimate()
@@ -73,7 +73,7 @@ def estimate(made, integrator, spp, passes, first_seed=0):
 def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
     rng = np.random.default_rng(passes)
     images = rng.exponential(size=(passes, 5, 7, 3)).astype(np.float32)
-    total = renderer.Accumulator()
+    total = sums.Accumulator()
     for image in images:
         total.add(mi.TensorXf(image))
     found, images = total.estimate(), images.astype(float)
@@ -89,7 +89,7 @@ def test_running_sums_keep_small_noise_on_a_large_level(rgb):
     """A sum of squares less the square of the sum would lose it."""
     rng = np.random.default_rng(1)
     images = 1e4 + rng.normal(size=(50, 4, 4, 3)) * 1e-3
-    total = renderer.Accumulator()
+    total = sums.Accumulator()
     for image in images:
         total.add(mi.TensorXd(image))
     error = images.std(axis=0, ddof=1) / np.sqrt(50)
@@ -99,7 +99,7 @@ def test_running_sums_keep_small_noise_on_a_large_level(rgb):
 def test_the_noise_image_has_the_spread_of_the_mean(rgb):
     """Its root mean square is the standard error's, over many pixels."""
     rng = np.random.default_rng(2)
-    total = renderer.Accumulator()
+    total = sums.Accumulator()
     for _ in range(8):
         total.add(mi.TensorXd(5 + rng.normal(size=(100, 100, 3))))
     found = total.estimate()

@@ -137,7 +137,7 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
     """
     loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)
-    measured = measurement(images, ready.surface.hit, viewing)
+    measured = measurement(images, ready.counted, viewing)
     return measured, Pictures(*images.mean(axis=0))
 
 

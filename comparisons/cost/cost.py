@@ -21,7 +21,8 @@ from comparisons.options import Options
 from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import image_size
 from reference.rendering.passes import Stream, passes
-from reference.rendering.renderer import Accumulator, Mean, Renderer
+from reference.rendering.renderer import Renderer
+from reference.rendering.sums import Accumulator, Mean
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         effort = replace(effort, largest=options.spp)
     ready = guarded(source, replace(options, spp=None, allow_empty=False))
     width, height = image_size(ready.scene)
-    counted = ready.surface.hit
+    counted = ready.counted
     reference, groups = _converged(ready, effort, options.seed, progress)
     judge = Judge(reference, counted, options.viewing)
 
@@ -170,7 +171,7 @@ def _measured(methods, effort, judge, seed, progress):
 def _converged(ready, effort, seed, progress):
     """Render the reference that errors are told against, with seeds that no rung has.
 
-    Returns its :class:`~reference.rendering.renderer.Estimate`, and the means (R, H, W, 3) of its
+    Returns its :class:`~reference.rendering.sums.Estimate`, and the means (R, H, W, 3) of its
     passes in as many groups as there are replicates.
     """
     renderer = Renderer(

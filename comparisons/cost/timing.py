@@ -34,7 +34,7 @@ class Judge:
 
     Parameters
     ----------
-    reference : reference.rendering.renderer.Estimate
+    reference : reference.rendering.sums.Estimate
         The reference.
     counted
         (H, W): the pixels that count.

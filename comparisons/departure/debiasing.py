@@ -99,7 +99,7 @@ def debiased(
     count = len(grouped.sizes)
     if count < FEWEST:
         return None
-    shown = test.reshape(-1, 3)[grouped.places]
+    shown = test.reshape(-1, 3)[grouped.places].astype(np.float64)
     coordinates = metric.coordinates(shown, viewing)
 
     def distances(difference: Array) -> Array:

@@ -25,11 +25,13 @@ counts from :data:`WEDGE_LOST` on.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from comparisons.departure.blocks import bands
 from comparisons.records import Count, Record
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic, prepare
@@ -117,11 +119,26 @@ def find(surfaces, mean, standard_error, counted=None):
         (H, W), the pixels that count; those that hit a surface where it is not given.
     """
     counted = surfaces.hit if counted is None else np.asarray(counted, bool)
+    return _masks(surfaces, fireflies(mean, standard_error), counted)
+
+
+def count(scene, mean, standard_error, counted):
+    """Return the :class:`LimitCounts` of a scene's reference, as `find` does, by bands of rows."""
+    flies = fireflies(mean, standard_error)
+    total = dict.fromkeys(LimitCounts.__struct_fields__, 0)
+    for rows in bands(len(counted)):
+        surfaces = of_scene(scene, *counted.shape[::-1], rows=rows)
+        found = _masks(surfaces, flies[rows], counted[rows]).counts()
+        total = {name: total[name] + getattr(found, name) for name in total}
+    return LimitCounts(**total)
+
+
+def _masks(surfaces, flies, counted):
     return Limits(
         clamped=counted & (surfaces.alpha <= SMALLEST_ALPHA),
         terminator=counted & terminator(surfaces),
         energy_loss=counted & (surfaces.albedo < 1 - LOST),
-        fireflies=counted & fireflies(mean, standard_error),
+        fireflies=counted & flies,
     )
 
 
@@ -156,17 +173,34 @@ def fireflies(mean, standard_error):
     :data:`FIREFLY_CONTRAST` times the median of the pixels around, where the image is not noisy
     throughout.
     """
-    from scipy.ndimage import median_filter
+    mean, standard_error = np.asarray(mean), np.asarray(standard_error)
+    found = np.zeros(mean.shape[:2], bool)
+    for rows in bands(len(found)):
+        total = np.abs(mean[rows]).sum(axis=-1, dtype=float)
+        error, lower = _lower_around(standard_error, rows)
+        # The median is under a value if more than half of what it is taken of are.
+        found[rows] = (error > FIREFLY_SHARE * total) & (lower > NEIGHBOURHOOD**2 // 2)
+    return found
 
-    total = np.abs(np.asarray(mean, float)).sum(axis=-1)
-    error = np.asarray(standard_error, float).sum(axis=-1)
-    around = median_filter(error, size=NEIGHBOURHOOD, mode="nearest")
-    return (error > FIREFLY_SHARE * total) & (error > FIREFLY_CONTRAST * around)
+
+def _lower_around(standard_error, rows):
+    """Return the errors (h, W) of some rows, and how many around are far lower; edges repeat."""
+    reach = NEIGHBOURHOOD // 2
+    height, width = standard_error.shape[:2]
+    near = np.clip(np.arange(rows.start - reach, rows.stop + reach), 0, height - 1)
+    error = np.pad(standard_error[near].sum(axis=-1, dtype=float), ((0, 0), (reach, reach)), "edge")
+    own = error[reach : reach + rows.stop - rows.start, reach : reach + width]
+    limit, lower = own / FIREFLY_CONTRAST, np.zeros(own.shape, np.uint8)
+    for y, x in np.ndindex(NEIGHBOURHOOD, NEIGHBOURHOOD):
+        lower += error[y : y + len(own), x : x + width] < limit
+    return own, lower
 
 
-def of_scene(scene, width, height, sensor=0):
-    """Collect the :class:`Surfaces` that the centres of a scene's pixels see."""
-    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+def of_scene(scene, width, height, sensor=0, rows=slice(None)):
+    """Collect the :class:`Surfaces` that the centres of a scene's pixels see, in some rows."""
+    heights = (np.arange(height)[rows] + 0.5) / height
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, heights)
+    height = len(heights)
     place = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
     ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
@@ -200,6 +234,7 @@ def _first(value):
     return float(np.ravel(value)[0])
 
 
+@lru_cache
 def _furnace(plastic):
     albedo = of_roughplastic(plastic)
     return float((albedo.diffuse + albedo.specular).mean())

@@ -85,11 +85,13 @@ def find(
 
     Raises `NonFiniteError`.
     """
-    test, counted = np.asarray(test, np.float64), np.asarray(counted, bool)
+    test, counted = np.asarray(test), np.asarray(counted, bool)
     require_finite(difference.mean, "mean difference")
     require_finite(difference.standard_error, "standard error of the difference")
     marks = np.zeros(counted.shape, np.float32)
-    beyond = _beyond_rounding(difference.mean, test) & counted
+    beyond = counted.copy()
+    for rows in bands(len(counted)):
+        beyond[rows] &= _beyond_rounding(difference.mean[rows], test[rows])
     if exact:
         marks[beyond] = MARKED
         return marks
@@ -204,11 +206,16 @@ def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slic
     sign; and of the variances of the pixels that have them.
     """
     here = counted[rows, :, None]
-    variance, third = difference.standard_error[rows] ** 2 * here, difference.third[rows] * here
+    variance, third = _variance(difference, rows) * here, difference.third[rows] * here
     skewed = [np.maximum(-third, 0.0), np.maximum(third, 0.0)]
     moved = [variance * (third < 0.0), variance * (third > 0.0)]
     plain = [here * np.ones(3), difference.mean[rows] * here, variance, variance**2]
     return [block_sums(part) for part in (*plain, *skewed, *moved)]
+
+
+def _variance(difference: DifferenceEstimate, rows: slice) -> Array:
+    # In doubles: squares leave the range of single precision.
+    return difference.standard_error[rows].astype(np.float64) ** 2
 
 
 @dataclass(frozen=True)
@@ -226,7 +233,7 @@ class _Pixels:
     ) -> _Pixels:
         """Those of some rows that are in a mask (H, W) of the whole image."""
         mask = mask[rows]
-        mean, own = difference.mean[rows][mask], difference.standard_error[rows][mask] ** 2
+        mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
         prior, pooled, *sizes = (
             spread_out(values[blocks], mask.shape)[mask]
@@ -273,7 +280,7 @@ def _inflation(difference: DifferenceEstimate) -> float:
     A wide reconstruction filter makes neighbours share their samples.
     """
     grouped = difference.grouped
-    own = difference.standard_error.reshape(-1, 3)[grouped.places] ** 2
+    own = difference.standard_error.reshape(-1, 3)[grouped.places].astype(np.float64) ** 2
     independent = grouped.by_block(own)
     sums = np.stack([grouped.by_block(one) for one in grouped.means])
     weights = grouped.sizes[:, None, None]

@@ -120,7 +120,8 @@ class Metric:
         """
 
         def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
-            values = self.function(factor * test, reference, viewing)
+            shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
+            values = self.function(factor * shown, truth, viewing)
             return values[where if within is None else within]
 
         return distances
@@ -129,7 +130,9 @@ class Metric:
         """The mean of distances as the metric takes it; 0 where there are none."""
         if not values.size:
             return 0.0
-        return float(np.sqrt(np.mean(values**2)) if self.linear else values.mean())
+        if self.linear:
+            return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
+        return float(values.mean(dtype=np.float64))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,10 +154,9 @@ class Pixelwise(Metric):
         fixed = self.coordinates(reference[where], viewing)
 
         def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
-            if within is None:
-                return self.difference(fixed, self.coordinates(factor * test[where], viewing))
-            shown = self.coordinates(factor * test[within], viewing)
-            return self.difference(fixed[within[where]], shown)
+            pixels = np.asarray(test[where if within is None else within], np.float64)
+            shown = self.coordinates(factor * pixels, viewing)
+            return self.difference(fixed if within is None else fixed[within[where]], shown)
 
         return distances
 
@@ -172,11 +174,14 @@ def drawn() -> dict[str, Metric]:
 
 
 def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
-    """Both images as float64, checked: same shape (..., 3) and finite.
+    """Both images as float64, or as float32 where they are, checked: same shape (..., 3), finite.
 
     Raises `InputError` for the shapes, `NonFiniteError` for a NaN or an infinity.
     """
-    test, reference = np.asarray(test, np.float64), np.asarray(reference, np.float64)
+    test, reference = (
+        image if image.dtype == np.float32 else image.astype(np.float64, copy=False)
+        for image in (np.asarray(test), np.asarray(reference))
+    )
     if test.shape != reference.shape or test.shape[-1:] != (3,):
         raise InputError(
             f"images of shapes {test.shape} and {reference.shape} cannot be compared: "

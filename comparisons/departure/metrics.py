@@ -7,7 +7,7 @@ dE_CAM16UCS    CAM16-UCS (Li et al. 2017)        display-referred, with viewing 
 rmse           root mean square                  linear light, neither exposed nor clipped
 =============  ================================  ==========================================
 
-The first three come from colour-science. Beside them stands the signed ratio of luminances in
+colour-science defines the first three. Beside them stands the signed ratio of luminances in
 stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
 """
 

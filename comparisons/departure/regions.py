@@ -47,8 +47,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     Only pixels of `counted` (H, W) matter. Without error there is no region.
     """
     counted = np.asarray(counted, bool)
-    error = np.where(counted, np.asarray(error, np.float64), 0.0)
-    total, pixels = error.sum(), counted.sum()
+    error = np.where(counted, np.asarray(error), 0.0)
+    total, pixels = error.sum(dtype=np.float64), counted.sum()
     if not total > 0.0:
         return ()
     cell = -(-max(error.shape) // CELLS)
@@ -102,7 +102,7 @@ def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total
     """The region of a box, drawn in to the counted pixels that it holds."""
     inside = counted[rows, columns]
     y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    held = error[rows, columns].sum()
+    held = error[rows, columns].sum(dtype=np.float64)
     return Region(
         x=int(columns.start + x[0]),
         y=int(rows.start + y[0]),

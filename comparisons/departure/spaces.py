@@ -1,20 +1,32 @@
 """Colour spaces in which distances are nearly what an eye sees, and how an image is looked at.
 
 Conversions from linear light with the sRGB primaries (ITU-R BT.709, D65; 1.0 is display white) to
-CIE L*a*b*, ICtCp and CAM16-UCS, by colour-science, which is imported on first use: that takes
-about a second.
+CIE L*a*b*, ICtCp and CAM16-UCS. colour-science defines them, and the tests hold them to it; they
+are computed by Dr.Jit (`comparisons.departure.colorimetry`), on all cores.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import drjit as dr
 import numpy as np
+from drjit.llvm import Array3f64, Float64
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.departure.colorimetry import (
+    BT709,
+    BT2020,
+    delta_e_00,
+    opaque,
+    rgb_to_ictcp,
+    rgb_to_xyz,
+    times,
+    xyz_to_cam16ucs,
+    xyz_to_lab,
+)
 from comparisons.records import Positive, Record, plain
 from heuristic.errors import InputError
 
@@ -24,7 +36,7 @@ Array = NDArray[np.float64]
 PQ_PEAK = 10_000.0
 
 #: Pixels converted at a time: temporaries stay small whatever the image's size.
-_BLOCK = 32_768
+_BLOCK = 2**17
 
 
 class Viewing(Record):
@@ -64,45 +76,35 @@ DEFAULT_VIEWING = Viewing()
 
 def luminance(rgb: ArrayLike) -> Array:
     """Relative luminance Y of linear BT.709 RGB (..., 3); 1 is display white."""
-    return np.asarray(rgb, np.float64) @ _rgb_to_xyz()[1]
+    return np.asarray(rgb, np.float64) @ rgb_to_xyz(BT709)[1]
 
 
-@lru_cache(maxsize=1)
-def _rgb_to_xyz() -> Array:
-    # From the primaries at full precision: white is exactly D65, so greys have no chroma. The
-    # rounded matrix of IEC 61966-2-1 would leave them 0.01 of a*.
-    from colour.models import RGB_COLOURSPACE_BT709
-
-    return RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ
-
-
-@lru_cache(maxsize=1)
-def _bt709_to_bt2020() -> Array:
-    from colour.models import RGB_COLOURSPACE_BT2020
-
-    return RGB_COLOURSPACE_BT2020.matrix_XYZ_to_RGB @ _rgb_to_xyz()
-
-
-def _by_blocks(function: Callable[..., Array], *arrays: Array, out: tuple[int, ...]) -> Array:
-    """Apply `function` to blocks of pixels of (..., 3) arrays; the result has shape `out`."""
-    flat = [array.reshape(-1, 3) for array in arrays]
-    result = np.empty((len(flat[0]), *out[arrays[0].ndim - 1 :]))
+def _by_blocks(function: Callable[..., Any], *arrays: ArrayLike, out: tuple[int, ...]) -> Array:
+    """Apply a function of Dr.Jit colours to blocks of (..., 3) arrays; the result is of `out`."""
+    flat = [np.asarray(array).reshape(-1, 3) for array in arrays]
+    result = np.empty((len(flat[0]), *out[np.ndim(arrays[0]) - 1 :]))
     for start in range(0, len(flat[0]), _BLOCK):
         block = slice(start, start + _BLOCK)
-        result[block] = function(*(array[block] for array in flat))
+        found = function(*(_colours(pixels[block]) for pixels in flat))
+        result[block] = np.asarray(dr.ravel(found)).reshape(result[block].shape)
     return result.reshape(out)
 
 
-def _display_xyz(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
-    return np.clip(rgb * viewing.exposure, 0.0, white) @ _rgb_to_xyz().T
+def _colours(pixels: Array) -> Array3f64:
+    return dr.unravel(Array3f64, Float64(np.ascontiguousarray(pixels, np.float64).ravel()))
+
+
+def _displayed(viewing: Viewing, white: float = 1.0) -> Callable[[Array3f64], Array3f64]:
+    """A function from linear RGB to the XYZ that a display shows; Y of white is 1."""
+    exposure, largest = opaque(viewing.exposure), opaque(white)
+    matrix = rgb_to_xyz(BT709)
+    return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
 
 
 def lab(rgb: ArrayLike, viewing: Viewing) -> Array:
     """CIE L*a*b* (D65, 2°) of linear RGB (..., 3) as displayed; L* from 0 to 100."""
-    from colour.models import XYZ_to_Lab
-
-    rgb = np.asarray(rgb, np.float64)
-    return _by_blocks(lambda block: XYZ_to_Lab(_display_xyz(block, viewing)), rgb, out=rgb.shape)
+    shown, white = _displayed(viewing), rgb_to_xyz(BT709).sum(axis=1)
+    return _by_blocks(lambda block: xyz_to_lab(shown(block), white), rgb, out=np.shape(rgb))
 
 
 def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
@@ -111,42 +113,30 @@ def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
     `white` is the largest value that the display shows, in units of the white that CAM16 adapts to;
     beyond 1, J' goes beyond 100.
     """
-    from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
-    from colour.models import JMh_CAM16_to_CAM16UCS
-
-    adapted = 100.0 * _rgb_to_xyz().sum(axis=1)
-    adapting = 0.2 * viewing.ambient_illuminance / np.pi
-    surround = VIEWING_CONDITIONS_CAM16["Average"]
-
-    def convert(block: Array) -> Array:
-        xyz = 100.0 * _display_xyz(block, viewing, white)
-        model = XYZ_to_CAM16(xyz, adapted, adapting, viewing.background, surround, compute_H=False)
-        return JMh_CAM16_to_CAM16UCS(np.stack((model.J, model.M, model.h), axis=-1))
-
-    rgb = np.asarray(rgb, np.float64)
-    return _by_blocks(convert, rgb, out=rgb.shape)
+    shown = _displayed(viewing, white)
+    adapted = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
+    convert = xyz_to_cam16ucs(
+        adapted, 0.2 * viewing.ambient_illuminance / np.pi, viewing.background
+    )
+    return _by_blocks(lambda block: convert(100.0 * shown(block)), rgb, out=np.shape(rgb))
 
 
 def itp(rgb: ArrayLike, viewing: Viewing) -> Array:
     """720 · (I, T, P) of linear RGB (..., 3), so that the Euclidean distance is ΔE_ITP."""
-    from colour.models import RGB_to_ICtCp
+    matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
+    level = opaque(viewing.exposure * viewing.white_luminance)
+    scale = Array3f64(720.0, 360.0, 720.0)
 
-    matrix = (viewing.exposure * viewing.white_luminance * _bt709_to_bt2020()).T
-    scale = 720.0 * np.array([1.0, 0.5, 1.0])
+    def convert(block: Array3f64) -> Array3f64:
+        absolute = dr.clip(times(matrix, block) * level, 0.0, PQ_PEAK)
+        return scale * rgb_to_ictcp(absolute, PQ_PEAK)
 
-    def convert(block: Array) -> Array:
-        absolute = np.clip(block @ matrix, 0.0, PQ_PEAK)
-        return scale * RGB_to_ICtCp(absolute, method="ITU-R BT.2100-2 PQ")
-
-    rgb = np.asarray(rgb, np.float64)
-    return _by_blocks(convert, rgb, out=rgb.shape)
+    return _by_blocks(convert, rgb, out=np.shape(rgb))
 
 
 def ciede2000(lab_a: Array, lab_b: Array) -> Array:
     """ΔE00 between CIE L*a*b* colours (..., 3), with k_L = k_C = k_H = 1."""
-    from colour.difference import delta_E_CIE2000
-
-    return _by_blocks(delta_E_CIE2000, lab_a, lab_b, out=lab_a.shape[:-1])
+    return _by_blocks(delta_e_00, lab_a, lab_b, out=np.shape(lab_a)[:-1])
 
 
 def euclidean(a: Array, b: Array) -> Array:

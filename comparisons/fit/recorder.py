@@ -12,7 +12,8 @@ from heuristic.errors import InputError
 from heuristic.materials import Material
 from heuristic.plugins.scene_materials import SceneMaterials
 from heuristic.shading import shade
-from reference.rendering.renderer import Accumulator, Renderer, variant
+from reference.rendering.renderer import Renderer, variant
+from reference.rendering.sums import Accumulator
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
 """Those that are fitted."""

@@ -8,7 +8,8 @@ import numpy as np
 from comparisons.fit.recorder import Recorder
 from heuristic.errors import InputError
 from reference.rendering.passes import passes
-from reference.rendering.renderer import Accumulator, add_difference, variant
+from reference.rendering.renderer import variant
+from reference.rendering.sums import Accumulator, add_difference
 from reference.scene.graph import properties
 
 VARIANT = "llvm_ad_rgb"
@@ -54,4 +55,4 @@ def render(ready, options, progress):
         recorder.render(one.seed)
     before, reference, difference = (total.estimate() for total in sums)
     with variant(VARIANT):
-        return Rendered(before.mean, reference, difference, recorder.surface(), ready.surface.hit)
+        return Rendered(before.mean, reference, difference, recorder.surface(), ready.counted)

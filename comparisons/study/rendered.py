@@ -15,10 +15,11 @@ from heuristic.errors import InputError
 from reference.effects import EFFECTS
 from reference.pairing import halves
 from reference.planning.plan import plan, sampler
-from reference.rendering.gbuffer import gbuffer, image_size
+from reference.rendering.gbuffer import gbuffer, image_size, require_surface
 from reference.rendering.guard import Verdict, examine_plan
 from reference.rendering.passes import passes
-from reference.rendering.renderer import Accumulator, Renderer, physical_integrator
+from reference.rendering.renderer import Renderer, physical_integrator
+from reference.rendering.sums import Accumulator
 from reference.scene.sampler import with_sampler
 from reference.scene.source import Source
 
@@ -37,7 +38,7 @@ def row(part, point, identity):
     kept = _kept(part.scene, identity)
     physical = kept[1].scene(with_sampler(pair.physical, sampler()))
     surface = gbuffer(physical, *image_size(physical))
-    surface.require_surface(part.scene)
+    require_surface(surface.hit, part.scene)
     chosen = _guarded(part, identity, plan(pair, physical), physical, pair)
     heuristic = kept[0].scene(with_sampler(pair.heuristic, chosen.sampler))
     spp = part.spp // PASSES

@@ -41,22 +41,23 @@ class GBuffer:
         lit = np.maximum(cosine, 0) * falloff(distance, travel)
         return float(np.mean(lit)) if len(distance) else 0.0
 
-    def require_surface(self, name: str) -> None:
-        """Refuse a picture of nothing, whose difference would be 0 whatever is wrong with it.
 
-        Raises
-        ------
-        InputError
-            Naming the scene, where no pixel sees a surface.
-        """
-        if not self.hit.any():
-            height, width = self.hit.shape
-            raise InputError(
-                f"{name}: no pixel sees a surface: the rays through the centres of all"
-                f" {width}x{height} pixels meet nothing. Check the camera (to_world, fov,"
-                " near_clip, far_clip, the film's crop) and the shapes in front of it. To"
-                " compare or check an empty picture all the same, give --allow-empty."
-            )
+def require_surface(hit: np.ndarray, name: str) -> None:
+    """Refuse a picture of nothing, whose difference would be 0 whatever is wrong with it.
+
+    Raises
+    ------
+    InputError
+        Naming the scene, where no pixel (H, W) sees a surface.
+    """
+    if not hit.any():
+        height, width = hit.shape
+        raise InputError(
+            f"{name}: no pixel sees a surface: the rays through the centres of all"
+            f" {width}x{height} pixels meet nothing. Check the camera (to_world, fov,"
+            " near_clip, far_clip, the film's crop) and the shapes in front of it. To"
+            " compare or check an empty picture all the same, give --allow-empty."
+        )
 
 
 def image_size(scene):

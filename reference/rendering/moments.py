@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.rendering.renderer import Accumulator, Estimate
+from reference.rendering.sums import Accumulator, Estimate, flattened, values
 
 GROUPS = 8
 """Of passes, at most: seven degrees of freedom for an interval."""
@@ -79,48 +79,54 @@ class DifferenceSums(Accumulator):
     ----------
     counted
         (H, W): the pixels from which blocks are sampled.
+    compact
+        As for :class:`reference.rendering.sums.Mean`.
     """
 
     SUMS = (*Accumulator.SUMS, "cubes")
 
-    def __init__(self, counted):
-        super().__init__()
+    def __init__(self, counted, compact=False):
+        super().__init__(compact)
         self._sample = sample(counted)
         flat = 3 * self._sample[0][:, None] + np.arange(3)
         self._index = mi.UInt32(flat.ravel().astype(np.uint32))
         self._groups = np.zeros((GROUPS, flat.size))
 
-    def _step(self, image):
-        count, step = self.count, image - self._mean
+    def add(self, image, less=None):
+        """Add a pass: a tensor (H, W, 3), less another one if that is given."""
+        super().add(image, less)
+        if self._index.shape[0]:
+            found = values(flattened(image, less), self._index)
+            self._groups[(self.count - 1) % GROUPS] += np.array(found)
+
+    def _step(self, sums, image):
+        count, step = self.count, image - sums["mean"]
         share = step / dr.opaque(mi.Float64, count)
         # The update of a third central moment by one value (Pébay 2008, equation 2.8), which takes
         # the mean and the squares as they were before.
         cubic = dr.opaque(mi.Float64, (count - 1) * (count - 2))
-        self._cubes += share * (share * step * cubic - 3 * self._squares)
-        super()._step(image)
-        if self._index.shape[0]:
-            values = dr.gather(mi.Float64, image.array, self._index)
-            self._groups[(count - 1) % GROUPS] += np.array(values)
+        sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
+        super()._step(sums, image)
 
     def state(self):
-        """Return the sums as arrays, for :meth:`restore`."""
-        return super().state() | {"groups": self._groups.copy()}
+        """Return the sums by name, as functions that make an array each, for :meth:`restore`."""
+        return super().state() | {"groups": self._groups.copy}
 
     def shapes(self, size):
         """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
         return super().shapes(size) | {"groups": self._groups.shape}
 
     def restore(self, state):
-        """Go on from the :meth:`state` of another one."""
+        """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
         super().restore(state)
         self._groups = np.array(state["groups"])
 
-    def estimate(self):
-        """Return what the passes so far say."""
-        plain, n = super().estimate(), self.count
-        third = np.array(self._cubes)
+    def estimate(self, dtype=float, last=False):
+        """Return what the passes so far say, as the base does; the third cumulant in doubles."""
+        third, n = self._array("cubes", float, last), self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, that of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
+        plain = super().estimate(dtype, last)
         return DifferenceEstimate(**vars(plain), third=third, grouped=self._grouped())
 
     def _grouped(self):
@@ -131,6 +137,41 @@ class DifferenceSums(Accumulator):
         shape = (len(sizes), len(places), 3)
         sampled = int(blocks.max()) + 1 if len(blocks) else 0
         return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+
+
+class SumsOfHalves(DifferenceSums):
+    """Running sums of a difference that has no mean of its own: it is that of the halves' means.
+
+    Each pass is added to it before it is added to those.
+
+    Parameters
+    ----------
+    counted, compact
+        As for :class:`DifferenceSums`.
+    halves
+        The :class:`Mean` of each half.
+    """
+
+    SUMS = tuple(name for name in DifferenceSums.SUMS if name != "mean")
+
+    def __init__(self, counted, halves, compact=False):
+        super().__init__(counted, compact)
+        self._halves = halves
+
+    def mean(self, dtype=float, last=False):
+        """Return the mean of the passes so far; with ``last`` too, the halves keep theirs."""
+        test, reference = self._halves
+        found = test.mean()
+        found -= reference.mean()
+        return found.astype(dtype, copy=False)
+
+    def _sums(self, number, size):
+        if not self._halves[0].count:
+            mean = dr.zeros(mi.Float64, size)
+        else:
+            test, reference = (half.part("mean", number) for half in self._halves)
+            mean = test - reference
+        return super()._sums(number, size) | {"mean": mean}
 
 
 def block_numbers(counted):

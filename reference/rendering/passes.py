@@ -77,9 +77,10 @@ def passes(
             if progress:
                 progress(stage, number, count)
             own = pass_seed(seed, number, stream)
-            images = _images(renderers, own)
+            made = Pass(number, own, _images(renderers, own))
             done = number + 1
-            yield Pass(number, own, images)
+            yield made
+            del made  # else its images would be there beside the next ones
     finally:
         if progress:
             progress(stage, done, done)

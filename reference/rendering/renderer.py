@@ -22,7 +22,7 @@ from reference.rendering.gbuffer import image_size
 from reference.scene.preparation import PATHS
 
 LARGEST_PASS = 2**26
-"""Samples of one pass, and pixels of an image: each takes some 300 bytes while it is under way."""
+"""Samples of one pass, and pixels of an image; `reference.rendering.memory` may allow fewer."""
 
 
 @dataclass(frozen=True)
@@ -39,106 +39,6 @@ class PassTimes:
     total: float
     compilation: float
     passes: int
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """An image from ``passes`` independent passes; arrays are (H, W, 3), linear.
-
-    Attributes
-    ----------
-    mean
-        Mean of the passes.
-    standard_error
-        Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
-    noise
-        An image with the distribution of ``mean``'s error: the passes summed with alternating
-        signs, divided by their number.
-    """
-
-    mean: np.ndarray
-    standard_error: np.ndarray
-    noise: np.ndarray
-    passes: int
-
-
-class Mean:
-    """The running mean of passes.
-
-    Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering.
-    """
-
-    SUMS = ("mean",)
-
-    def __init__(self):
-        self.count = 0
-
-    def add(self, image):
-        """Add a pass: a tensor (H, W, 3)."""
-        image = mi.TensorXd(image)
-        if self.count == 0:
-            for name in self.SUMS:
-                setattr(self, f"_{name}", dr.zeros_like(image))
-        self.count += 1
-        self._step(image)
-        dr.eval(*(getattr(self, f"_{name}") for name in self.SUMS))
-
-    def mean(self):
-        """Return the mean of the passes so far."""
-        return np.array(self._mean)
-
-    def state(self):
-        """Return the sums as arrays, for :meth:`restore`."""
-        sums = {name: np.array(getattr(self, f"_{name}")) for name in self.SUMS}
-        return {"count": np.array(self.count)} | sums
-
-    def shapes(self, size):
-        """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
-        return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
-
-    def restore(self, state):
-        """Go on from the :meth:`state` of another one."""
-        self.count = int(state["count"])
-        for name in self.SUMS:
-            setattr(self, f"_{name}", mi.TensorXd(state[name]))
-
-    def _step(self, image):
-        self._mean += (image - self._mean) / dr.opaque(mi.Float64, self.count)
-
-
-class Accumulator(Mean):
-    """Running sums of passes, for an :class:`Estimate`."""
-
-    SUMS = ("mean", "squares", "signed")
-
-    def _step(self, image):
-        step = image - self._mean
-        super()._step(image)
-        self._squares += step * (image - self._mean)
-        self._signed += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
-
-    def noise(self):
-        """Return the noise image of :class:`Estimate`; the number of passes should be even."""
-        return np.array(self._signed) / self.count
-
-    def estimate(self):
-        """Return what the passes so far say; their number should be even and at least 2."""
-        variance = np.array(self._squares)
-        variance /= max(self.count - 1, 1) * self.count
-        return Estimate(
-            mean=self.mean(),
-            standard_error=np.sqrt(variance, out=variance),
-            noise=self.noise(),
-            passes=self.count,
-        )
-
-
-def add_difference(sums, images):
-    """Add the images of both halves, and their difference, to three sums."""
-    heuristic, reference = images
-    difference = mi.TensorXd(heuristic) - mi.TensorXd(reference)
-    for total, image in zip(sums, (heuristic, reference, difference), strict=True):
-        total.add(image)
 
 
 class Renderer:
@@ -199,6 +99,8 @@ class Renderer:
                 ) from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
+        # The film keeps what it has developed, which is as large as the image.
+        self.scene.sensors()[0].film().clear()
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)

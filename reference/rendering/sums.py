@@ -1,0 +1,211 @@
+"""Running sums of passes: their mean, its standard error, and its noise.
+
+Every standard error here comes from the spread of passes, which are independent.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from math import prod
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+POWERS = {"signed": 1, "squares": 2, "cubes": 3}
+ROOTS = {1: lambda value: value, 2: dr.sqrt, 3: dr.cbrt}
+
+PART = 2**20
+"""Values of a sum that are updated at a time: Dr.Jit's memory comes in powers of two."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An image from ``passes`` independent passes; arrays are (H, W, 3), linear.
+
+    Attributes
+    ----------
+    mean
+        Mean of the passes.
+    standard_error
+        Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
+    noise
+        An image with the distribution of ``mean``'s error: the passes summed with alternating
+        signs, divided by their number.
+    """
+
+    mean: np.ndarray
+    standard_error: np.ndarray
+    noise: np.ndarray
+    passes: int
+
+
+class Mean:
+    """The running mean of passes.
+
+    Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering; in
+    parts of :data:`PART` values, so that updating them takes next to no memory beside them.
+
+    Parameters
+    ----------
+    compact
+        Whether all sums but the mean are kept in single precision, as roots of their power: so
+        their range is that of the images. Each pass adds less than 2e-7 of a sum to its error.
+    """
+
+    SUMS = ("mean",)
+
+    def __init__(self, compact=False):
+        self.count = 0
+        self._compact = compact
+        self._shape = ()
+        self._parts = []
+
+    def add(self, image, less=None):
+        """Add a pass: a tensor (H, W, 3), less another one if that is given."""
+        flat = flattened(image, less)
+        if self.count == 0:
+            self._shape = tuple(image.shape)
+            self._parts = [
+                {name: self._packed(name, dr.zeros(mi.Float64, len(part))) for name in self.SUMS}
+                for part in self._ranges()
+            ]
+        self.count += 1
+        for number, (part, kept) in enumerate(zip(self._ranges(), self._parts, strict=True)):
+            places = dr.arange(mi.UInt32, len(part)) + dr.opaque(mi.UInt32, part.start)
+            sums = self._sums(number, len(part))
+            self._step(sums, values(flat, places))
+            kept.update((name, self._packed(name, sums[name])) for name in self.SUMS)
+            del sums
+            dr.eval(kept)
+
+    def mean(self, dtype=float, last=False):
+        """Return the mean of the passes so far, as :meth:`Accumulator.estimate` does."""
+        return self._array("mean", dtype, last)
+
+    def part(self, name, number):
+        """Return a part of a sum."""
+        return self._unpacked(name, self._parts[number][name])
+
+    def state(self):
+        """Return the sums by name, as functions that make an array each, for :meth:`restore`."""
+        sums = {name: partial(self._array, name) for name in self.SUMS}
+        return {"count": lambda: np.array(self.count)} | sums
+
+    def shapes(self, size):
+        """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
+        return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
+
+    def restore(self, state):
+        """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
+        self.count = int(state["count"])
+        self._shape = state[self.SUMS[0]].shape
+        self._parts = [{} for _ in self._ranges()]
+        for name in self.SUMS:
+            flat = state.pop(name).reshape(-1)
+            for part, kept in zip(self._ranges(), self._parts, strict=True):
+                kept[name] = self._packed(name, mi.Float64(flat[part.start : part.stop]))
+            dr.eval(self._parts)
+
+    def _step(self, sums, image):
+        sums["mean"] += (image - sums["mean"]) / dr.opaque(mi.Float64, self.count)
+
+    def _sums(self, number, size):
+        """Return the sums of a part, of so many values, in doubles."""
+        return {name: self.part(name, number) for name in self.SUMS}
+
+    def _packed(self, name, total):
+        power = POWERS.get(name)
+        if not self._compact or power is None:
+            return total
+        return mi.Float32(dr.mulsign(ROOTS[power](dr.abs(total)), total))
+
+    def _unpacked(self, name, kept):
+        power = POWERS.get(name)
+        if not self._compact or power is None:
+            return kept
+        root = mi.Float64(kept)
+        return root if power == 1 else root * root * (root if power == 3 else 1.0)
+
+    def _ranges(self):
+        size = prod(self._shape)
+        return [range(start, min(start + PART, size)) for start in range(0, size, PART)]
+
+    def _array(self, name, dtype=float, last=False):
+        """Return a sum as an array; with ``last`` its memory is given back."""
+        found = np.empty(prod(self._shape), dtype)
+        for part, kept in zip(self._ranges(), self._parts, strict=True):
+            total = self._unpacked(name, kept.pop(name) if last else kept[name])
+            found[part.start : part.stop] = np.array(total)
+        if last:
+            dr.flush_malloc_cache()
+        return found.reshape(self._shape)
+
+
+class Deviations(Mean):
+    """The running mean of passes, and how far they are from it."""
+
+    SUMS = ("mean", "squares")
+
+    def standard_error(self, dtype=float, last=False):
+        """Return the standard error of the mean, as :meth:`Accumulator.estimate` does."""
+        error = self._array("squares", float, last)
+        error /= max(self.count - 1, 1) * self.count
+        np.sqrt(error, out=error)
+        return error.astype(dtype, copy=False)
+
+    def _step(self, sums, image):
+        step = image - sums["mean"]
+        super()._step(sums, image)
+        sums["squares"] += step * (image - sums["mean"])
+
+
+class Accumulator(Deviations):
+    """Running sums of passes, for an :class:`Estimate`."""
+
+    SUMS = (*Deviations.SUMS, "signed")
+
+    def _step(self, sums, image):
+        super()._step(sums, image)
+        # Rounded as the sum is, so that equal passes cancel.
+        image = mi.Float64(mi.Float32(image)) if self._compact else image
+        sums["signed"] += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
+
+    def noise(self, dtype=float, last=False):
+        """Return the noise image of :class:`Estimate`; the number of passes should be even."""
+        noise = self._array("signed", dtype, last)
+        noise /= self.count
+        return noise
+
+    def estimate(self, dtype=float, last=False):
+        """Return what the passes so far say; their number should be even and at least 2.
+
+        Parameters
+        ----------
+        dtype
+            Of the arrays.
+        last
+            Whether the sums are done with: each is given back as soon as its array is made.
+        """
+        noise, error = self.noise(dtype, last), self.standard_error(dtype, last)
+        return Estimate(self.mean(dtype, last), error, noise, self.count)
+
+
+def flattened(image, less=None):
+    """Return the values of one tensor or array (H, W, 3) or two as Dr.Jit arrays."""
+    given = [one for one in (image, less) if one is not None]
+    return [(one if dr.is_tensor_v(one) else mi.TensorXd(one)).array for one in given]
+
+
+def values(images, places):
+    """Return some values of the first flat image in doubles, less those of a second one."""
+    found = [mi.Float64(dr.gather(type(image), image, places)) for image in images]
+    return found[0] - found[1] if len(found) == 2 else found[0]
+
+
+def add_difference(sums, images):
+    """Add the images of both halves, and their difference, to three sums."""
+    heuristic, reference = images
+    # First, since it may build on the means of the passes before.
+    sums[2].add(heuristic, reference)
+    sums[0].add(heuristic)
+    sums[1].add(reference)
