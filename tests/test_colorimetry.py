@@ -3,21 +3,12 @@
 import colour
 import numpy as np
 import pytest
-from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
 from colour.difference import delta_E_CIE2000
-from colour.models import (
-    RGB_COLOURSPACE_BT709,
-    RGB_COLOURSPACE_BT2020,
-    JMh_CAM16_to_CAM16UCS,
-    RGB_to_ICtCp,
-    XYZ_to_Lab,
-)
 
+from comparisons.departure import definitions
+from comparisons.departure.definitions import AGREEMENT, DEFINED
 from comparisons.departure.metrics import METRICS
-from comparisons.departure.spaces import PQ_PEAK, Viewing, cam16ucs, ciede2000
-
-#: Of a colour difference: what the compiled formulas may be away from colour-science's.
-AGREEMENT = 1e-4
+from comparisons.departure.spaces import Viewing, cam16ucs, ciede2000
 
 VIEWINGS = [
     Viewing(),
@@ -53,35 +44,6 @@ def cases():
     }
 
 
-def lab(rgb, viewing):
-    return XYZ_to_Lab(shown(rgb, viewing))
-
-
-def ucs(rgb, viewing, white=1.0):
-    adapted = 100.0 * RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.sum(axis=1)
-    found = XYZ_to_CAM16(
-        100.0 * shown(rgb, viewing, white),
-        adapted,
-        0.2 * viewing.ambient_illuminance / np.pi,
-        viewing.background,
-        VIEWING_CONDITIONS_CAM16["Average"],
-        compute_H=False,
-    )
-    return JMh_CAM16_to_CAM16UCS(np.stack((found.J, found.M, found.h), axis=-1))
-
-
-def itp(rgb, viewing):
-    matrix = RGB_COLOURSPACE_BT2020.matrix_XYZ_to_RGB @ RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ
-    level = viewing.exposure * viewing.white_luminance
-    absolute = np.clip(rgb @ (level * matrix).T, 0.0, PQ_PEAK)
-    return RGB_to_ICtCp(absolute, method="ITU-R BT.2100-2 PQ") * [720.0, 360.0, 720.0]
-
-
-def shown(rgb, viewing, white=1.0):
-    clipped = np.clip(rgb * viewing.exposure, 0.0, white)
-    return clipped @ RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.T
-
-
 def opposite(a, b):
     """Whether the hues of L*a*b* colours are opposite, where CIE DE2000 jumps."""
     (_, a1, b1), (_, a2, b2) = a.T, b.T
@@ -98,15 +60,14 @@ def quiet():
 
 @pytest.mark.parametrize("viewing", VIEWINGS, ids=["usual", "bright", "dim"])
 @pytest.mark.parametrize("name", list(cases()))
-@pytest.mark.parametrize("metric", ["dE2000", "dE_ITP", "dE_CAM16UCS"])
+@pytest.mark.parametrize("metric", list(DEFINED))
 def test_metrics_are_colour_sciences(metric, name, viewing, quiet):
     test, reference = cases()[name]
-    space = {"dE2000": lab, "dE_ITP": itp, "dE_CAM16UCS": ucs}[metric]
+    space, difference = DEFINED[metric]
     pair = [space(image, viewing) for image in (test, reference)]
+    wanted, defined = difference(*pair), np.full(len(test), True)
     if metric == "dE2000":
-        wanted, defined = delta_E_CIE2000(*pair), ~opposite(*pair)
-    else:
-        wanted, defined = np.linalg.norm(pair[0] - pair[1], axis=-1), np.full(len(test), True)
+        defined = ~opposite(*pair)
     found = METRICS[metric](test[None], reference[None], viewing)[0]
     assert defined.mean() > 0.5
     assert np.isfinite(found).all()
@@ -134,7 +95,8 @@ def test_opposite_hues_take_the_branch_of_the_definition(hue, wanted):
 def test_brighter_than_white(quiet):
     rgb = np.random.default_rng(7).uniform(0.0, 12.0, (5000, 3))
     found = cam16ucs(rgb, VIEWINGS[0], white=10.0)
-    np.testing.assert_allclose(found, ucs(rgb, VIEWINGS[0], white=10.0), atol=AGREEMENT)
+    wanted = definitions.cam16ucs(rgb, VIEWINGS[0], white=10.0)
+    np.testing.assert_allclose(found, wanted, atol=AGREEMENT)
 
 
 def test_one_kernel_serves_all_viewing_conditions():

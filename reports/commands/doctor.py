@@ -7,6 +7,7 @@ import click
 
 from comparisons.pool import Task
 from heuristic import backend
+from heuristic.errors import InstallationError
 from heuristic.version import __version__
 from reports import jobs
 
@@ -18,7 +19,7 @@ TIMEOUT_S = 300
 
 @click.command()
 def doctor():
-    """Check the installation: versions, LLVM, and a test rendering in each variant.
+    """Check the installation: versions, LLVM, a rendering in each variant, colour differences.
 
     \b
     Examples:
@@ -50,6 +51,8 @@ def examine(variants):
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
+        apart = pool.do(Task("colour differences", compared, ()))
+        yield f"metrics         at most {apart:.0e} from those of colour-science"
 
 
 def rendered(variant):
@@ -62,3 +65,22 @@ def rendered(variant):
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
+
+
+def compared():
+    """Return how far colour differences are from those of colour-science.
+
+    Raises
+    ------
+    InstallationError
+        When they are too far.
+    """
+    from comparisons.departure import definitions
+
+    apart = definitions.farthest()
+    if not apart <= definitions.AGREEMENT:
+        raise InstallationError(
+            f"colour differences are {apart:.1e} from those of colour-science, and"
+            f" {definitions.AGREEMENT:g} is allowed. Install the pinned versions: `./run` does."
+        )
+    return apart

@@ -1,0 +1,83 @@
+"""The colour differences by colour-science, which defines them.
+
+They take as long as rendering does. The compiled ones (`comparisons.departure.colorimetry`) are
+used in their place; the tests compare the two, and so does ``fotismos doctor``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import colour
+import numpy as np
+from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
+from colour.difference import delta_E_CIE2000
+from colour.models import (
+    RGB_COLOURSPACE_BT709,
+    RGB_COLOURSPACE_BT2020,
+    JMh_CAM16_to_CAM16UCS,
+    RGB_to_ICtCp,
+    XYZ_to_Lab,
+)
+
+from comparisons.departure.metrics import METRICS
+from comparisons.departure.spaces import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
+
+#: Of a colour difference: what the compiled formulas may be away from colour-science's.
+AGREEMENT = 1e-4
+
+
+def lab(rgb: Array, viewing: Viewing) -> Array:
+    """CIE L*a*b* of linear RGB (..., 3) as displayed."""
+    return XYZ_to_Lab(_shown(rgb, viewing, 1.0))
+
+
+def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
+    """CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed, up to `white`."""
+    adapted = 100.0 * RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.sum(axis=1)
+    found = XYZ_to_CAM16(
+        100.0 * _shown(rgb, viewing, white),
+        adapted,
+        0.2 * viewing.ambient_illuminance / np.pi,
+        viewing.background,
+        VIEWING_CONDITIONS_CAM16["Average"],
+        compute_H=False,
+    )
+    return JMh_CAM16_to_CAM16UCS(np.stack((found.J, found.M, found.h), axis=-1))
+
+
+def itp(rgb: Array, viewing: Viewing) -> Array:
+    """720 · (I, T, P) of linear RGB (..., 3)."""
+    matrix = RGB_COLOURSPACE_BT2020.matrix_XYZ_to_RGB @ RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ
+    level = viewing.exposure * viewing.white_luminance
+    absolute = np.clip(rgb @ (level * matrix).T, 0.0, PQ_PEAK)
+    return RGB_to_ICtCp(absolute, method="ITU-R BT.2100-2 PQ") * [720.0, 360.0, 720.0]
+
+
+def _shown(rgb: Array, viewing: Viewing, white: float) -> Array:
+    clipped = np.clip(rgb * viewing.exposure, 0.0, white)
+    return clipped @ RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.T
+
+
+def _distance(a: Array, b: Array) -> Array:
+    return np.linalg.norm(a - b, axis=-1)
+
+
+DEFINED: dict[str, tuple[Callable[..., Array], Callable[[Array, Array], Array]]] = {
+    "dE2000": (lab, delta_E_CIE2000),
+    "dE_ITP": (itp, _distance),
+    "dE_CAM16UCS": (cam16ucs, _distance),
+}
+"""Space and difference of each metric that colour-science defines."""
+
+
+def farthest(count: int = 4096) -> float:
+    """Return how far the compiled differences of random colours are from the defined ones."""
+    test, reference = np.random.default_rng(0).random((2, count, 3))
+    apart = 0.0
+    with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):
+        for name, (space, difference) in DEFINED.items():
+            defined = difference(*(space(image, DEFAULT_VIEWING) for image in (test, reference)))
+            found = METRICS[name](test[None], reference[None], DEFAULT_VIEWING)[0]
+            apart = max(apart, float(np.abs(found - defined).max()))
+    return apart
