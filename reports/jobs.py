@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import math
 import os
+import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +17,14 @@ import click
 from click.shell_completion import CompletionItem
 
 from comparisons.pool import Pool, cores
-from heuristic import program
+from heuristic import backend, program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, suggestion
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from comparisons.case import Request
+    from comparisons.cluster import Cluster
 
 
 def _resolution(text):
@@ -206,7 +208,16 @@ IN_PROCESSES = True
 """Whether scenes are read and rendered in processes apart; tests do so in their own."""
 
 
-def pool(timeout: float, workers: int = 1) -> Pool:
+scheduler_option = click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.",
+)
+
+
+def pool(
+    timeout: float, workers: int = 1, scheduler: str | None = None
+) -> AbstractContextManager[Pool | Cluster]:
     """Return where scenes are read and rendered: apart from the process that the user sees.
 
     A scene may run code of its own, and native code may crash or hang.
@@ -214,43 +225,85 @@ def pool(timeout: float, workers: int = 1) -> Pool:
     Parameters
     ----------
     timeout
-        Seconds that a task may take without any progress.
+        Seconds that a task may take without any progress; Dask's clusters have limits of their own.
     workers
         Processes at the same time.
+    scheduler
+        Address of a Dask cluster to use in place of processes here. Its workers need the same
+        folders.
     """
-    return Pool(workers if IN_PROCESSES else 0, ready(workers), timeout)
+    if scheduler is None:
+        return Pool(workers if IN_PROCESSES else 0, Ready.among(workers), timeout)
+    if workers > 1:
+        raise click.UsageError("--workers and --scheduler exclude each other.")
+    from comparisons import cluster
+
+    return cluster.connected(scheduler, Ready.far_away())
 
 
-def ready(workers: int) -> Callable[[], None]:
-    """Return what gets one of so many processes ready to render."""
-    return partial(prepare, verbosity.level(), cores() // workers if workers > 1 else None)
+@dataclass(frozen=True)
+class Ready:
+    """Gets a process ready to render.
 
-
-def prepare(level: int, threads: int | None) -> None:
-    """Get a process ready to render.
-
-    Parameters
+    Attributes
     ----------
     level
         Of the user's output: at 1, verbose, what Mitsuba says is heard.
     threads
         Of Dr.Jit; if omitted, one per core.
-
-    Raises
-    ------
-    InstallationError
-        Saying what was found, what is needed and how to get it.
+    folder
+        From which the names of files are seen; if omitted, the process is there already.
+    program
+        How printed commands begin; if omitted, as the process was started.
     """
-    from heuristic import backend
 
-    backend.check()
-    backend.use_threads(threads)
-    from reference.scene import messages
+    level: int
+    threads: int | None = None
+    folder: str | None = None
+    program: str | None = None
 
-    messages.divert(_print if level > 0 else _pass_over)
-    if level > 0:
-        logging.basicConfig(level=logging.INFO)
-    import comparisons.compare  # noqa: F401  part of start-up
+    @classmethod
+    def among(cls, workers: int) -> Ready:
+        """Return what gets one of so many processes of this machine ready."""
+        return cls(verbosity.level(), cores() // workers if workers > 1 else None)
+
+    @classmethod
+    def far_away(cls) -> Ready:
+        """Return what gets a process ready that somebody else started."""
+        return cls(verbosity.level(), None, os.getcwd(), shlex.join(program.program()))
+
+    def __call__(self) -> None:
+        """Do so.
+
+        Raises
+        ------
+        InputError
+            When the folder is not there.
+        InstallationError
+            Saying what was found, what is needed and how to get it.
+        """
+        if self.program is not None:
+            os.environ[program.VARIABLE] = self.program
+        if self.folder is not None:
+            _enter(self.folder)
+        backend.check()
+        backend.use_threads(self.threads)
+        from reference.scene import messages
+
+        messages.divert(_print if self.level > 0 else _pass_over)
+        if self.level > 0:
+            logging.basicConfig(level=logging.INFO)
+        import comparisons.compare  # noqa: F401  part of start-up
+
+
+def _enter(folder: str) -> None:
+    try:
+        os.chdir(folder)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: {error.strerror}, says a worker of the cluster. Its workers need the same"
+            " folders as this machine."
+        ) from error
 
 
 def _print(text: str) -> None:

@@ -4,7 +4,6 @@ import builtins
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -13,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.study import cluster, dataset
+from comparisons import cluster
+from comparisons.study import dataset
+from tests import dask_cluster
 
 ROOT = Path(__file__).parent.parent
 STUDY = """title = "A small study"
@@ -63,7 +64,7 @@ def test_study_writes_dataset_figures_and_findings(run, file, tmp_path):
     ],
 )
 def test_a_mistake_gets_one_message(words, text, expected, run, file, tmp_path, monkeypatch):
-    monkeypatch.setattr("comparisons.study.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("comparisons.cluster.TIMEOUT", 0.5)
     file.write_text(text, encoding="utf-8")
     code, printed, messages = run("study", file, "-o", tmp_path / "out", *words)
     assert (code, printed) == (2, "")
@@ -87,34 +88,9 @@ def test_without_the_extra_it_says_how_to_install_it(run, file, tmp_path, monkey
     assert list(cluster.NEEDED) == extras["optional-dependencies"]["cluster"]
 
 
-def start(*words):
-    command = [sys.executable, "-c", "from dask.__main__ import main; main()", *map(str, words)]
-    return subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_path):
     file.write_text(STUDY.replace("[0, 60]", "{from = 0, to = 80, steps = 8}"), encoding="utf-8")
     kept, processes = tmp_path / "out/study/small/points", []
-
-    def cluster():
-        port = free_port()
-        address = f"tcp://127.0.0.1:{port}"
-        options = ("--host", "127.0.0.1", "--port", port, "--no-dashboard")
-        processes.append(start("scheduler", *options))
-        processes.append(start("worker", address, "--nthreads", 1, "--no-dashboard"))
-        return address
 
     def study(address):
         words = ("-m", "reports", "study", file, "-o", tmp_path / "out", "--scheduler", address)
@@ -128,7 +104,7 @@ def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_
         )
 
     try:
-        first = study(cluster())
+        first = study(dask_cluster.start(processes))
         while len(list(kept.glob("*.json"))) < 3:
             assert first.poll() is None, first.communicate()
             time.sleep(0.02)
@@ -140,7 +116,7 @@ def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_
         done = {path: path.stat().st_mtime_ns for path in kept.glob("*.json")}
         assert 3 <= len(done) < 16
         code, printed, messages = run(
-            "study", file, "-o", tmp_path / "out", "--scheduler", cluster()
+            "study", file, "-o", tmp_path / "out", "--scheduler", dask_cluster.start(processes)
         )
         assert code == 0, messages
         assert f"{len(done)} points were at hand" in printed

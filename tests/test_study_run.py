@@ -10,7 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.study import cluster, dataset, design, editing, point, rendered, running
+from comparisons import cluster
+from comparisons.study import dataset, design, editing, point, rendered, running
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError
 from reference.pairing import halves
@@ -257,7 +258,8 @@ def test_killed_workers_change_nothing(count, workers, rgb, tmp_path):
     wanted = study(MANY % count)
     undisturbed = running.run(wanted, tmp_path / "a")
     shot = []
-    with cluster.local(workers) as spread:
+    with cluster.local(workers) as of_ours:
+        spread = running.workers_of(of_ours)
 
         def under_fire(given):
             from distributed import get_client

@@ -57,7 +57,7 @@ def run(study, folder, spread=None, progress=None, blocks=None):
         Where finished blocks are kept, in ``points/``.
     spread : callable, optional
         Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
-        (:func:`processes`, :mod:`comparisons.study.cluster`). All are done in this
+        (:func:`processes`, :func:`workers_of`). All are done in this
         process where it is not given.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
@@ -114,9 +114,8 @@ def processes(count, ready=lambda workers: tuple, limit_s=inf):
 
     def spread(blocks):
         workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
-        tasks = [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
         with Pool(workers, ready(workers), limit_s) as pool:
-            for task, rows in pool.each(tasks):
+            for task, rows in pool.each(_tasks(blocks)):
                 try:
                     yield task.arguments[0], rows.result()
                 except LostProcessError as error:
@@ -126,6 +125,32 @@ def processes(count, ready=lambda workers: tuple, limit_s=inf):
                     ) from error
 
     return spread
+
+
+def workers_of(cluster):
+    """Return what spreads blocks over a :class:`comparisons.cluster.Cluster`, as `run` takes it.
+
+    A block that is not done has rows that say why.
+    """
+
+    def spread(blocks):
+        for task, rows in cluster.each(_tasks(blocks)):
+            (block,) = task.arguments
+            error = rows.exception()
+            yield block, _failing(block, str(error)) if error else rows.result()
+
+    return spread
+
+
+def _tasks(blocks):
+    return [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
+
+
+def _failing(block, reason):
+    return [
+        {"part": block.part.name, "point": block.first + number, **values, "error": reason}
+        for number, values in enumerate(block.points)
+    ]
 
 
 def _named(block: Block, rows):

@@ -44,13 +44,14 @@ from reports.terminal import verbosity
 @jobs.output_option("out")
 @jobs.timeout_option
 @jobs.workers_option
+@jobs.scheduler_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.pass_context
 def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
-          timeout, workers, **rendering):  # fmt: skip
+          timeout, workers, scheduler, **rendering):  # fmt: skip
     """Say whether anything that was measured before moved by more than noise.
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
@@ -73,7 +74,7 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     }
     _require_consistent(update, scenes, images, given)
     jobs.require_known(scenes)
-    with jobs.pool(timeout, workers) as pool:
+    with jobs.pool(timeout, workers, scheduler) as pool:
         pool.start()
         from comparisons.records import to_json
         from reports.ci import annotations, check_record, lines, suite

@@ -15,6 +15,7 @@ from reports.terminal import verbosity
 @jobs.scripts_option
 @jobs.timeout_option
 @jobs.workers_option
+@jobs.scheduler_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
@@ -29,7 +30,9 @@ from reports.terminal import verbosity
 @click.option(
     "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
 )
-def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, workers, **rendering):
+def compare(
+    scenes, output, figures, fresh, with_cost, scripts, timeout, workers, scheduler, **rendering
+):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
@@ -52,4 +55,4 @@ def compare(scenes, output, figures, fresh, with_cost, scripts, timeout, workers
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
-    batch.run(scenes, output, wanted, jobs.pool(timeout, workers))
+    batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler))

@@ -19,10 +19,11 @@ VERIFIED_AT = (96, 96)
 @jobs.fresh_option
 @jobs.timeout_option
 @jobs.workers_option
+@jobs.scheduler_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-def report(output, figures, fresh, timeout, workers, **rendering):
+def report(output, figures, fresh, timeout, workers, scheduler, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
 
     Writes what `compare --cost` does, and in the page the plans verified, the hard cases and the
@@ -51,7 +52,7 @@ def report(output, figures, fresh, timeout, workers, **rendering):
         }
 
     wanted = batch.Wanted(request, figures, with_cost=True, fresh=fresh)
-    batch.run(tuple(SCENES), output, wanted, jobs.pool(timeout, workers), more)
+    batch.run(tuple(SCENES), output, wanted, jobs.pool(timeout, workers, scheduler), more)
 
 
 def _verified(pool, names, request):

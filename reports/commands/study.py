@@ -1,7 +1,7 @@
 """``fotismos study``: how the departure behaves over a space of scenes."""
 
 import os
-from contextlib import nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -25,11 +25,7 @@ from reports.terminal import verbosity
     metavar="N",
     help="Start a Dask cluster of N worker processes on this machine.",
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.",
-)
+@jobs.scheduler_option
 @click.option(
     "--findings",
     type=click.Path(path_type=Path),
@@ -56,8 +52,9 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
     given = [name for name in (processes, workers, scheduler) if name is not None]
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
+    from comparisons import cluster
     from comparisons.pool import Task, cores
-    from comparisons.study import cluster, design, running
+    from comparisons.study import design, running
     from reports.run import study_files
     from reports.run.output import below, held
     from reports.run.places import assigned
@@ -71,14 +68,16 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
         studies = below(held_folder, "study")
         (place,) = assigned(studies, [(wanted.name, file)])
         folder = study_files.prepare(wanted, studies / place)
-        if scheduler:
-            spreading = cluster.connected(scheduler)
-        elif workers:
-            spreading = cluster.local(workers)
-        else:
-            count = (processes or cores()) if jobs.IN_PROCESSES else 0
-            spreading = nullcontext(running.processes(count, jobs.ready, timeout))
-        with spreading as spread, progress.shown("points") as bar:
+        with ExitStack() as stack:
+            if scheduler:
+                spread = running.workers_of(stack.enter_context(jobs.pool(0, scheduler=scheduler)))
+            elif workers:
+                of_ours = cluster.local(workers, jobs.Ready.among(workers))
+                spread = running.workers_of(stack.enter_context(of_ours))
+            else:
+                count = (processes or cores()) if jobs.IN_PROCESSES else 0
+                spread = running.processes(count, jobs.Ready.among, timeout)
+            bar = stack.enter_context(progress.shown("points"))
             outcome = running.run(wanted, folder, spread, bar.of(wanted.name), blocks)
         places = list(study_files.write(wanted, outcome, folder, page))
     verbosity.tell([*study_files.summary(wanted, outcome), ""])

@@ -48,7 +48,7 @@ def run(
     FotismosError
         The gravest of the errors that kept a scene from being compared.
     """
-    with pool:
+    with pool as pool:
         pool.start()
         from reports.files import ownership
         from reports.run import output, stages

@@ -13,9 +13,12 @@ from rich.console import Console
 from rich.table import Table
 
 from comparisons import pool  # isort: skip
-from comparisons.study import cluster, design, point, running  # isort: skip  it finds LLVM first
+from comparisons import cluster  # isort: skip
+from comparisons.study import design, point, running  # isort: skip  it finds LLVM first
 
 import drjit as dr
+
+from reports import jobs
 
 POINTS = 96
 WORKERS = (1, 2, 4)
@@ -37,7 +40,7 @@ def run(rounds):
         ("one process, 1 thread", 1, _here(1)),
         (f"one process, {cores} threads", cores, _here(cores)),
         (f"{cores} processes, 1 thread each", cores, _pool(cores)),
-        *((f"Dask, workers: {n}", cores, cluster.local(n)) for n in WORKERS),
+        *((f"Dask, workers: {n}", cores, _cluster(n)) for n in WORKERS),
     ]
     rows = []
     for name, used, way in ways:
@@ -58,6 +61,12 @@ def _here(threads):
     dr.set_thread_count(threads)
     yield running.processes(1)
     dr.set_thread_count(before)
+
+
+@contextmanager
+def _cluster(workers):
+    with cluster.local(workers, jobs.Ready.among(workers)) as of_ours:
+        yield running.workers_of(of_ours)
 
 
 @contextmanager
