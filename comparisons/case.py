@@ -9,7 +9,7 @@ from typing import Any
 from comparisons import atomic
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
-from comparisons.pool import end_after_task
+from comparisons.processes.worker import end_after_task
 from heuristic import program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, unknown

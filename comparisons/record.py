@@ -23,7 +23,7 @@ from comparisons.comparison import (
     Times,
     Unrepresentable,
 )
-from comparisons.pool import cores
+from comparisons.processes.pool import cores
 from heuristic import __version__
 from reference.planning.light_by_light import loses_light
 from reference.rendering.guard import Verdict

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-from comparisons import interruption
+from comparisons.processes import interruption
 from heuristic.program import VARIABLE
 
 

@@ -15,7 +15,7 @@ from pkgutil import iter_modules
 import click
 
 import reports.commands
-from comparisons import interruption
+from comparisons.processes import interruption
 from heuristic.errors import FotismosError, suggestion
 from heuristic.program import program
 from heuristic.version import __version__

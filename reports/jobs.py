@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from comparisons.pool import Pool, cores
+from comparisons.processes.pool import Pool, cores
 from heuristic import backend, program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, suggestion
@@ -24,7 +24,7 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from comparisons.case import Request
-    from comparisons.cluster import Cluster
+    from comparisons.processes.cluster import Cluster
 
 
 def _resolution(text):
@@ -236,7 +236,7 @@ def pool(
         return Pool(workers if IN_PROCESSES else 0, Ready.among(workers), timeout)
     if workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
-    from comparisons import cluster
+    from comparisons.processes import cluster
 
     return cluster.connected(scheduler, Ready.far_away())
 

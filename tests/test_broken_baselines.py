@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from comparisons.pool import Pool
+from comparisons.processes.pool import Pool
 from heuristic.errors import (
     FotismosError,
     InputError,

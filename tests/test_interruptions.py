@@ -21,7 +21,7 @@ print("loaded", flush=True)
 """
 PROGRAM = """
 import sys, time
-from comparisons import interruption
+from comparisons.processes import interruption
 interruption.listen()
 try:
     import module

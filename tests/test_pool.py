@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.pool import Pool, Task, end_after_task
+from comparisons.processes.pool import Pool
+from comparisons.processes.worker import Task, end_after_task
 from heuristic.errors import InputError, LostProcessError
 
 ROOT = Path(__file__).parents[1]
@@ -235,7 +236,8 @@ def test_what_is_under_way_ends_with_the_pool(tmp_path):
 PARENT = """
 import sys
 from pathlib import Path
-from comparisons.pool import Pool, Task, end_after_task
+from comparisons.processes.pool import Pool
+from comparisons.processes.worker import Task, end_after_task
 from tests.test_pool import leave_behind
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from comparisons import cluster
+from comparisons.processes import cluster
 from comparisons.study import dataset
 from tests import dask_cluster
 
@@ -64,7 +64,7 @@ def test_study_writes_dataset_figures_and_findings(run, file, tmp_path):
     ],
 )
 def test_a_mistake_gets_one_message(words, text, expected, run, file, tmp_path, monkeypatch):
-    monkeypatch.setattr("comparisons.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("comparisons.processes.cluster.TIMEOUT", 0.5)
     file.write_text(text, encoding="utf-8")
     code, printed, messages = run("study", file, "-o", tmp_path / "out", *words)
     assert (code, printed) == (2, "")

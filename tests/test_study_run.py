@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons import cluster
+from comparisons.processes import cluster
 from comparisons.study import dataset, design, editing, point, rendered, running
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError

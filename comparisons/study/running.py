@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
-from comparisons.pool import Pool, Task
+from comparisons.processes.pool import Pool
+from comparisons.processes.worker import Task
 from comparisons.store import Entry
 from comparisons.study import dataset, point
 from comparisons.study.point import Block
@@ -101,7 +102,7 @@ def processes(count, ready=lambda workers: tuple, limit_s=inf):
     """Return what spreads blocks over so many processes of this machine, as `run` takes it.
 
     ``ready(workers)`` returns what gets one of so many ready to render, and ``limit_s`` is as of
-    :class:`comparisons.pool.Pool`; with a ``count`` of 0 this process does all.
+    :class:`comparisons.processes.pool.Pool`; with a ``count`` of 0 this process does all.
 
     A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
     several processes keep all of them busy.
@@ -128,9 +129,10 @@ def processes(count, ready=lambda workers: tuple, limit_s=inf):
 
 
 def workers_of(cluster):
-    """Return what spreads blocks over a :class:`comparisons.cluster.Cluster`, as `run` takes it.
+    """Return what spreads blocks over a cluster, as `run` takes it.
 
-    A block that is not done has rows that say why.
+    A block that is not done has rows that say why. ``cluster`` is a
+    :class:`comparisons.processes.cluster.Cluster`.
     """
 
     def spread(blocks):

@@ -3,7 +3,8 @@
 from comparisons.case import Request, open_case
 from comparisons.check.moved import level_of_each
 from comparisons.gallery.builtin import SCENES
-from comparisons.pool import Pool, Task
+from comparisons.processes.pool import Pool
+from comparisons.processes.worker import Task
 from heuristic.errors import InputError
 from reports.ci import baselines, checks
 from reports.terminal import progress

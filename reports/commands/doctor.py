@@ -5,7 +5,7 @@ from importlib import metadata
 
 import click
 
-from comparisons.pool import Task
+from comparisons.processes.worker import Task
 from heuristic import backend
 from heuristic.errors import InstallationError
 from heuristic.version import __version__

@@ -2,7 +2,7 @@
 
 import click
 
-from comparisons.pool import Task
+from comparisons.processes.worker import Task
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import click
 
-from comparisons.pool import Task
+from comparisons.processes.worker import Task
 from reports import jobs
 from reports.run import batch, tasks
 from reports.terminal import verbosity

@@ -52,8 +52,9 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
     given = [name for name in (processes, workers, scheduler) if name is not None]
     if len(given) > 1:
         raise click.UsageError("--processes, --workers and --scheduler exclude each other.")
-    from comparisons import cluster
-    from comparisons.pool import Task, cores
+    from comparisons.processes import cluster
+    from comparisons.processes.pool import cores
+    from comparisons.processes.worker import Task
     from comparisons.study import design, running
     from reports.run import study_files
     from reports.run.output import below, held

@@ -12,7 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from comparisons.pool import Pool, Task
+from comparisons.processes.pool import Pool
+from comparisons.processes.worker import Task
 from heuristic.errors import FotismosError, InstallationError
 from reports import jobs
 from reports.run import single

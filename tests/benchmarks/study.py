@@ -12,8 +12,8 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-from comparisons import pool  # isort: skip
-from comparisons import cluster  # isort: skip
+from comparisons.processes import pool  # isort: skip
+from comparisons.processes import cluster  # isort: skip
 from comparisons.study import design, point, running  # isort: skip  it finds LLVM first
 
 import drjit as dr

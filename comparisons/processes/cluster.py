@@ -1,9 +1,9 @@
 """Spreading tasks over processes with Dask: a cluster that runs already, or one made for it.
 
-It stands in the place of a :class:`comparisons.pool.Pool`. Dask gives the tasks of a lost worker to
-another. A scheduler that is lost ends the run, and the next run goes on where it ended. Dask knows
-neither progress nor a process for each task: a limit of time does not hold here, and what a script
-changes in its worker stays changed.
+It stands in the place of a :class:`comparisons.processes.pool.Pool`. Dask gives the tasks of a lost
+worker to another. A scheduler that is lost ends the run, and the next run goes on where it ended.
+Dask knows neither progress nor a process for each task: a limit of time does not hold here, and
+what a script changes in its worker stays changed.
 """
 
 import logging
@@ -16,7 +16,7 @@ from itertools import count, islice
 from threading import Lock
 from typing import Any
 
-from comparisons.pool import Task
+from comparisons.processes.worker import Task
 from heuristic.errors import FotismosError, InstallationError, LostProcessError
 
 NEEDED = ("dask", "distributed")
@@ -51,7 +51,7 @@ def silent(*told: object) -> None:
 
 
 class Cluster:
-    """Does tasks on a Dask cluster, as a :class:`comparisons.pool.Pool` does in processes here.
+    """Does tasks on a Dask cluster, as a pool does in processes here.
 
     Parameters
     ----------

@@ -1,0 +1,144 @@
+"""Processes that work is given to, so that a task which kills its process takes no other along.
+
+A process does task after task, so that its start-up is paid once; a new one takes the place of one
+that died, or that ran code of a user's (:func:`comparisons.processes.worker.end_after_task`).
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from itertools import islice
+from math import inf
+from multiprocessing import connection
+from time import monotonic
+from typing import Any
+
+from comparisons.processes.worker import GRACE_S, Task, Worker
+
+LOOK_S = 1.0
+"""Seconds between looks at whether a process lives: what it forked may hold its pipe open."""
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Pool:
+    """Does tasks in processes of their own; a context that ends the processes.
+
+    Parameters
+    ----------
+    count
+        Processes at the same time, at most. With 0 the tasks are done in this process, one after
+        another and without a limit.
+    prepare
+        Called once in each process, before its first task.
+    limit_s
+        Seconds that a task may take without a sign of progress, start-up included.
+    """
+
+    def __init__(
+        self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
+    ) -> None:
+        self._count, self._prepare, self._limit_s = count, prepare, limit_s
+        self._idle: list[Worker] = []
+        self._busy: list[Worker] = []
+        self._given_again: list[Task] = []
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def start(self) -> None:
+        """Start the processes now, so that they get ready while this one does other things."""
+        while len(self._idle) + len(self._busy) < self._count:
+            self._idle.append(Worker(self._prepare))
+
+    def do(self, task: Task) -> Any:
+        """Do one task, and return what it returned, or raise what it raised."""
+        ((_, outcome),) = self.each([task])
+        return outcome.result()
+
+    def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
+        """Do tasks; yields each as it is finished, with its outcome.
+
+        The outcome returns what the function returned, or raises the `FotismosError` that it
+        raised. In a process apart it raises a `LostProcessError` for any other exception, for a
+        process that ended, and when the time is over.
+        """
+        if self._count == 0:
+            self._prepare()
+            for task in tasks:
+                yield task, _done_here(task)
+            return
+        waiting = iter(tasks)
+        self._fill(waiting)
+        while self._busy:
+            finished = self._finished()
+            self._fill(waiting)  # so that no process waits for what is done with the results
+            yield from finished
+
+    def end(self) -> None:
+        """End the processes, whatever they do."""
+        workers, self._idle, self._busy = self._idle + self._busy, [], []
+        for worker in workers:
+            worker.pipe.close()
+        until = monotonic() + GRACE_S
+        for worker in workers:
+            worker.end(max(0.0, until - monotonic()))
+
+    def _fill(self, waiting: Iterator[Task]) -> None:
+        """Give tasks to idle and new processes."""
+        for worker in self._idle:
+            if not worker.process.is_alive():
+                worker.end()
+        self._idle = [worker for worker in self._idle if not worker.is_spent]
+        for task in islice(waiting, self._count - len(self._busy)):
+            self._give(task)
+
+    def _give(self, task: Task) -> None:
+        worker = self._idle.pop() if self._idle else Worker(self._prepare)
+        self._busy.append(worker)
+        worker.give(task, self._limit_s)
+
+    def _finished(self) -> list[tuple[Task, Future[Any]]]:
+        """Wait for messages, or the end of somebody's time; return the tasks that are over."""
+        first = min(worker.deadline for worker in self._busy)
+        ready = connection.wait(
+            [worker.pipe for worker in self._busy],
+            max(0.0, min(LOOK_S, first - monotonic())),
+        )
+        for worker in self._busy:
+            if worker.pipe in ready:
+                worker.receive(self._limit_s)
+            elif not worker.process.is_alive():
+                worker.gone()
+            elif worker.deadline <= monotonic():
+                worker.lose(f"it took {self._limit_s:g} s without any progress, and was ended.")
+        over = [worker for worker in self._busy if worker.outcome.done()]
+        self._busy = [worker for worker in self._busy if worker not in over]
+        for worker in [worker for worker in over if worker.was_killed]:
+            if not any(worker.task is task for task in self._given_again):
+                self._given_again.append(worker.task)
+                over.remove(worker)
+                self._give(worker.task)
+        for worker in over:
+            if worker.is_spent:
+                worker.end()
+            else:
+                self._idle.append(worker)
+        return [(worker.task, worker.outcome) for worker in over]
+
+
+def _done_here(task: Task) -> Future[Any]:
+    outcome: Future[Any] = Future()
+    try:
+        outcome.set_result(task.function(*task.arguments, *filter(None, [task.progress])))
+    except Exception as error:
+        outcome.set_exception(error)
+    return outcome
