@@ -212,6 +212,7 @@ def test_an_empty_picture_is_taken_where_it_is_asked_for(rgb, tmp_path):
 
 # -- Files -----------------------------------------------------------------------------------------
 
+CORPUS = Path(__file__).parent / "corpus"
 POINTS = np.array([[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], "<f4")
 CORNERS = np.array([[0, 1, 3], [0, 2, 1], [0, 3, 2], [1, 2, 3]], "<i4")
 
@@ -224,6 +225,15 @@ def ply(points=POINTS, corners=CORNERS, vertices=None):
     return "\n".join(head).encode() + points.tobytes() + faces
 
 
+def ply_in_words(corners=CORNERS):
+    head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {len(POINTS)}"]
+    head += [f"property float {axis}" for axis in "xyz"] + [f"element face {len(corners)}"]
+    head += ["property list uchar int vertex_indices", "end_header"]
+    lines = [" ".join(map(str, point)) for point in POINTS.tolist()]
+    lines += [" ".join(map(str, (3, *face))) for face in corners.tolist()]
+    return "\n".join([*head, *lines, ""]).encode()
+
+
 def with_index(index):
     corners = CORNERS.copy()
     corners[1, 1] = index
@@ -234,6 +244,8 @@ MESHES = {
     "an index that is not there": (ply(corners=with_index(9)), "names vertex 9, and there are 4"),
     "an index far beyond memory": (ply(corners=with_index(10**8)), "names vertex 100000000"),
     "positions that are nowhere": (ply(np.where(POINTS > 0, POINTS, np.nan)), "invalid vertex"),
+    "an index below 0": (ply(corners=with_index(-1)), "face 1 names a vertex below 0"),
+    "words with an index below 0": (ply_in_words(with_index(-1)), "face 1 names a vertex below 0"),
     "a cut": (ply()[:-9], "read"),
     "nothing": (b"", "mesh.ply"),
     "noise": (np.random.default_rng(0).bytes(500), "mesh.ply"),
@@ -250,10 +262,22 @@ def test_a_damaged_mesh_is_named(rgb, tmp_path, content, message):
     assert "mesh.ply" in str(refusal.value)
 
 
-def test_a_sound_mesh_is_compared(rgb, tmp_path):
-    (tmp_path / "mesh.ply").write_bytes(ply())
+@pytest.mark.parametrize("content", [ply(), ply_in_words()], ids=["numbers", "words"])
+def test_a_sound_mesh_is_compared(rgb, tmp_path, content):
+    (tmp_path / "mesh.ply").write_bytes(content)
     shape = '<shape type="ply"><string name="filename" value="mesh.ply"/></shape>'
     assert compared(tmp_path, SCENE.replace(END, shape + END)).record.pixels.counted
+
+
+def test_a_measured_material_is_refused_wherever_it_is_cut(rgb, corpus):
+    path, scene = corpus / "measured.bsdf", (CORPUS / "bsdf-measured.xml").read_text()
+    whole = path.read_bytes()
+    assert compared(corpus, scene).record.pixels.counted
+    for size in (0, 5, 14, 30, 150, *range(200, len(whole), 97), len(whole) - 1):
+        path.write_bytes(whole[:size])
+        with pytest.raises(InputError, match="measured"):
+            compared(corpus, scene)
+    path.write_bytes(whole)
 
 
 READERS = {

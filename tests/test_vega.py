@@ -5,6 +5,9 @@ import re
 import subprocess
 import sys
 
+import pytest
+
+from heuristic.errors import OutputError
 from reports.charts import theme, vega
 from reports.page import page
 from tests import records
@@ -119,3 +122,16 @@ def test_the_library_is_made_once_for_all_runs(tmp_path, monkeypatch):
     assert len(calls) == 2
     (tmp_path / "file").write_text("")
     assert bundle(tmp_path / "file")  # where nothing can be kept
+
+
+class PanicException(BaseException):
+    """What a library in Rust raises when it cannot go on."""
+
+
+def test_a_panic_of_the_library_is_one_message(monkeypatch):
+    def panic(spec):
+        raise PanicException("Too many open files")
+
+    monkeypatch.setattr("vl_convert.vegalite_to_svg", panic)
+    with pytest.raises(OutputError, match="cannot be drawn: Too many open files"):
+        vega.figure("title", {"mark": "point"})

@@ -41,19 +41,34 @@ def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
 
     Its text may come from users' files: it is escaped in the picture, and is data in the page.
     """
-    import vl_convert
-
     spec = theme.themed(spec, theme.PAGE)
-    return Figure(title, note, spec, _inline(vl_convert.vegalite_to_svg(spec)))
+    return Figure(title, note, spec, _inline(_made("vegalite_to_svg", spec)))
 
 
 def paper(spec: Mapping[str, Any], kind: str = "svg") -> bytes:
     """Return the file of a specification for print, as ``svg`` or ``pdf``."""
+    made = _made(f"vegalite_to_{kind}", theme.themed(spec, theme.PAPER))
+    return made.encode() if isinstance(made, str) else made
+
+
+def _made(function: str, argument: Mapping[str, Any] | str) -> Any:
+    """Return what a function of vl_convert makes.
+
+    Raises
+    ------
+    OutputError
+        When it has no files or memory for it; it panics then, which is no usual exception.
+    """
     import vl_convert
 
-    convert = {"svg": vl_convert.vegalite_to_svg, "pdf": vl_convert.vegalite_to_pdf}[kind]
-    made = convert(theme.themed(spec, theme.PAPER))
-    return made.encode() if isinstance(made, str) else made
+    try:
+        return getattr(vl_convert, function)(argument)
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise OutputError(
+            f"the charts cannot be drawn: {error}. Allow more open files (ulimit -n) or memory."
+        ) from error
 
 
 def specification(chart: altair.TopLevelMixin) -> dict[str, Any]:
@@ -85,9 +100,7 @@ def bundle() -> str:
 
 @lru_cache(maxsize=1)
 def _bundled() -> str:
-    import vl_convert
-
-    return vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+    return _made("javascript_bundle", "window.vegaEmbed = vegaEmbed;")
 
 
 def _cache() -> Path:

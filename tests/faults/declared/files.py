@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from threading import Lock
 
 from tests.faults.fault import RESULTS, Fault, compare, written
 from tests.small_scene import SCENE
@@ -86,6 +87,10 @@ OBJECTS = {
 }
 
 
+_one_at_a_time = Lock()
+"""Faults are tried in several threads, and the first writes the corpus."""
+
+
 @cache
 def _whole() -> Path:
     """Return a folder with the corpus, and all files that it reads."""
@@ -102,7 +107,8 @@ def _whole() -> Path:
 
 def _damaged(file: str, scene: str, damage):
     def prepare(folder: Path) -> None:
-        shutil.copy(_whole() / file, folder / file)
+        with _one_at_a_time:
+            shutil.copy(_whole() / file, folder / file)
         shutil.copy(CORPUS / f"{scene}.xml", folder / "a.xml")
         damage(folder / file)
 

@@ -1,0 +1,133 @@
+"""Files that Mitsuba reads in silence though something of them is lost.
+
+A tensor file, as of `measured` materials, says where each of its fields lies: magic ``tensor_file``
+and a null byte, a version of two bytes, the number of fields (uint32), and for each field the
+length of its name (uint16), the name, the number of axes (uint16), the type (uint8), the offset
+(uint64) and the lengths of its axes (uint64). Mitsuba does not look whether the file goes as far.
+
+A PLY file may have negative numbers in faces, which Mitsuba takes for 0.
+"""
+
+import os
+import struct
+from math import prod
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from heuristic.errors import InputError
+from reference.scene.graph import Graph
+
+MAGIC = b"tensor_file\0"
+
+BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 8, 8: 8, 9: 2, 10: 4, 11: 8}
+"""Of a number, by its type: integers of 8 to 64 bits, without sign and with, and floats."""
+
+
+TYPES = {
+    b"char": "i1", b"uchar": "u1", b"short": "i2", b"ushort": "u2", b"int": "i4", b"uint": "u4",
+    b"float": "f4", b"double": "f8", b"int8": "i1", b"uint8": "u1", b"int16": "i2",
+    b"uint16": "u2", b"int32": "i4", b"uint32": "u4", b"float32": "f4", b"float64": "f8",
+}  # fmt: skip
+"""Numbers in PLY files, as NumPy names them."""
+
+
+def check(graph: Graph) -> None:
+    """Refuse files of which Mitsuba would not notice that something is lost.
+
+    Raises
+    ------
+    InputError
+        Naming the element, its file, and what is wrong with it.
+    """
+    for index in graph.nodes_in_use():
+        plugin = graph.plugin(index)
+        look = {"measured": _lost_of_tensor, "ply": _lost_of_ply}.get(plugin)
+        path = graph.file(index) if look else None
+        if path is not None and (fault := look(path)):
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: {path}: {fault} Write the file again."
+            )
+
+
+def _lost_of_tensor(path: Path) -> str:
+    """Return what is lost of a tensor file; nothing of one that Mitsuba refuses by itself."""
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            return ""
+        try:
+            _, count = _unpacked(file, "<HI")
+            for _ in range(count):
+                (length,) = _unpacked(file, "<H")
+                name = file.read(length).decode("ascii", "replace")
+                axes, kind, offset = _unpacked(file, "<HBQ")
+                shape = _unpacked(file, f"<{axes}Q")
+                end = offset + BYTES.get(kind, 0) * prod(shape)
+                if end > path.stat().st_size:
+                    return (
+                        f"the field {name} ends at byte {end}, and the file has"
+                        f" {path.stat().st_size}."
+                    )
+        except struct.error:
+            return "the file ends within its table of contents."
+    return ""
+
+
+def _unpacked(file: BinaryIO, form: str) -> tuple:
+    return struct.unpack(form, file.read(struct.calcsize(form)))
+
+
+def _lost_of_ply(path: Path) -> str:
+    """Return which face of a PLY file names a vertex below 0, if its faces are lists alone."""
+    with path.open("rb") as file:
+        form, elements = _head_of_ply(file)
+        for name, count, properties in elements:
+            if name == b"face":
+                are_lists = len(properties) == 1 and properties[0][:1] == [b"list"]
+                found = _negative(file, form, count, properties[0]) if are_lists else None
+                return "" if found is None else f"face {found} names a vertex below 0."
+            if form == b"ascii":
+                for _ in range(count):
+                    file.readline()
+            elif any(words[:1] == [b"list"] or words[0] not in TYPES for words in properties):
+                return ""
+            else:
+                size = sum(np.dtype(TYPES[words[0]]).itemsize for words in properties)
+                file.seek(count * size, os.SEEK_CUR)
+    return ""
+
+
+def _head_of_ply(file: BinaryIO) -> tuple[bytes, list[tuple[bytes, int, list[list[bytes]]]]]:
+    """Return the format, and name, number and properties of each element."""
+    form, elements = b"", []
+    for line in file:
+        words = line.split()
+        if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
+            elements.append((words[1], int(words[2]), []))
+        elif words[:1] == [b"property"] and len(words) > 2 and elements:
+            elements[-1][2].append(words[1:])
+        elif words[:1] == [b"format"] and len(words) > 1:
+            form = words[1]
+        elif words == [b"end_header"]:
+            return form, elements
+    return b"", []
+
+
+def _negative(file: BinaryIO, form: bytes, count: int, words: list[bytes]) -> int | None:
+    """Return the first of some faces that has a negative number, None where none has."""
+    if form == b"ascii":
+        return next((i for i in range(count) if b"-" in file.readline()), None)
+    order = {b"binary_little_endian": "<", b"binary_big_endian": ">"}.get(form)
+    if order is None or len(words) < 3 or not {*words[1:3]} <= TYPES.keys():
+        return None
+    length, number = (np.dtype(order + TYPES[word]) for word in words[1:3])
+    if number.kind != "i":
+        return None
+    content = np.frombuffer(file.read(), np.uint8)
+    face = np.dtype([("length", length), ("corners", number, (3,))])
+    triangles = content[: len(content) // face.itemsize * face.itemsize].view(face)[:count]
+    # Lists of other lengths end what is known of where the next one begins.
+    known = np.cumprod(triangles["length"] == 3, dtype=bool)
+    bad = np.flatnonzero(known & (triangles["corners"] < 0).any(axis=1))
+    return int(bad[0]) if len(bad) else None
