@@ -58,6 +58,11 @@ def quiet():
         yield
 
 
+@pytest.mark.guarantee(
+    "means",
+    "Colour differences agree with colour-science to 1e-4, for random, near, dark, very "
+    "bright, out-of-gamut and hostile colours.",
+)
 @pytest.mark.parametrize("viewing", VIEWINGS, ids=["usual", "bright", "dim"])
 @pytest.mark.parametrize("name", list(cases()))
 @pytest.mark.parametrize("metric", list(DEFINED))

@@ -13,8 +13,8 @@ ELSEWHERE = ("hard", "fit", "study", "check")
 """Folders of comparisons that comparing two images has no need of."""
 
 MOST = 150
-"""Modules and packages of ours; 151 when each command imported all others."""
-"""Modules and packages of ours; 151 when each command imported all others."""
+"""Modules and packages of ours."""
+"""Modules and packages of ours."""
 
 COMPARE = """
 import sys

@@ -177,6 +177,10 @@ def check_mean(samples, truth, other=0.0):
     return error
 
 
+@pytest.mark.guarantee(
+    "reference",
+    "Lights that are picked in proportion to what they give have the mean of all of them.",
+)
 def test_picked_lights_have_the_mean_of_all(rgb):
     made = mi.load_dict(floor(**lights(point, 150), **lights(spot, 100), **lights(directional, 50)))
     check_mean(radiance(made, REPEATS, light_samples=8), radiance(made))

@@ -131,6 +131,10 @@ def die_once(path):
     return "done"
 
 
+@pytest.mark.guarantee(
+    "runs",
+    "A process that is killed loses nothing: another one does its task.",
+)
 def test_a_process_that_somebody_kills_loses_nothing(tmp_path):
     with Pool(2) as pool:
         tasks = [Task("equal", die_once, (tmp_path / str(i // 2),)) for i in range(6)]
