@@ -41,12 +41,12 @@ alpha = [0.1, 0.2, 0.4]
 light_angle = { from = 0, to = 60, steps = 6 }
 """
 REPORT = """
-import heuristic
-from comparisons.hard import collection
+if __name__ != "__main__":  # in the process that renders
+    import heuristic
+    from comparisons.hard import collection
 
-collection.CASES = collection.CASES[::20]
-
-if __name__ == "__main__":
+    collection.CASES = collection.CASES[::20]
+else:
     from comparisons.gallery import builtin
     for name in set(builtin.SCENES) - {"fig-8-9", "lambert-sphere"}:
         del builtin.SCENES[name]
