@@ -6,7 +6,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError
 from reference.pairing import bsdfs, lights
-from reference.scene import allowed, cut_short, reading, vertices
+from reference.scene import allowed, damaged, reading
 from reference.scene.graph import Reference, properties
 
 FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
@@ -61,8 +61,7 @@ def prepare(graph, resolution, sensor=0):
     lights.check(graph)
     allowed.check(graph)
     reading.require_files(graph)
-    cut_short.check(graph)
-    vertices.check(graph)
+    damaged.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")

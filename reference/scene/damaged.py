@@ -1,19 +1,23 @@
-"""Files that Mitsuba reads in silence though something of them is lost.
+"""Files that Mitsuba reads in silence though something in them is wrong.
+
+Vertex numbers of PLY and serialized meshes it takes as they are: it reads whatever lies beyond the
+mesh in memory, or the process ends there, and takes numbers below 0 for 0. OBJ files it checks by
+itself.
 
 A tensor file, as of `measured` materials, says where each of its fields lies: magic ``tensor_file``
 and a null byte, a version of two bytes, the number of fields (uint32), and for each field the
 length of its name (uint16), the name, the number of axes (uint16), the type (uint8), the offset
 (uint64) and the lengths of its axes (uint64). Mitsuba does not look whether the file goes as far.
-
-A PLY file may have negative numbers in faces, which Mitsuba takes for 0.
 """
 
 import os
 import struct
+from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
 from typing import BinaryIO
 
+import mitsuba as mi
 import numpy as np
 
 from heuristic.errors import InputError
@@ -34,7 +38,7 @@ TYPES = {
 
 
 def check(graph: Graph) -> None:
-    """Refuse files of which Mitsuba would not notice that something is lost.
+    """Refuse meshes and tables of which something is lost, or whose faces or vertices are nowhere.
 
     Raises
     ------
@@ -42,18 +46,51 @@ def check(graph: Graph) -> None:
         Naming the element, its file, and what is wrong with it.
     """
     for index in graph.nodes_in_use():
-        plugin = graph.plugin(index)
-        look = {"measured": _lost_of_tensor, "ply": _lost_of_ply}.get(plugin)
-        path = graph.file(index) if look else None
-        if path is not None and (fault := look(path)):
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: {path}: {fault} Write the file again."
-            )
+        faults = FAULTS.get(graph.plugin(index), ())
+        path = graph.file(index) if faults else None
+        if path is None:
+            continue
+        state = path.stat()
+        stamp = state.st_mtime_ns, state.st_size, mi.variant()
+        for fault_of in faults:
+            number = graph.props(index).get("shape_index", 0)
+            if fault := fault_of(str(path), number, stamp):
+                raise InputError(
+                    f"{graph.name}: {graph.label(index)}: {path}: {fault} Write the file again."
+                )
 
 
-def _lost_of_tensor(path: Path) -> str:
+@lru_cache(maxsize=1024)
+def _fault_of_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
+    """Return what is wrong with a mesh; nothing for one that Mitsuba refuses by itself.
+
+    ``stamp`` tells one content of the file from another.
+    """
+    # With face normals nothing is computed at vertices, which may not be there.
+    description = {"type": plugin, "filename": path, "face_normals": True}
+    if plugin == "serialized":
+        description["shape_index"] = number
+    try:
+        mesh = mi.load_dict(description)
+    except Exception:  # whatever it is, the scene's own attempt raises it again
+        return ""
+    faces, count = np.array(mesh.faces_buffer()), mesh.vertex_count()
+    if len(faces) and faces.max() >= count:
+        return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
+    lost = ~np.isfinite(np.array(mesh.vertex_positions_buffer()).reshape(-1, 3)).all(axis=1)
+    if lost.any():
+        return (
+            f"the position of vertex {lost.argmax()} is not finite, and that of"
+            f" {np.count_nonzero(lost)} vertices in all."
+        )
+    return ""
+
+
+@lru_cache(maxsize=1024)
+def _fault_of_tensor(path: str, number: int, stamp: tuple) -> str:
     """Return what is lost of a tensor file; nothing of one that Mitsuba refuses by itself."""
-    with path.open("rb") as file:
+    size = stamp[1]
+    with Path(path).open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             return ""
         try:
@@ -64,11 +101,8 @@ def _lost_of_tensor(path: Path) -> str:
                 axes, kind, offset = _unpacked(file, "<HBQ")
                 shape = _unpacked(file, f"<{axes}Q")
                 end = offset + BYTES.get(kind, 0) * prod(shape)
-                if end > path.stat().st_size:
-                    return (
-                        f"the field {name} ends at byte {end}, and the file has"
-                        f" {path.stat().st_size}."
-                    )
+                if end > size:
+                    return f"the field {name} ends at byte {end}, and the file has {size}."
         except struct.error:
             return "the file ends within its table of contents."
     return ""
@@ -78,9 +112,10 @@ def _unpacked(file: BinaryIO, form: str) -> tuple:
     return struct.unpack(form, file.read(struct.calcsize(form)))
 
 
-def _lost_of_ply(path: Path) -> str:
+@lru_cache(maxsize=1024)
+def _fault_of_ply(path: str, number: int, stamp: tuple) -> str:
     """Return which face of a PLY file names a vertex below 0, if its faces are lists alone."""
-    with path.open("rb") as file:
+    with Path(path).open("rb") as file:
         form, elements = _head_of_ply(file)
         for name, count, properties in elements:
             if name == b"face":
@@ -131,3 +166,12 @@ def _negative(file: BinaryIO, form: bytes, count: int, words: list[bytes]) -> in
     known = np.cumprod(triangles["length"] == 3, dtype=bool)
     bad = np.flatnonzero(known & (triangles["corners"] < 0).any(axis=1))
     return int(bad[0]) if len(bad) else None
+
+
+FAULTS = {
+    "measured": (_fault_of_tensor,),
+    "ply": (_fault_of_ply, partial(_fault_of_mesh, "ply")),
+    "serialized": (partial(_fault_of_mesh, "serialized"),),
+}
+"""What looks for faults in the files of plugins: their path, number of the mesh, and a stamp that
+tells one content of the file from another; it returns what is wrong, or nothing."""
