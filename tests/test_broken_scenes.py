@@ -225,9 +225,9 @@ def ply(points=POINTS, corners=CORNERS, vertices=None):
     return "\n".join(head).encode() + points.tobytes() + faces
 
 
-def ply_in_words(corners=CORNERS):
-    head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {len(POINTS)}"]
-    head += [f"property float {axis}" for axis in "xyz"] + [f"element face {len(corners)}"]
+def ply_in_words(corners=CORNERS, vertices=len(POINTS), faces=len(CORNERS)):
+    head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {vertices}"]
+    head += [f"property float {axis}" for axis in "xyz"] + [f"element face {faces}"]
     head += ["property list uchar int vertex_indices", "end_header"]
     lines = [" ".join(map(str, point)) for point in POINTS.tolist()]
     lines += [" ".join(map(str, (3, *face))) for face in corners.tolist()]
@@ -246,6 +246,8 @@ MESHES = {
     "positions that are nowhere": (ply(np.where(POINTS > 0, POINTS, np.nan)), "invalid vertex"),
     "an index below 0": (ply(corners=with_index(-1)), "face 1 names a vertex below 0"),
     "words with an index below 0": (ply_in_words(with_index(-1)), "face 1 names a vertex below 0"),
+    "words that promise a trillion vertices": (ply_in_words(vertices=10**12), "mesh.ply"),
+    "words that promise a trillion faces": (ply_in_words(faces=10**12), "mesh.ply"),
     "a cut": (ply()[:-9], "read"),
     "nothing": (b"", "mesh.ply"),
     "noise": (np.random.default_rng(0).bytes(500), "mesh.ply"),

@@ -123,8 +123,9 @@ def _fault_of_ply(path: str, number: int, stamp: tuple) -> str:
                 found = _negative(file, form, count, properties[0]) if are_lists else None
                 return "" if found is None else f"face {found} names a vertex below 0."
             if form == b"ascii":
-                for _ in range(count):
-                    file.readline()
+                # A file may promise more lines than it has.
+                if any(not file.readline() for _ in range(count)):
+                    return ""
             elif any(words[:1] == [b"list"] or words[0] not in TYPES for words in properties):
                 return ""
             else:
@@ -152,7 +153,8 @@ def _head_of_ply(file: BinaryIO) -> tuple[bytes, list[tuple[bytes, int, list[lis
 def _negative(file: BinaryIO, form: bytes, count: int, words: list[bytes]) -> int | None:
     """Return the first of some faces that has a negative number, None where none has."""
     if form == b"ascii":
-        return next((i for i in range(count) if b"-" in file.readline()), None)
+        lines = zip(range(count), file, strict=False)
+        return next((i for i, line in lines if b"-" in line), None)
     order = {b"binary_little_endian": "<", b"binary_big_endian": ">"}.get(form)
     if order is None or len(words) < 3 or not {*words[1:3]} <= TYPES.keys():
         return None

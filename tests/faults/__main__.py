@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -77,6 +78,9 @@ def main(words: list[str]) -> int:
         parser.error(f"no kind: {', '.join(sorted(unknown))}")
     faults = [(k, f) for k in chosen.kinds or KINDS for f in of_kind(k) if chosen.only in f.name]
     faults = faults[:: chosen.every]
+    # A shell lets what it starts in the background ignore them, and so would all that is tried.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if chosen.list:
         print(*(f"{kind}: {fault.name}" for kind, fault in faults), sep="\n")
         print(len(faults))
