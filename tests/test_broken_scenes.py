@@ -225,7 +225,7 @@ def ply(points=POINTS, corners=CORNERS, vertices=None):
     return "\n".join(head).encode() + points.tobytes() + faces
 
 
-def ply_in_words(corners=CORNERS, vertices=len(POINTS), faces=len(CORNERS)):
+def ply_in_words(corners=CORNERS, vertices=4, faces=4):
     head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {vertices}"]
     head += [f"property float {axis}" for axis in "xyz"] + [f"element face {faces}"]
     head += ["property list uchar int vertex_indices", "end_header"]
