@@ -13,7 +13,7 @@ ELSEWHERE = ("hard", "fit", "study", "check")
 """Folders of comparisons that comparing two images has no need of."""
 
 MOST = 152
-"""Modules and packages of ours."""
+"""The project's modules and packages."""
 
 COMPARE = """
 import sys

@@ -23,7 +23,7 @@ NEEDED = ("dask", "distributed")
 """The extra `cluster` of pyproject.toml."""
 
 ALLOWED_FAILURES = 30
-"""Workers that may die with a task before the task itself is blamed, in a cluster of ours."""
+"""Workers that may die with a task before the task itself is blamed, in a cluster that this process made."""
 
 AHEAD = 4
 """Tasks at hand for each worker: enough to keep it busy, few enough to lose little."""
@@ -70,7 +70,7 @@ class Cluster:
         """Do nothing: workers run already."""
 
     def end(self) -> None:
-        """Let go of all tasks."""
+        """Release all tasks."""
         self._client.close()
 
     def do(self, task: Task) -> Any:
