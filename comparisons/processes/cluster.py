@@ -23,7 +23,7 @@ NEEDED = ("dask", "distributed")
 """The extra `cluster` of pyproject.toml."""
 
 ALLOWED_FAILURES = 30
-"""Workers that may die with a task before the task itself is blamed, in a cluster that this process made."""
+"""Workers that may die with a task before it is blamed, in a cluster that this process made."""
 
 AHEAD = 4
 """Tasks at hand for each worker: enough to keep it busy, few enough to lose little."""
