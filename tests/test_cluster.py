@@ -2,6 +2,8 @@
 
 import pytest
 
+from comparisons.processes import cluster
+from comparisons.processes.worker import Task
 from tests import dask_cluster
 from tests.interruptions import results
 from tests.small_baselines import change
@@ -28,6 +30,14 @@ def test_a_batch_is_the_same_on_a_cluster(run, apart, address, tmp_path, monkeyp
     assert told[0][0] == 2
     assert "c.xml" in told[0][2]
     assert results(tmp_path / "here") == results(tmp_path / "there")
+
+
+def test_tasks_of_one_name_are_apart_whoever_asks(address):
+    with cluster.connected(address) as one, cluster.connected(address) as other:
+        first = one.each([Task("sum", divmod, (7, 2)), Task("sum", divmod, (9, 2))])
+        assert next(first)[1].result() in ((3, 1), (4, 1))
+        assert other.do(Task("sum", divmod, (50, 7))) == (7, 1)
+        assert next(first)[1].result() in ((3, 1), (4, 1))
 
 
 def test_baselines_are_checked_on_a_cluster(run, apart, address, baselines_folder, tmp_path):

@@ -1,8 +1,8 @@
 """Colour spaces and differences as Dr.Jit formulas in double precision.
 
 The definitions are those of colour-science, which the tests hold every function to, to 1e-4 of a
-colour difference. NumPy took as long for them as rendering takes; compiled and on all cores they
-cost a few nanoseconds a pixel. Functions take and return colours as ``Colours``, any number.
+colour difference. NumPy took as long for them as rendering takes; these are compiled, and run on
+all cores. Functions take and return any number of colours.
 
 Sources: CIE 15:2018 (L*a*b*), ITU-R BT.2100-2 (ICtCp), Li et al., Color Res. Appl. 42(6), 2017
 (CAM16), Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005 (CIE DE2000).

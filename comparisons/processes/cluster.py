@@ -12,9 +12,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
-from itertools import count, islice
+from itertools import islice
 from threading import Lock
 from typing import Any
+from uuid import uuid4
 
 from comparisons.processes.worker import Task
 from heuristic.errors import FotismosError, InstallationError, LostProcessError
@@ -64,7 +65,6 @@ class Cluster:
 
     def __init__(self, client: Any, prepare: Prepare) -> None:
         self._client, self._prepare = client, prepare
-        self._numbers = count()
 
     def start(self) -> None:
         """Do nothing: workers run already."""
@@ -124,9 +124,10 @@ class Cluster:
 
     def _submitted(self, task: Task) -> tuple[Any, Task]:
         more = () if task.progress is None else (silent,)
-        key = f"{task.name}-{next(self._numbers)}"
+        # To Dask two tasks of one key are one and the same, whoever asks.
+        key = f"{task.name}-{uuid4()}"
         arguments = self._prepare, task.function, task.arguments, *more
-        return self._client.submit(done, *arguments, key=key, pure=False), task
+        return self._client.submit(done, *arguments, key=key), task
 
 
 @contextmanager

@@ -46,7 +46,6 @@ class Pool:
         self._count, self._prepare, self._limit_s = count, prepare, limit_s
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
-        self._given_again: list[Task] = []
 
     def __enter__(self) -> "Pool":
         return self
@@ -101,10 +100,10 @@ class Pool:
         for task in islice(waiting, self._count - len(self._busy)):
             self._give(task)
 
-    def _give(self, task: Task) -> None:
+    def _give(self, task: Task, is_second_try: bool = False) -> None:
         worker = self._idle.pop() if self._idle else Worker(self._prepare)
         self._busy.append(worker)
-        worker.give(task, self._limit_s)
+        worker.give(task, self._limit_s, is_second_try)
 
     def _finished(self) -> list[tuple[Task, Future[Any]]]:
         """Wait for messages, or the end of somebody's time; return the tasks that are over."""
@@ -122,11 +121,10 @@ class Pool:
                 worker.lose(f"it took {self._limit_s:g} s without any progress, and was ended.")
         over = [worker for worker in self._busy if worker.outcome.done()]
         self._busy = [worker for worker in self._busy if worker not in over]
-        for worker in [worker for worker in over if worker.was_killed]:
-            if not any(worker.task is task for task in self._given_again):
-                self._given_again.append(worker.task)
-                over.remove(worker)
-                self._give(worker.task)
+        killed = [worker for worker in over if worker.was_killed and not worker.is_second_try]
+        over = [worker for worker in over if worker not in killed]
+        for worker in killed:
+            self._give(worker.task, is_second_try=True)
         for worker in over:
             if worker.is_spent:
                 worker.end()

@@ -70,6 +70,7 @@ class Worker:
     outcome: Future[Any]
     deadline: float
     number: int
+    is_second_try: bool
 
     def __init__(self, prepare: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
@@ -83,8 +84,9 @@ class Worker:
         theirs.close()  # so that the end of the process is the end of the pipe
         self._send(prepare)
 
-    def give(self, task: Task, limit_s: float) -> None:
+    def give(self, task: Task, limit_s: float, is_second_try: bool = False) -> None:
         self.task, self.outcome, self.number = task, Future(), next(_numbers)
+        self.is_second_try = is_second_try
         self.deadline = monotonic() + limit_s
         self._send((self.number, task.function, task.arguments, task.progress is not None))
 

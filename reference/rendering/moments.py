@@ -109,7 +109,7 @@ class DifferenceSums(Accumulator):
         super()._step(sums, image)
 
     def state(self):
-        """Return the sums by name, as functions that make an array each, for :meth:`restore`."""
+        """Return functions that make the array of each sum, for :meth:`restore`."""
         return super().state() | {"groups": self._groups.copy}
 
     def shapes(self, size):

@@ -87,7 +87,7 @@ class Mean:
         return self._unpacked(name, self._parts[number][name])
 
     def state(self):
-        """Return the sums by name, as functions that make an array each, for :meth:`restore`."""
+        """Return functions that make the array of each sum, for :meth:`restore`."""
         sums = {name: partial(self._array, name) for name in self.SUMS}
         return {"count": lambda: np.array(self.count)} | sums
 

@@ -71,7 +71,9 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
         folder = study_files.prepare(wanted, studies / place)
         with ExitStack() as stack:
             if scheduler:
-                spread = running.workers_of(stack.enter_context(jobs.pool(0, scheduler=scheduler)))
+                # Points need no files of this machine.
+                elsewhere = cluster.connected(scheduler, jobs.Ready.among(1))
+                spread = running.workers_of(stack.enter_context(elsewhere))
             elif workers:
                 of_ours = cluster.local(workers, jobs.Ready.among(workers))
                 spread = running.workers_of(stack.enter_context(of_ours))

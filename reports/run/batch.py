@@ -42,7 +42,7 @@ def run(
     pool
         Where they are compared; it is ended.
     more
-        Does what else the page shows in the pool, counts its time, and returns it by name.
+        Does what else the page shows in the pool, counts its time, and returns it in a dictionary.
 
     Raises
     ------
