@@ -20,6 +20,7 @@ from tests.benchmarks import (
     stability,
     study,
     terms,
+    variance,
 )
 
 BENCHMARKS = {
@@ -35,6 +36,7 @@ BENCHMARKS = {
     "stability": stability.run,
     "study": study.run,
     "terms": terms.run,
+    "variance": variance.run,
 }
 
 
