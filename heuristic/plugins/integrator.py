@@ -45,7 +45,7 @@ LAYERS = 64
 """Surfaces that a camera ray passes at most: a bound for a tower of empty ones."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Known:
     """What a rendering needs to know of a scene, and the scene's parts.
 
@@ -137,6 +137,10 @@ def define():
                 prepared = self.model.prepare(scene) if self.model.prepare else None
                 self._known = _Known(parts, materials, prepared)
             return self._known
+
+        def prepare(self, scene):
+            """Make what a rendering needs to know of a scene, which the first sample does else."""
+            self.known(scene)
 
         def lights(self, scene, si, active):
             """Return the kernel's form of the scene's lights."""

@@ -1,5 +1,7 @@
 """The materials of a scene, read at what a ray hits."""
 
+from typing import ClassVar
+
 import drjit as dr
 import mitsuba as mi
 
@@ -19,6 +21,8 @@ class SceneMaterials:
         For a BSDF that is no ``phong``.
     """
 
+    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
+
     def __init__(self, scene, prune=True, form=None):
         self.prune, self.form = prune, form
         self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
@@ -29,7 +33,8 @@ class SceneMaterials:
                     " renders the heuristic half of a pair, which reference.pair makes."
                 )
         places = {_registry_index(bsdf): number for number, bsdf in enumerate(self.bsdfs)}
-        self.table = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
+        numbers = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
+        self.table = mi.UInt32(numbers)
 
     def at(self, si, active):
         """Return the materials at a surface interaction, as pairs of a material and a mask.
@@ -85,7 +90,7 @@ class SceneMaterials:
     def index(self, si, active):
         """Return the number in ``bsdfs`` of the material at a surface interaction."""
         bsdf = dr.reinterpret_array(mi.UInt32, si.bsdf())
-        return dr.gather(mi.UInt32, mi.UInt32(self.table), bsdf, active)
+        return dr.gather(mi.UInt32, self.table, bsdf, active)
 
 
 def _reader(bsdf, present, form):

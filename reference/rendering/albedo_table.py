@@ -1,5 +1,7 @@
 """Light of a constant environment without sampling: the albedo of a BSDF, tabulated."""
 
+from typing import ClassVar
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -21,6 +23,8 @@ class AlbedoTable:
     Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most. A BSDF that reflects
     on its back too does so as on its front.
     """
+
+    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
 
     def __init__(self, bsdf):
         self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)

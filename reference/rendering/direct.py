@@ -60,6 +60,14 @@ def _define():
             """An `AlbedoTable` in place of sampling the environment,
             for a scene of one BSDF that nothing hides from it; set after construction."""
 
+        def prepare(self, scene):
+            """Find the chances of lights, which the first sample does else."""
+            delta, others = _parted(scene.emitters())
+            for lights in (delta, [e for e in others if not self._is_tabulated(e)]):
+                self._choice(scene, lights)
+            if self.max_depth != 2:
+                self._choice(scene, scene.emitters(), 1)
+
         def sample(self, scene, sampler, ray, medium=None, active=True):
             delta, others = _parted(scene.emitters())
             si = self._first_surface(scene, ray, active)

@@ -55,6 +55,11 @@ class Renderer:
     label
         Name in error messages.
 
+    Attributes
+    ----------
+    replays
+        Whether passes after the first replay its kernels, without tracing anything again.
+
     Raises
     ------
     InputError
@@ -69,6 +74,7 @@ class Renderer:
         self.variant = mi.variant()
         self.times = []
         self.compilation = 0.0
+        self._replayed = dr.freeze(_rendered)
 
     def render(self, seed):
         """Render one pass and return it as a tensor (H, W, 3), noting the time.
@@ -85,12 +91,7 @@ class Renderer:
             dr.kernel_history_clear()
             begin = perf_counter()
             try:
-                image = mi.render(
-                    self.scene,
-                    integrator=self.integrator,
-                    spp=self.spp,
-                    seed=dr.opaque(mi.UInt32, seed),
-                )
+                image = self._image(dr.opaque(mi.UInt32, seed))
                 dr.eval(image)
                 dr.sync_thread()
             except RuntimeError as error:
@@ -107,6 +108,26 @@ class Renderer:
         if not dr.all(dr.isfinite(image.array)):
             require_finite(np.array(image), f"{self.label}, pass with seed {seed}")
         return image
+
+    @property
+    def replays(self):
+        """See the class."""
+        return self._replayed is not None
+
+    def _image(self, seed):
+        """Render, later passes by replaying the kernels of the first where Dr.Jit can do so.
+
+        It cannot where a plugin has arrays that it does not know of, as Mitsuba's spectral tables.
+        """
+        given = self.scene, self.integrator, self.spp, seed
+        if self._replayed is not None:
+            try:
+                if hasattr(self.integrator, "prepare"):
+                    self.integrator.prepare(self.scene)
+                return self._replayed(*given)
+            except Exception:  # whatever a plugin raises, it says better when it is traced
+                self._replayed = None
+        return _rendered(*given)
 
     def _require_room(self):
         width, height = image_size(self.scene)
@@ -155,6 +176,10 @@ def physical_integrator(plan, scene, hide_emitters):
     if plan.tabulate_environment and scene.environment() is not None:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
+
+
+def _rendered(scene, integrator, spp, seed):
+    return mi.render(scene, integrator=integrator, spp=spp, seed=seed)
 
 
 def _reason(error):

@@ -1,0 +1,82 @@
+"""Passes after the first replay its kernels: the images must be those of tracing each pass."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.case import Request, open_case
+from comparisons.compare import prepare
+from comparisons.cost.methods import Methods
+from reference.rendering.renderer import Renderer, variant
+
+SEEDS = (1, 2, 3)
+
+
+def methods(name):
+    """Return a renderer of each method of a scene's ladder."""
+    case = open_case(name, Request(resolution=(24, 16)))
+    mi.set_variant(case.variant)
+    ready = prepare(case.source, case.options)
+    found = Methods(case.source, case.options, ready)
+    return {rung.name: found.renderer(rung.method, 4) for rung in found.rungs}
+
+
+def traced(renderer, seed):
+    """Render a pass by tracing everything again."""
+    with variant(renderer.variant):
+        given = {"integrator": renderer.integrator, "spp": renderer.spp, "seed": seed}
+        image = np.array(mi.render(renderer.scene, **given))
+    return image if image.shape[2] == 3 else np.repeat(image, 3, axis=2)
+
+
+# A plain pair, lamps and glossy surfaces, many materials, an environment from a table, meshes.
+@pytest.mark.parametrize(
+    "name", ["lambert-sphere", "plastic-spheres", "cornell-box", "fig-8-9", "fig-6-14"]
+)
+def test_replayed_passes_are_traced_ones_bit_for_bit(name):
+    for rung, renderer in methods(name).items():
+        for seed in SEEDS:
+            image = np.array(renderer.render(seed))
+            assert np.array_equal(image, traced(renderer, seed)), (rung, seed)
+        assert renderer.replays, rung
+
+
+def test_where_dr_jit_cannot_replay_each_pass_is_traced():
+    renderer = methods("metameric-pair")["full plan"]  # Mitsuba's spectral tables are in the way
+    images = [np.array(renderer.render(seed)) for seed in SEEDS]
+    assert not renderer.replays
+    assert all(np.array_equal(a, traced(renderer, s)) for a, s in zip(images, SEEDS, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [("lamp.emitter.radiance.value", 0.5), ("ball.bsdf.reflectance.value", 0.1)],
+)
+def test_edits_between_passes_show(rgb, parameter, value):
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 3},
+            "sensor": {
+                "type": "perspective",
+                "to_world": mi.ScalarTransform4f().look_at([0, -4, 1], [0, 0, 0], [0, 0, 1]),
+                "film": {"type": "hdrfilm", "width": 8, "height": 8},
+            },
+            "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": 0.8}},
+            "lamp": {
+                "type": "sphere",
+                "center": [0, -2, 4],
+                "emitter": {"type": "area", "radiance": 3.0},
+            },
+        }
+    )
+    renderer = Renderer(scene, None, 4, "image")
+    before = [np.array(renderer.render(seed)) for seed in SEEDS]
+    parameters = mi.traverse(scene)
+    parameters[parameter] = value
+    parameters.update()
+    after = [np.array(renderer.render(seed)) for seed in SEEDS]
+    assert renderer.replays
+    for seed, old, new in zip(SEEDS, before, after, strict=True):
+        assert new.mean() < 0.7 * old.mean()
+        assert np.array_equal(new, traced(renderer, seed))
