@@ -6,6 +6,7 @@ Passes differ in seed alone and are independent; samples within a pass are strat
 so that every standard error here comes from the spread of passes.
 """
 
+import gc
 from contextlib import contextmanager
 from dataclasses import dataclass
 from statistics import median
@@ -124,7 +125,8 @@ class Renderer:
             try:
                 if hasattr(self.integrator, "prepare"):
                     self.integrator.prepare(self.scene)
-                return self._replayed(*given)
+                with _no_collection():
+                    return self._replayed(*given)
             except Exception:  # whatever a plugin raises, it says better when it is traced
                 self._replayed = None
         return _rendered(*given)
@@ -176,6 +178,18 @@ def physical_integrator(plan, scene, hide_emitters):
     if plan.tabulate_environment and scene.environment() is not None:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
+
+
+@contextmanager
+def _no_collection():
+    """Keep garbage: a recording, collected while another one is made, ends the process."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _rendered(scene, integrator, spp, seed):
