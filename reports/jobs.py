@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from comparisons.processes.cluster import Cluster
 
 
-def _resolution(text):
+def resolution(text):
     """Parse ``WIDTHxHEIGHT``, two positive integers."""
     width, separator, height = text.lower().partition("x")
     if not (separator and width.isdecimal() and height.isdecimal()):
@@ -129,7 +129,7 @@ def rendering_options(command):
                      help="Seed of the run; each pass hashes its own from it."),
         click.option("--spp", type=click.IntRange(min=2),
                      help="Samples per pixel, over all passes. [default: the plan's]"),
-        click.option("--resolution", type=_resolution, metavar="WxH",
+        click.option("--resolution", type=resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
         click.option("--heuristic", metavar="NAME",
                      help="Which heuristic shades: phong, blinn, or one that a package declares."

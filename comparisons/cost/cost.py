@@ -12,6 +12,7 @@ from comparisons.cost.cost_record import Converged, Cost, Pictures, Point, Rung,
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.methods import Methods
+from comparisons.cost.prediction import predict, require_shape
 from comparisons.cost.timing import Judge, measure
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
@@ -62,7 +63,15 @@ class Study:
     counted: np.ndarray
 
 
-def cost(source, options=None, effort=None, progress=None, command=""):
+def cost(
+    source,
+    options=None,
+    effort=None,
+    progress=None,
+    command="",
+    at=None,
+    is_measured=False,
+):
     """Study what accuracy costs on one scene, in the current variant.
 
     Parameters
@@ -72,6 +81,10 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         Carlo rung. Without a resolution, the film's own is reduced to :data:`WIDTH`.
     effort : Effort, optional
         How much is rendered.
+    at : tuple of int, optional
+        Width and height to predict time and error for (:mod:`comparisons.cost.prediction`).
+    is_measured
+        Whether to measure there, too.
 
     Returns
     -------
@@ -87,7 +100,10 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     options, effort = options or Options(), effort or Effort()
     progress = progress or (lambda *_: None)
     if options.resolution is None:
-        options = replace(options, resolution=reduced(source, options, WIDTH))
+        shaped = replace(options, resolution=at)
+        options = replace(options, resolution=reduced(source, shaped, WIDTH))
+    elif at is not None:
+        require_shape(options.resolution, at)
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
     ready = guarded(source, replace(options, spp=None, allow_empty=False))
@@ -104,6 +120,8 @@ def cost(source, options=None, effort=None, progress=None, command=""):
     priced = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders)
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
+    # It changes the sizes of the scenes' films, and comes last.
+    prediction = predict(methods, at, effort, options.seed, is_measured, progress) if at else None
 
     found = Cost(
         scene=source.name,
@@ -133,6 +151,7 @@ def cost(source, options=None, effort=None, progress=None, command=""):
         versions=record.versions(),
         command=command,
         guard=record.guard_record(ready.guard),
+        prediction=prediction,
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
     return Study(

@@ -16,6 +16,8 @@ from comparisons.records import (
     Positive,
     Record,
     Resolution,
+    Share,
+    Size,
     Versions,
 )
 from heuristic.interpolation import Interpolation
@@ -186,6 +188,80 @@ class Prices(Record):
     orders: int
 
 
+class Range(Record):
+    """A predicted value, and the ends of its interval."""
+
+    value: Amount
+    low: Amount
+    high: Amount
+
+
+class Seen(Record):
+    """What was measured where something was predicted: mean ΔE2000, and its spread over rounds."""
+
+    seconds: Interval
+    error: Amount
+    error_spread: Amount
+
+
+class Forecast(Record):
+    """Time of a later frame, and mean ΔE2000, that are predicted of a method and sample count."""
+
+    method: str
+    spp: Size
+    seconds: Range
+    error: Range
+    measured: Seen | None = None
+
+
+class TimeLaw(Record):
+    """A method's time, ``setup_s + pixel_s N + sample_s N s`` for ``N`` pixels of ``s`` samples.
+
+    ``scatter`` is the relative spread of what was measured about it.
+    """
+
+    method: str
+    setup_s: Amount
+    pixel_s: Amount
+    sample_s: Amount
+    scatter: Amount
+
+
+class Cheapest(Record):
+    """The method that is predicted to reach an error first; none where no one does."""
+
+    error: Positive
+    method: str | None = None
+    spp: Size | None = None
+    seconds: Range | None = None
+
+
+class Prediction(Record):
+    """What methods cost at a size, predicted from smaller ones.
+
+    Attributes
+    ----------
+    resolution
+        The size that was asked for.
+    level
+        Chance of each interval to hold what is measured later.
+    fitted
+        The sizes that were measured for it.
+    rounds
+        Timed repeats of each method, size and sample count.
+    laws, forecasts, cheapest
+        One law of time per method, forecasts over the sample counts, and the cheapest ways.
+    """
+
+    resolution: Resolution
+    level: Share
+    fitted: tuple[Resolution, ...]
+    rounds: Size
+    laws: tuple[TimeLaw, ...]
+    forecasts: tuple[Forecast, ...]
+    cheapest: tuple[Cheapest, ...]
+
+
 class Part(Record):
     """One cause of the departure.
 
@@ -249,6 +325,7 @@ class Cost(Record, kw_only=True):
     command: str
     pictures: Pictures
     guard: GuardRecord | None = None
+    prediction: Prediction | None = None
 
     def points_of(self, rung: str) -> tuple[Measured, ...]:
         """Return the points of a rung, by its name."""

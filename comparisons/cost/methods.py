@@ -41,6 +41,7 @@ class Methods:
         depths: tuple[int, ...] = DEPTHS,
     ):
         self.ready = ready
+        self.viewing = options.viewing
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
 
         self.pairs = Pairs(source, options, ready)
@@ -51,17 +52,19 @@ class Methods:
         self._asked_for = options.interpolation
         self._kernel_scene = cache(self._make_kernel_scene)
 
-    def renderer(self, method: Kernel | Physical, spp: int) -> Renderer:
-        """Return a renderer of a method, with samples per pixel of a pass."""
+    def renderer(
+        self, method: Kernel | Physical, spp: int, size: tuple[int, int] | None = None
+    ) -> Renderer:
+        """Return a renderer of a method, with samples per pixel of a pass, and a size to render."""
         if isinstance(method, Kernel):
             with variant(self.heuristic_variant):
                 scene, integrator = self._kernel_scene(method.interpolation), self._kernel(method)
-                return Renderer(scene, integrator, spp, "image of the kernel")
+                return Renderer(scene, integrator, spp, "image of the kernel", size)
         simulated = set(EFFECTS) - method.without
         plan = self.ready.plan.simulating(simulated, method.max_depth)
         scene = self.between.of(simulated)
         integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
-        return Renderer(scene, integrator, spp, "image of a rung")
+        return Renderer(scene, integrator, spp, "image of a rung", size)
 
     def forget(self) -> None:
         """Release the scenes of rungs."""

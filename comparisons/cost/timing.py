@@ -50,18 +50,19 @@ class Judge:
         self.coordinates = self.metric.coordinates(self.reference, viewing)
         self.variance = float(np.mean(reference.standard_error[counted] ** 2))
         """Mean variance of the reference, which a mean squared error holds on top of its own."""
-        self.floor = float(self._distance(reference.mean[counted] + reference.noise[counted]))
+        self.floor = self.distance(reference.mean[counted] + reference.noise[counted])
         """Mean ΔE2000 that the reference's noise alone gives."""
 
     def errors(self, image):
         """Return mean ΔE2000, and the linear MSE without the reference's share (can be < 0)."""
         image = np.asarray(image, float)[self.counted]
         mse = float(np.mean((image - self.reference) ** 2)) - self.variance
-        return float(self._distance(image)), mse
+        return self.distance(image), mse
 
-    def _distance(self, pixels):
+    def distance(self, pixels):
+        """Return the mean ΔE2000 of the counted pixels (N, 3)."""
         here = self.metric.coordinates(pixels, self.viewing)
-        return np.mean(self.metric.difference(self.coordinates, here))
+        return float(np.mean(self.metric.difference(self.coordinates, here)))
 
 
 def measure(renderers, judge, rounds, seed, progress):

@@ -65,6 +65,16 @@ def image_size(scene):
     return tuple(int(side) for side in scene.sensors()[0].film().crop_size())
 
 
+def resize(scene, size):
+    """Give the film of a scene's first sensor a width and height of the same shape."""
+    if image_size(scene) != tuple(size):
+        parameters = mi.traverse(scene.sensors()[0])
+        for side in ("film.size", "film.crop_size"):
+            parameters[side] = list(size)
+        parameters["film.crop_offset"] = [0, 0]
+        parameters.update()
+
+
 def gbuffer(scene, width=GRID, height=GRID, sensor=0):
     """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)

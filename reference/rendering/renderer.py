@@ -19,7 +19,7 @@ import numpy as np
 from heuristic.errors import InputError, NonFiniteError
 from reference.rendering import direct
 from reference.rendering.albedo_table import AlbedoTable
-from reference.rendering.gbuffer import image_size
+from reference.rendering.gbuffer import image_size, resize
 from reference.scene.preparation import PATHS
 
 LARGEST_PASS = 2**26
@@ -55,6 +55,8 @@ class Renderer:
         Samples per pixel and pass.
     label
         Name in error messages.
+    size
+        Width and height to render in place of the film's, of the same shape; None leaves them.
 
     Attributes
     ----------
@@ -67,11 +69,12 @@ class Renderer:
         For more samples than :data:`LARGEST_PASS` in a pass, when it is rendered.
     """
 
-    def __init__(self, scene, integrator, spp, label):
+    def __init__(self, scene, integrator, spp, label, size=None):
         self.scene = scene
         self.integrator = integrator or scene.integrator()
         self.spp = spp
         self.label = label
+        self.size = size
         self.variant = mi.variant()
         self.times = []
         self.compilation = 0.0
@@ -87,6 +90,8 @@ class Renderer:
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
         """
+        if self.size:
+            resize(self.scene, self.size)
         self._require_room()
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()

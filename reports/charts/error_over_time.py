@@ -53,16 +53,16 @@ def plot(record, ground="transparent"):
     families = {rung.name: rung.family for rung in record.rungs}
     rows = [_row(point, families[point.rung]) for point in record.points]
     floor = record.reference.noise_floor
-    times = _domain([row[bound] for row in rows for bound in ("low", "high")])
+    times = domain([row[bound] for row in rows for bound in ("low", "high")])
     told = [row["error"] for row in rows] + ([floor] if floor > 0 else [])
-    errors = _domain([max(error, LEAST_ERROR) for error in told])
+    errors = domain([max(error, LEAST_ERROR) for error in told])
     for row in rows:
         row["shown"] = max(row["error"], errors[0])
     layers = [
         *_slope(rows, times, errors),
         *_floor(floor, times, errors),
         *_points(rows, times, errors, ground),
-        *_names(rows, times, errors),
+        *names_beside(rows, times, errors),
     ]
     # Names may be wider in the reader's font than where the picture is drawn.
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
@@ -93,7 +93,7 @@ def _row(point, family):
     }
 
 
-def _domain(values):
+def domain(values):
     """Return the ends of a logarithmic axis: room on both sides of the values."""
     low, high = min(values), max(values)
     room = 10 ** max(0.06 * log10(high / low), 0.05)
@@ -113,7 +113,8 @@ def _logarithmic(channel, domain, title):
     return scaled.axis(format="~g", tickCount=6).title(title)
 
 
-def _chart(rows, times, errors):
+def charted(rows, times, errors):
+    """Return a chart of rows over the two axes, without marks yet."""
     data = alt.Data(values=rows)
     return alt.Chart(data).encode(x=_time("time", times), y=_error("shown", errors))
 
@@ -126,7 +127,7 @@ def _points(rows, times, errors, ground):
         for channel, styles in ((alt.Color, colours), (alt.Shape, shapes))
     )
     titles = {"time": "time (ms)", "error": "mean ΔE2000"}
-    chart = _chart(rows, times, errors).encode(color=colour)
+    chart = charted(rows, times, errors).encode(color=colour)
     return [
         chart.mark_line(strokeWidth=1.2, opacity=0.75).encode(detail="rung:N"),
         chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(x=_time("low", times), x2="high"),
@@ -161,7 +162,7 @@ def _guide(ends, times, errors, dash):
     """Return a faint line from border to border through errors at both ends of the time axis."""
     rows = [{"time": time, "shown": end} for time, end in zip(times, ends, strict=True)]
     style = {"color": FAINT, "strokeWidth": 1.2, "strokeDash": dash, "clip": True, "aria": False}
-    return _chart(rows, times, errors).mark_line(**style)
+    return charted(rows, times, errors).mark_line(**style)
 
 
 def _sampled(rungs):
@@ -169,7 +170,7 @@ def _sampled(rungs):
     return {rung for rung in rungs if rungs.count(rung) > 1}
 
 
-def _names(rows, times, errors):
+def names_beside(rows, times, errors):
     """Return the rungs' names beside the plot, apart from each other, with lines to their points.
 
     Each name belongs to its rung's slowest point.
@@ -183,7 +184,7 @@ def _names(rows, times, errors):
         row | {"beside": high * (low / high) ** (place / HEIGHT)}
         for row, place in zip(ordered, places, strict=True)
     ]
-    chart, beside = _chart(named, times, errors), _error("beside", errors)
+    chart, beside = charted(named, times, errors), _error("beside", errors)
     leading = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
     return [
         chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),

@@ -3,6 +3,7 @@
 import click
 
 from comparisons.processes.worker import Task
+from heuristic.errors import InputError
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity
@@ -18,8 +19,12 @@ from reports.terminal import verbosity
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
+@click.option(
+    "--at", type=jobs.resolution, metavar="WxH", help="Predict time and error at this size."
+)
+@click.option("--measure", "is_measured", is_flag=True, help="With --at, measure there, too.")
 @jobs.json_option
-def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
+def cost(scene, output, figures, rounds, at, is_measured, as_json, timeout, **rendering):
     """Say what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
@@ -32,7 +37,10 @@ def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
     Examples:
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
+      fotismos cost cornell-box --at 1920x1080
     """  # noqa: D301 click reads the \b as: keep these lines
+    if is_measured and at is None:
+        raise InputError("--measure says what to do at a size: give one with --at, as 1920x1080.")
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
@@ -47,7 +55,8 @@ def cost(scene, output, figures, rounds, as_json, timeout, **rendering):
             require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
             for_print = folder / FIGURES if figures else None
             with progress.shown() as bar:
-                words = (scene, jobs.request(rendering), rounds, folder / place, for_print)
+                asked = (scene, jobs.request(rendering), rounds, at, is_measured)
+                words = (*asked, folder / place, for_print)
                 record = pool.do(Task(place, tasks.priced, words, bar.of(place)))
             tables.write_cost(folder / TABLES, place, record)
     if as_json:

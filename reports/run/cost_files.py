@@ -23,6 +23,7 @@ def documents(study):
     Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
     brighter, over the range that the record's ``pictures`` states; effects are errors removed.
     """
+    from reports.charts import prediction_chart
     from reports.charts.error_over_time import error_over_time
 
     record = study.record
@@ -37,6 +38,8 @@ def documents(study):
         pictures[picture_name("effect", name)] = images.signed_map(values, limits.effect_limit)
     made = {f"{name}.png": images.png(picture) for name, picture in pictures.items()}
     made["cost.svg"] = vega.paper(error_over_time(record))
+    if record.prediction:
+        made["prediction.svg"] = vega.paper(prediction_chart.standing_alone(record))
     made["cost.json"] = records.to_json(record).encode()
     return made
 

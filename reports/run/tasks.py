@@ -51,13 +51,15 @@ def priced(
     name: str,
     request: Request,
     rounds: int | None,
+    at: tuple[int, int] | None,
+    is_measured: bool,
     place: Path,
     figures: Path | None,
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write the study's files.
 
-    ``figures`` is the folder for those for print, None for none.
+    ``at`` is a size to predict for, and ``figures`` the folder for those for print; None for none.
     """
     from comparisons.case import open_case
     from comparisons.cost.cost import Effort, cost
@@ -66,8 +68,9 @@ def priced(
 
     case = open_case(name, request)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
-    words = case.command("cost", rounds=rounds)
-    study = cost(case.source, case.options, effort, progress, words)
+    size = at and f"{at[0]}x{at[1]}"
+    words = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
+    study = cost(case.source, case.options, effort, progress, words, at, is_measured)
     cost_files.write(place, study)
     if figures is not None:
         write_cost(figures, place.name, study.record)

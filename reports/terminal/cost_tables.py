@@ -26,6 +26,48 @@ def lines(record):
         yield noise(record)
         yield closure(record)
     yield from _section("Parts of the departure, linear", _parts(record))
+    if record.prediction:
+        yield from predicted(record.prediction)
+
+
+SHOWN_SPP = (1, 4, 16, 64, 256, 1024, 4096)
+"""Sample counts of forecasts on the terminal, with those that were measured."""
+
+
+def predicted(prediction):
+    """Yield the lines of what is predicted at a size."""
+    width, height = prediction.resolution
+    sizes = ", ".join("x".join(map(str, size)) for size in prediction.fitted)
+    yield from _section(f"Predicted at {width}x{height}", _forecasts(prediction))
+    yield f"{prediction.level:.0%} intervals, from {sizes}. Times are of later frames."
+    yield ""
+    for row in prediction.cheapest:
+        yield _cheapest(row)
+
+
+def _forecasts(prediction):
+    is_measured = any(forecast.measured for forecast in prediction.forecasts)
+    measured = ("measured time", "measured error") if is_measured else ()
+    yield "method", "samples", "time", "interval", "mean ΔE2000", "interval", *measured
+    for row in prediction.forecasts:
+        if row.spp in SHOWN_SPP or row.measured:
+            found = row.measured
+            seen = (_time(found.seconds.median), f"{found.error:.3f}") if found else ("", "")
+            yield (
+                row.method,
+                f"{row.spp}",
+                *_timed(row.seconds.value, row.seconds),
+                f"{row.error.value:.3f}",
+                f"{row.error.low:.3f} to {row.error.high:.3f}",
+                *(seen if is_measured else ()),
+            )
+
+
+def _cheapest(row):
+    if row.method is None:
+        return f"ΔE2000 = {row.error:g}: no method reaches it."
+    time, interval = _timed(row.seconds.value, row.seconds)
+    return f"ΔE2000 = {row.error:g}: {row.method}, {row.spp} samples, {time} ({interval})."
 
 
 def noise(record):

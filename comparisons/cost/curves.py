@@ -1,0 +1,205 @@
+"""Curves of a method: its time and its error at any size and number of samples.
+
+Time of one image of ``N`` pixels with ``s`` samples each, on later frames (the first one traces and
+compiles besides)::
+
+    T(N, s) = t_0 + t_N N + t_s N s,    t_0, t_N, t_s >= 0
+
+fitted in logarithms, so that each measurement counts by its relative error. Its interval is that of
+Student's t for one more measurement, from what the measurements depart from the fit.
+
+Error: a rendering is ``x = m + e``, with the method's own mean ``m``, wrong by its bias, and noise
+``e``. Both are measured; the mean distance at ``s`` samples is that of ``m + λ e_r`` over the
+measured residuals ``e_r``, with ``λ = σ(s) / σ(s_r)`` from the mean absolute residual ``σ``, which
+a few bright pixels do not rule. So noise keeps its skew, and the distance its curvature. ``σ`` is a
+power of ``s`` between measured squares and beyond them; other counts stratify worse, by a factor
+that one of them shows. Where ``m`` holds more noise than ``s`` samples do, ``E² = b² + c σ²(s)``
+continues from the last counts before.
+
+Between sizes the error follows a straight line in ``1 / width``: edges make it depend on the size,
+and so does their share of the pixels.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import exp, isqrt, log, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.optimize import least_squares
+
+LEVEL = 0.9
+"""Chance of an interval to hold what is measured later."""
+
+Range = tuple[float, float, float]
+"""A value, and the ends of its interval."""
+
+LEAST_SCATTER = 0.05
+"""Relative: a measurement that is repeated later moves by so much on a quiet machine."""
+
+LEAST_DOUBT = 0.04
+"""Relative, of the error of a method that is random: what these curves do not know of noise."""
+
+FALLS = (-1.0, -0.25)
+"""Powers of the samples by which noise may fall beyond the measured counts; plain Monte Carlo
+is -1/2, and stratified sampling lies below."""
+
+
+@dataclass(frozen=True)
+class TimeCurve:
+    """``T(N, s)`` of the module's formula, in seconds.
+
+    Attributes
+    ----------
+    coefficients
+        ``(t_0, t_N, t_s)``.
+    covariance
+        (3, 3): of their logarithms, over the square of the scatter.
+    scatter
+        Standard deviation of ``log T``.
+    freedom
+        Degrees of freedom that it is known by.
+    """
+
+    coefficients: tuple[float, float, float]
+    covariance: NDArray[np.float64]
+    scatter: float
+    freedom: int
+
+    @classmethod
+    def fit(cls, pixels: ArrayLike, spp: ArrayLike, seconds: ArrayLike) -> "TimeCurve":
+        """Fit measured times, (n,) each, at least four of them."""
+        terms = _terms(pixels, spp)
+        measured = np.log(np.asarray(seconds, float))
+        # Scaled so that all three unknowns start alike: a third of the smallest time each.
+        start = np.log(np.exp(measured.min()) / 3 / terms.max(axis=0))
+        found = least_squares(
+            lambda logs: np.log(terms @ np.exp(logs)) - measured, start, x_scale=1.0
+        )
+        freedom = max(len(measured) - 3, 1)
+        scatter = max(sqrt(2 * found.cost / freedom), LEAST_SCATTER)
+        # A coefficient that came out as nothing has no slope, and the pseudoinverse no say in it.
+        covariance = np.linalg.pinv(found.jac.T @ found.jac, rcond=1e-6)
+        return cls(tuple(np.exp(found.x).tolist()), covariance, scatter, freedom)
+
+    def at(self, pixels: float, spp: float) -> Range:
+        """Return seconds, and the ends of their interval at :data:`LEVEL`."""
+        parts = _terms([pixels], [spp])[0] * self.coefficients
+        value = float(parts.sum())
+        slope = parts / value
+        spread = self.scatter * sqrt(1 + float(slope @ self.covariance @ slope))
+        reach = exp(stats.t.ppf((1 + LEVEL) / 2, self.freedom) * spread)
+        return value, value / reach, value * reach
+
+
+def _terms(pixels: ArrayLike, spp: ArrayLike) -> NDArray[np.float64]:
+    pixels, spp = np.asarray(pixels, float), np.asarray(spp, float)
+    return np.stack([np.ones_like(pixels), pixels, pixels * spp], axis=-1)
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """Mean distance to the reference, over the samples, at one size.
+
+    Attributes
+    ----------
+    mean
+        (P, 3): the method's mean image, from the most samples.
+    residuals
+        ``{s: (R, P, 3)}``: renderings less their mean, by measured counts.
+    distance
+        ``(image (P, 3)) -> mean distance to the reference``.
+    noise_of_mean
+        Mean absolute noise that ``mean`` itself holds.
+    """
+
+    mean: NDArray
+    residuals: dict[int, NDArray]
+    distance: Callable[[NDArray], float]
+    noise_of_mean: float
+
+    @classmethod
+    def measured(
+        cls, images: dict[int, NDArray], distance: Callable[[NDArray], float]
+    ) -> "ErrorCurve":
+        """Make the curve of renderings ``{s: (R, P, 3)}``, at least two of each count."""
+        most = max(images)
+        residuals = {}
+        for spp, rounds in images.items():
+            # A mean over R rounds takes a share 1 / R of each with it.
+            unbiased = sqrt(len(rounds) / (len(rounds) - 1))
+            residuals[spp] = (rounds - rounds.mean(axis=0)) * unbiased
+        noise = _size(residuals[most]) / sqrt(len(images[most]))
+        return cls(images[most].mean(axis=0), residuals, distance, noise)
+
+    def noise(self, spp: float) -> float:
+        """Return the mean absolute residual at a number of samples."""
+        known = {s: _size(residuals) for s, residuals in self.residuals.items()}
+        if spp in known:
+            return known[spp]
+        squares = {s: size for s, size in known.items() if _is_square(s)}
+        others = [size / _power_law(squares, s) for s, size in known.items() if s not in squares]
+        worse = 1.0 if _is_square(spp) or not others else float(np.mean(others))
+        return worse * _power_law(squares, spp)
+
+    def at(self, spp: int) -> tuple[float, float]:
+        """Return the mean distance at a number of samples, and its standard error."""
+        last = spp
+        while self.noise(last) < self.noise_of_mean and last > 1:
+            last //= 4
+        if last == spp:
+            return self._drawn(spp)
+        (before, _), (error, stderr) = self._drawn(max(last // 4, 1)), self._drawn(last)
+        fallen = self.noise(max(last // 4, 1)) ** 2 - self.noise(last) ** 2
+        slope = (before**2 - error**2) / fallen if fallen > 0 else 0.0
+        left = error**2 + max(slope, 0.0) * (self.noise(spp) ** 2 - self.noise(last) ** 2)
+        return sqrt(max(left, 0.0)), stderr
+
+    def _drawn(self, spp: int) -> tuple[float, float]:
+        nearest = min(self.residuals, key=lambda count: abs(log(count / spp)))
+        residuals = self.residuals[nearest]
+        own = _size(residuals)
+        missing = max(self.noise(spp) ** 2 - self.noise_of_mean**2, 0.0)
+        factor = sqrt(missing) / own if own > 0 else 0.0
+        found = [self.distance(self.mean + factor * residual) for residual in residuals]
+        return float(np.mean(found)), float(np.std(found, ddof=1) / sqrt(len(found)))
+
+
+def _size(residuals: NDArray) -> float:
+    return float(np.mean(np.abs(residuals)))
+
+
+def _is_square(count: float) -> bool:
+    return isqrt(int(count)) ** 2 == count
+
+
+def _power_law(known: dict[int, float], place: float) -> float:
+    """Interpolate between the two nearest of some values in logarithms, or extrapolate."""
+    counts = sorted(known)
+    if min(known.values()) <= 0 or len(counts) == 1:
+        nearest = min(counts, key=lambda count: abs(log(count / place)))
+        return known[nearest] * sqrt(nearest / place)
+    right = min(max(np.searchsorted(counts, place), 1), len(counts) - 1)
+    low, high = counts[right - 1], counts[right]
+    power = log(known[high] / known[low]) / log(high / low)
+    if not low <= place <= high:
+        power = min(max(power, FALLS[0]), FALLS[1])
+    anchor = low if place < low else high
+    return known[anchor] * (place / anchor) ** power
+
+
+def across_sizes(
+    widths: Sequence[float], errors: Sequence[float], stderrs: Sequence[float], width: float
+) -> tuple[float, float]:
+    """Extrapolate errors along a straight line in ``1 / width``; return error and its doubt.
+
+    The doubt holds the noise of what is measured, and half of what the line adds to the last.
+    """
+    if len(widths) == 1:
+        return errors[0], stderrs[0]
+    (first, last), (before, after) = (1 / np.asarray(widths[-2:], float)), errors[-2:]
+    reach = (1 / width - last) / (first - last)
+    moved = (before - after) * reach
+    noise = np.hypot(stderrs[-1] * (1 - reach), stderrs[-2] * reach)
+    return max(after + moved, 0.0), float(np.hypot(noise, moved / 2))

@@ -1,0 +1,97 @@
+"""Predicted error over predicted time of each method at a size, with bands, as a chart."""
+
+import altair as alt
+
+from reports.charts.error_over_time import (
+    HEIGHT,
+    LEAST_ERROR,
+    MARKS,
+    WIDTH,
+    charted,
+    domain,
+    names_beside,
+)
+from reports.charts.vega import specification
+
+
+def prediction_chart(record, ground="transparent"):
+    """Return the chart of a ``Cost`` with a prediction: curves, bands, and what was measured."""
+    families = {rung.name: rung.family for rung in record.rungs}
+    found = record.prediction
+    rows = [_row(forecast, families[forecast.method]) for forecast in found.forecasts]
+    seen = [_seen(f, families[f.method]) for f in found.forecasts if f.measured]
+    times = domain([row[end] for row in rows for end in ("fastest", "slowest")])
+    errors = domain([max(row[end], LEAST_ERROR) for row in rows for end in ("low", "high")])
+    for row in (*rows, *seen):
+        row["shown"] = max(row["error"], errors[0])
+    for row in rows:
+        row["low"] = max(row["low"], errors[0])
+    colours = alt.Scale(domain=list(MARKS), range=[colour for colour, _ in MARKS.values()])
+    colour = alt.Color("family:N", legend=None, scale=colours)
+    curves = charted(rows, times, errors).encode(color=colour)
+    layers = [
+        curves.mark_area(opacity=0.18).encode(y="low:Q", y2="high:Q", detail="rung:N"),
+        curves.mark_line(strokeWidth=1.4).encode(detail="rung:N"),
+        curves.mark_rule(strokeWidth=1, opacity=0.35).encode(x="fastest:Q", x2="slowest:Q"),
+        curves.mark_point(size=18, filled=True, opacity=0.9).encode(
+            tooltip=[
+                alt.Tooltip("rung:N", title="method"),
+                alt.Tooltip("spp:Q", title="samples per pixel"),
+                alt.Tooltip("time:Q", title="time (ms)", format=".3~g"),
+                alt.Tooltip("error:Q", title="mean ΔE2000", format=".3~g"),
+            ]
+        ),
+        *names_beside(rows, times, errors),
+    ]
+    if seen:
+        measured = charted(seen, times, errors).encode(color=colour)
+        layers.append(measured.mark_point(shape="cross", size=90, fill=ground, strokeWidth=1.5))
+    padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
+    return specification(alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding))
+
+
+def standing_alone(record):
+    """Return the chart with a title, on white."""
+    width, height = record.prediction.resolution
+    subtitle = [
+        f"fitted to {', '.join('x'.join(map(str, size)) for size in record.prediction.fitted)};"
+        f" {record.machine.cores} cores, {record.machine.processor}",
+        reading(record),
+    ]
+    title = {
+        "text": f"{record.scene}: predicted at {width} × {height} pixels",
+        "subtitle": subtitle,
+    }
+    return prediction_chart(record, "white") | {"title": title}
+
+
+def reading(record):
+    """Return how to read the chart, in a line."""
+    level = f"{record.prediction.level:.0%}"
+    crosses = any(forecast.measured for forecast in record.prediction.forecasts)
+    said = f"bands and strokes: {level} intervals of error and time; points: powers of 2 samples"
+    return f"{said}; crosses: measured" if crosses else said
+
+
+def _row(forecast, family):
+    return {
+        "rung": forecast.method,
+        "family": family,
+        "spp": forecast.spp,
+        "time": forecast.seconds.value * 1e3,
+        "fastest": forecast.seconds.low * 1e3,
+        "slowest": forecast.seconds.high * 1e3,
+        "error": forecast.error.value,
+        "low": forecast.error.low,
+        "high": forecast.error.high,
+    }
+
+
+def _seen(forecast, family):
+    measured = forecast.measured
+    return {
+        "rung": forecast.method,
+        "family": family,
+        "time": measured.seconds.median * 1e3,
+        "error": measured.error,
+    }

@@ -1,0 +1,152 @@
+"""Curves of time and error against laws that are known, and predictions as a whole."""
+
+from math import erf, exp, pi, sqrt
+
+import msgspec
+import numpy as np
+import pytest
+
+from comparisons.case import Request, open_case
+from comparisons.cost.cost import cost
+from comparisons.cost.cost_record import Cost, Forecast, Range
+from comparisons.cost.curves import LEVEL, ErrorCurve, TimeCurve, across_sizes
+from comparisons.cost.effort import Effort
+from comparisons.cost.prediction import cheapest, require_shape, sizes
+from comparisons.records import to_json
+from heuristic.errors import InputError
+from reports.terminal import cost_tables
+
+PIXELS = np.repeat([64**2, 128**2, 256**2], 3)
+SPP = np.tile([4, 16, 64], 3)
+
+
+@pytest.mark.parametrize("law", [(2e-3, 1e-8, 3e-7), (2e-2, 0, 5e-8), (1e-4, 2e-7, 2e-8)])
+def test_times_without_noise_give_their_law_back(law):
+    def time(pixels, spp):
+        return law[0] + law[1] * pixels + law[2] * pixels * spp
+
+    curve = TimeCurve.fit(PIXELS, SPP, time(PIXELS, SPP))
+    for pixels, spp in ((1920 * 1080, 16), (512**2, 1), (32**2, 4)):
+        assert curve.at(pixels, spp)[0] == pytest.approx(time(pixels, spp), rel=0.02)
+
+
+def test_intervals_of_time_hold_as_often_as_they_say():
+    rng = np.random.default_rng(5)
+    law, scatter, pixels, spp = (3e-3, 2e-8, 2e-7), 0.12, 800 * 600, 32
+    exact = law[0] + law[1] * PIXELS + law[2] * PIXELS * SPP
+    later = law[0] + law[1] * pixels + law[2] * pixels * spp
+    count, held = 400, 0
+    for _ in range(count):
+        curve = TimeCurve.fit(PIXELS, SPP, exact * np.exp(scatter * rng.normal(size=9)))
+        _, low, high = curve.at(pixels, spp)
+        held += low <= later * np.exp(scatter * rng.normal()) <= high
+    # Five standard deviations of a binomial share.
+    assert abs(held / count - LEVEL) < 5 * sqrt(LEVEL * (1 - LEVEL) / count)
+
+
+def folded(bias, spread):
+    """Return the mean of ``|x|`` for a normal ``x``."""
+    return spread * sqrt(2 / pi) * exp(-(bias**2) / (2 * spread**2)) + bias * erf(
+        bias / (spread * sqrt(2))
+    )
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.05, 0.5])
+@pytest.mark.parametrize("spp", [1, 4, 32, 256, 1024])
+def test_errors_follow_bias_and_noise_at_any_count(bias, spp):
+    rng = np.random.default_rng(11)
+    shape = 8, 4000, 3
+    images = {s: bias + rng.normal(size=shape) / sqrt(s) for s in (4, 16, 64)}
+    curve = ErrorCurve.measured(images, lambda image: float(np.abs(image).mean()))
+    expected = folded(bias, 1 / sqrt(spp))
+    # The mean of all rounds holds the noise of 512 samples: beyond, the bias is extrapolated.
+    assert curve.at(spp)[0] == pytest.approx(expected, rel=0.05 if spp < 512 else 0.1)
+
+
+def test_counts_that_stratify_worse_are_told_from_one_of_them():
+    rng = np.random.default_rng(12)
+    shape = 8, 4000, 3
+
+    def spread(spp):
+        return (1.5 if spp in (8, 32) else 1) / spp
+
+    images = {s: rng.normal(size=shape) * spread(s) for s in (4, 8, 16, 64)}
+    curve = ErrorCurve.measured(images, lambda image: float(np.abs(image).mean()))
+    assert curve.at(32)[0] == pytest.approx(spread(32) * sqrt(2 / pi), rel=0.05)
+
+
+def test_errors_of_edges_go_with_their_share_of_the_pixels():
+    error, doubt = across_sizes((128, 256), (2 + 64 / 128, 2 + 64 / 256), (0.01, 0.01), 1024)
+    assert error == pytest.approx(2 + 64 / 1024)
+    assert 0.01 < doubt < 0.2
+
+
+def test_fitted_sizes_have_the_shape_asked_for():
+    for target in ((1920, 1080), (512, 512), (300, 100)):
+        for width, height in sizes(target):
+            assert width / height == pytest.approx(target[0] / target[1], rel=0.08)
+            assert width * height <= target[0] * target[1] / 4 * 1.05
+    with pytest.raises(InputError, match="12x12 is too small"):
+        sizes((12, 12))
+
+
+def test_a_size_of_another_shape_is_rejected():
+    require_shape((128, 72), (1920, 1080))
+    with pytest.raises(InputError, match="128x128 and 1920x1080 are not of one shape"):
+        require_shape((128, 128), (1920, 1080))
+
+
+def forecast(method, spp, seconds, error):
+    return Forecast(method, spp, Range(seconds, seconds, seconds), Range(error, error, error))
+
+
+def test_the_cheapest_way_is_the_fastest_that_reaches_an_error():
+    rows = [
+        forecast("slow", 1, 8.0, 4.0),
+        forecast("slow", 4, 32.0, 2.0),
+        forecast("fast", 1, 1.0, 8.0),
+        forecast("fast", 4, 4.0, 4.0),
+        forecast("fast", 16, 16.0, 3.0),
+    ]
+    found = cheapest(rows, 4.0)
+    assert (found.method, found.spp, found.seconds.value) == ("fast", 4, 4.0)
+    found = cheapest(rows, 2.0 * sqrt(2))  # half way from 4 to 2, in logarithms
+    assert (found.method, found.spp) == ("slow", 2)
+    assert found.seconds.value == pytest.approx(16.0)
+    assert cheapest(rows, 1.0).method is None
+
+
+@pytest.fixture(scope="module")
+def predicted():
+    """A study that predicts for a small size, and measures there."""
+    case = open_case("fig-8-9", Request())
+    effort = Effort(rounds=3, largest=4, reference_spp=4, replicates=3, replicate_spp=4)
+    return cost(case.source, case.options, effort, at=(64, 48), is_measured=True).record
+
+
+def test_a_study_predicts_every_method_and_measures_counts_that_were_not_fitted(predicted):
+    found = predicted.prediction
+    assert found.resolution == (64, 48)
+    names = {rung.name for rung in predicted.rungs}
+    assert {law.method for law in found.laws} == names
+    assert {row.method for row in found.forecasts if row.measured} == names
+    for row in found.forecasts:
+        assert row.seconds.low < row.seconds.value < row.seconds.high
+        assert row.error.low <= row.error.value <= row.error.high
+    kernel = [row for row in found.forecasts if row.method == "Phong kernel" and row.measured]
+    assert all(row.error.value == pytest.approx(row.measured.error, rel=0.1) for row in kernel)
+    assert msgspec.json.decode(to_json(predicted), type=Cost).prediction == found
+
+
+def test_the_terminal_names_the_cheapest_way_to_each_error(predicted):
+    lines = list(cost_tables.lines(predicted))
+    (title,) = (line for line in lines if line.startswith("Predicted at"))
+    assert title == "Predicted at 64x48"
+    cheapest_lines = [line for line in lines if line.startswith("ΔE2000 = ")]
+    assert len(cheapest_lines) == len(predicted.prediction.cheapest)
+
+
+def test_measuring_needs_a_size(run):
+    code, _, error = run("cost", "fig-8-9", "--measure")
+    assert code == 2
+    assert "give one with --at" in error
