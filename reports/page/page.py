@@ -30,7 +30,7 @@ from comparisons.departure.spaces import luminance
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
-from reports.page import overview
+from reports.page import overview, verdict_view
 from reports.page.legends import legends
 from reports.page.scene_view import SceneView
 from reports.run.stages import Failure, Run
@@ -66,11 +66,11 @@ FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent"
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
-STYLES = ("base", "overview", "scene", "viewer", "print")
+STYLES = ("base", "verdict", "overview", "scene", "viewer", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "main",
+    "verdict", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
@@ -122,6 +122,7 @@ def render(
             style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
             scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
             page_data=_page_data(scenes, failed),
+            verdict=verdict_view.context(scenes) if scenes else None,
             scenes=scenes,
             failures=failed,
             metrics=METRICS,

@@ -79,6 +79,14 @@ def run(
         raise type(error)(f"{count}among them: {error}") from error
 
 
+def _verdict(views):
+    """Return the lines that say what was found."""
+    from reports import verdict
+
+    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
+    return ["", *verdict.sentences(found), *verdict.advice(found)]
+
+
 def _compare(pool, record, places, folder, wanted, requests, views, failures):
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from comparisons.case import name_of
@@ -136,4 +144,5 @@ def _write(run, folder, places, views, failures, with_figures, shown):
     output.as_far_as_possible(*steps)
     if views:
         verbosity.tell(progress.summary(records))
+        verbosity.tell(_verdict(views))
     verbosity.tell_where(folder / "index.html")

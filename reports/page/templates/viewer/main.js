@@ -2,6 +2,8 @@
 
 const address = makeAddress();
 const overview = makeOverview(byId("overview-section"), page.scenes, change);
+const verdict = document.getElementById("verdict-section");
+if (verdict) makeVerdict(verdict);
 const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);
 /** @type {View} */
 let view = DEFAULT_VIEW;

@@ -1,0 +1,29 @@
+"""The first screen: the verdict, and a bar for each scene, worst first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from reports import verdict
+from reports.charts.theme import EFFECT_COLOURS
+
+ROOM = 1.04
+"""The longest bar, and a little more, is the width of all."""
+
+
+def context(scenes: Sequence[Any]) -> dict[str, Any]:
+    """Return what the template shows of scenes, each with ``record`` and ``cost``."""
+    found = [verdict.finding(s.record, s.cost.record if s.cost else None) for s in scenes]
+    rows = sorted(zip(scenes, found, strict=True), key=lambda row: -row[1].mean)
+    names = verdict.ranked(found)
+    return {
+        "sentences": verdict.sentences(found),
+        "rows": rows,
+        "tolerances": verdict.TOLERANCES,
+        "usual": verdict.USUAL,
+        "share": verdict.SHARE,
+        "top": ROOM * max((f.mean for f in found), default=1.0) or 1.0,
+        "effects": {name: EFFECT_COLOURS[name] for name in names},
+        "has_remedies": any(f.remedies for f in found),
+    }

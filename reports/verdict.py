@@ -1,0 +1,162 @@
+"""What a run found, in sentences and bars: how many scenes look right, and what the others lack.
+
+A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. What it
+lacks is told by the prices of effects, where a study of cost has them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.metrics import LEADING
+from reports.charts.theme import EFFECT_COLOURS
+from reports.terminal.printing import seconds
+
+if TYPE_CHECKING:
+    from comparisons.cost.cost_record import Cost
+
+SHARE = 0.05
+"""Of the pixels, that may depart by more than the tolerance."""
+
+TOLERANCES = tuple(LEADING.visible)
+USUAL = 2.0
+"""The tolerance that is shown first: what is seen side by side."""
+
+EXACT = 0.01
+"""ΔE2000: smaller means are rounding, or noise that nobody sees."""
+
+NAMED = 3
+"""Effects that the sentence names."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one effect has of a bar: ΔE2000, in the scale of the scene's mean."""
+
+    effect: str
+    colour: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """The cheapest method of a study whose mean error stays within a tolerance."""
+
+    method: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One scene of a run.
+
+    Attributes
+    ----------
+    scene, mean
+        Its name, and its mean departure.
+    beyond
+        ``{tolerance: share of the pixels that depart by more}``.
+    parts
+        What effects have of the mean, largest first; empty without a study of cost.
+    remedies
+        ``{tolerance: cheapest method, or None}``; empty without a study of cost.
+    is_exact
+        Whether the mean is at most :data:`EXACT`.
+    """
+
+    scene: str
+    mean: float
+    beyond: dict[float, float]
+    parts: tuple[Part, ...]
+    remedies: dict[float, Remedy | None]
+    is_exact: bool
+
+    def is_right(self, tolerance: float) -> bool:
+        """Tell whether the scene looks right at one of :data:`TOLERANCES`."""
+        return self.beyond[tolerance] <= SHARE
+
+    @property
+    def cause(self) -> str | None:
+        """The effect that has most of the departure, None where none is known."""
+        return self.parts[0].effect if self.parts else None
+
+
+def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
+    """Return what was found of a scene."""
+    metric = record.metrics[LEADING.name]
+    return Finding(
+        scene=record.scene,
+        mean=metric.mean,
+        beyond={limit: metric.visible[f"{limit:g}"] for limit in TOLERANCES},
+        parts=_parts(metric.mean, cost) if cost else (),
+        remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
+        is_exact=metric.high <= EXACT,
+    )
+
+
+def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
+    """Scale the prices that are surely above 0 to the mean, which was measured in full size."""
+    sure = [price for price in cost.prices.effects if price.removes.low > 0]
+    total = sum(price.removes.value for price in sure)
+    ordered = sorted(sure, key=lambda price: -price.removes.value)
+    return tuple(
+        Part(price.effect, EFFECT_COLOURS[price.effect], mean * price.removes.value / total)
+        for price in ordered
+    )
+
+
+def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
+    reached = [r for r in cost.equal_error if r.error == tolerance and r.seconds is not None]
+    best = min(reached, key=lambda row: row.seconds, default=None)
+    return best and Remedy(best.method, best.seconds)
+
+
+def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
+    """Return what a run found, in one or two sentences."""
+    right = sum(found.is_right(tolerance) for found in findings)
+    if len(findings) == 1:
+        (only,) = findings
+        share = only.beyond[tolerance]
+        said = [
+            f"Textbook shading looks right in {only.scene}."
+            if right
+            else f"Textbook shading is visibly wrong in {share:.0%} of {only.scene}."
+        ]
+    else:
+        said = [f"Textbook shading looks right in {right} of {len(findings)} scenes."]
+    lacking = ranked([found for found in findings if not found.is_right(tolerance)])
+    if lacking:
+        first, *others = lacking[:NAMED]
+        then = f", then {' and '.join(others)}" if others else ""
+        said.append(f"What it lacks most is {first}{then}.")
+    return said
+
+
+def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
+    """Return a line for each scene that does not look right: what it lacks, and what would do."""
+    lines = []
+    for found in findings:
+        if found.is_right(tolerance) or not found.remedies:
+            continue
+        remedy = found.remedies[tolerance]
+        cause = f"mostly {found.cause}" if found.cause else "no cause is known"
+        way = (
+            f"{remedy.method} in {seconds(remedy.seconds)}"
+            if remedy
+            else "no method that was tried"
+        )
+        lines.append(f"{found.scene}: {cause}; within {LEADING.label} {tolerance:g}: {way}")
+    return lines
+
+
+def ranked(findings: Sequence[Finding]) -> list[str]:
+    """Return the effects that have most of the departure of some scenes together, largest first."""
+    sizes = Counter()
+    for found in findings:
+        for part in found.parts:
+            sizes[part.effect] += part.size
+    return [effect for effect, _ in sizes.most_common()]
