@@ -8,7 +8,7 @@ from msgspec import structs
 
 from comparisons import record
 from comparisons.compare import guarded
-from comparisons.cost.cost_record import Converged, Cost, Pictures, Point, Rung, Split
+from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Point, Rung, Split
 from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.methods import Methods
@@ -152,6 +152,7 @@ def cost(
         command=command,
         guard=record.guard_record(ready.guard),
         prediction=prediction,
+        left_out=tuple(LeftOut(name, reason) for name, reason in methods.left_out.items()),
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
     return Study(

@@ -107,6 +107,7 @@ def _summarise(key, renderer, errors):
         spp=key[1],
         first_s=renderer.times[0],
         compile_s=renderer.compilation,
+        prepare_s=getattr(renderer.integrator, "preparation", 0.0),
         seconds=interval(renderer.times[2:]),
         error=float(means[0]),
         error_stderr=float(stderrs[0]),

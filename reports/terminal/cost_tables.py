@@ -17,6 +17,8 @@ def lines(record):
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so that everything is simulated: please report it"
     yield from _section("Error and time of each method", _rungs(record))
+    for method in record.left_out:
+        yield f"left out: {method.name}: {method.reason}"
     yield from _section("Best within a time", _equal_time(record))
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
     if record.prices.effects:
