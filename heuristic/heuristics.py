@@ -138,7 +138,7 @@ class Heuristic:
         """
         if self.refuse is not None and (reason := self.refuse(scene)):
             raise InputError(
-                f"heuristic {self.name} cannot shade this scene: {reason}. Give another --heuristic."
+                f"heuristic {self.name} cannot shade this scene: {reason}. Choose another one."
             )
         return self.prepare(scene, **values) if self.prepare is not None else None
 

@@ -111,12 +111,15 @@ KERNELS = (
 )
 INDIRECT = frozenset({INTERREFLECTION, ENVIRONMENT})
 STAND_INS = tuple(
-    Rung(name, "kernel", Kernel(shadows=True, heuristic=heuristic), effects)
+    Rung(name, "kernel", Kernel(shadows="map" not in heuristic, heuristic=heuristic), effects)
     for name, heuristic, effects in (
+        ("shadow map", "shadow-map", frozenset({OCCLUSION})),
+        ("filtered shadow map", "soft-shadow-map", frozenset({OCCLUSION})),
         ("constant ambient", "mean-ambient", INDIRECT),
         ("hemisphere ambient", "hemisphere-ambient", INDIRECT),
         ("spherical harmonics", "harmonics-ambient", frozenset({ENVIRONMENT})),
         ("ambient occlusion", "ambient-occlusion", frozenset({OCCLUSION})),
+        ("ambient occlusion, depth image", "screen-occlusion", frozenset({OCCLUSION})),
     )
 )
 """What engines use in place of transport, each with shadows and a textbook's lights."""

@@ -61,7 +61,7 @@ class _Known:
     seconds: float
 
     def is_of(self, parts: list[mi.Object], values: dict[str, float]) -> bool:
-        """Tell whether these are the parts of the scene, and the values that it was prepared with."""
+        """Tell whether these are the parts of the scene, and the values it was prepared with."""
         is_same = len(parts) == len(self.parts) and all(map(is_, parts, self.parts))
         return is_same and values == self.values
 

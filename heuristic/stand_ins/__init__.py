@@ -1,9 +1,23 @@
 """What engines use in place of light transport, one heuristic in each module.
 
-Their light is display-linear as the kernel's is (:mod:`heuristic.convention`). What they prepare for
-a scene is gathered in its heuristic half alone, and is the same in every run.
+Their light is display-linear as the kernel's is (:mod:`heuristic.convention`). What they prepare
+for a scene is gathered in its heuristic half alone, and is the same in every run.
 """
 
-from heuristic.stand_ins import harmonics, hemisphere, mean_ambient, openness
+from heuristic.stand_ins import (
+    depth_image,
+    harmonics,
+    hemisphere,
+    mean_ambient,
+    openness,
+    shadow_maps,
+)
 
-__all__ = ["harmonics", "hemisphere", "mean_ambient", "openness"]
+__all__ = [
+    "depth_image",
+    "harmonics",
+    "hemisphere",
+    "mean_ambient",
+    "openness",
+    "shadow_maps",
+]

@@ -1,11 +1,12 @@
-"""What stand-ins for indirect light share: the chapters' model with other light in place of ``I_a``.
+"""What stand-ins for indirect light share: the chapters' model with other light for ``I_a``.
 
-``I_a`` stands for the environment where the scene has one, and is then replaced. Where the scene has
-an ``I_a`` of its own it stays, and what surfaces reflect joins it.
+``I_a`` stands for the environment where the scene has one, and is then replaced. Where the scene
+has an ``I_a`` of its own it stays, and what surfaces reflect joins it.
 """
 
 from typing import Any
 
+from heuristic import colours
 from heuristic.points import Array, Point
 
 
@@ -14,10 +15,13 @@ def has_environment(scene: Any) -> bool:
     return scene.environment() is not None
 
 
-def lit(point: Point, arriving: Array, replaces_ambient: bool) -> Array:
+def lit(point: Point, arriving: Array, replaces_ambient: bool, share: Array = 1) -> Array:
     """Return the chapters' model, and ``k_d`` times the light that arrives from all around.
 
-    ``arriving`` is ``E / pi``, display-linear.
+    ``arriving`` is ``E / pi``, display-linear; ``share`` is how much of an ``I_a`` that stays is
+    not hidden.
     """
-    instead = {"ambient": 0} if replaces_ambient else {}
-    return point.textbook(**instead) + point.material.k_d * arriving
+    ambient = point.given.ambient
+    is_there = not (replaces_ambient or colours.is_zero(colours.checked("ambient", ambient)))
+    found = point.textbook(ambient=ambient * share if is_there else 0)
+    return found + point.material.k_d * arriving

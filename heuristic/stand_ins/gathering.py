@@ -51,8 +51,8 @@ class Seen:
 
     def visible(self, scene: Any) -> Any:
         """Return ``visible(toward, distance)``, the shadow test at the points."""
-        return lambda toward, distance: ~scene.ray_test(
-            self.si.spawn_ray_to(self.si.p + toward * distance)
+        return lambda toward, distance: (
+            ~scene.ray_test(self.si.spawn_ray_to(self.si.p + toward * distance))
         )
 
 

@@ -41,7 +41,9 @@ def irradiance(sky: Array, ground: Array, cosine: Array) -> Array:
 
 def upward(scene: Any) -> np.ndarray:
     """Return the axis of the world, or its opposite, that the camera's up vector is nearest to."""
-    column = np.array(scene.sensors()[0].world_transform().matrix, float).reshape(4, 4, -1)[:3, 1, 0]
+    column = np.array(scene.sensors()[0].world_transform().matrix, float).reshape(4, 4, -1)[
+        :3, 1, 0
+    ]
     axis = int(np.argmax(np.abs(column)))
     return np.sign(column[axis]) * np.eye(3)[axis]
 

@@ -2,8 +2,9 @@
 
 ``I = ... + k_d A o`` with the openness ``o = 1 / N sum_j V(w_j)`` over directions that follow the
 cosine, hence ``1 / pi`` times the integral of ``V (n.w)``; ``V`` is 0 where something lies within
-``reach``. ``A`` keeps the image's mean of indirect light, as :mod:`heuristic.stand_ins.mean_ambient`
-does. The same directions about every normal make it a function of the place alone.
+``reach``. ``A`` keeps the image's mean of indirect light, as that of
+:mod:`heuristic.stand_ins.mean_ambient` does. The directions are a fixed pattern, turned and shifted
+by a hash of the place, so that they differ from point to point and repeat from run to run.
 """
 
 from collections.abc import Callable
@@ -22,9 +23,9 @@ from heuristic.stand_ins.tabulated import Table
 
 RAYS = 16
 
-REACH = Parameter("reach", 0.25, 0.001, 1.0, prepared=True)
-"""How far away things hide light, in diagonals of the scene's box. Without a bound a closed room
-would be dark."""
+REACH = Parameter("reach", 0.5, 0.01, 100.0, prepared=True)
+"""How far away things hide light, in units of the size of what the camera sees (:func:`reach_of`).
+Without a bound a closed room would be dark."""
 
 
 @dataclass(frozen=True)
@@ -36,24 +37,44 @@ class Hidden:
     replaces_ambient: bool
 
 
+def hashed(position: Any) -> tuple[Any, Any]:
+    """Return two numbers from 0 to 1 that follow from a place, and look random."""
+    bits = [
+        dr.reinterpret_array(mi.UInt32, dr.float32_array_t(mi.Float)(part))
+        for part in (position.x, position.y, position.z)
+    ]
+    first = mi.sample_tea_32(bits[0], bits[1])[0]
+    return tuple(mi.Float(mi.sample_tea_float32(first, bits[2] + more)) for more in (0, 1))
+
+
 @dr.syntax
-def openness(visible: Callable, normal: Any, distance: Any) -> Any:
+def openness(visible: Callable, position: Any, normal: Any, distance: Any) -> Any:
     """Return the share of the cosine-weighted hemisphere that nothing hides within a distance."""
     frame = mi.Frame3f(normal)
+    shift, turn = hashed(position)
+    distance = mi.Float(distance)  # a loop may widen what it is given
     count, number = mi.Float(0), mi.UInt32(0)
     while number < RAYS:
-        square = mi.Point2f((mi.Float(number) + 0.5) / RAYS, mi.radical_inverse_2(number, 0))
-        radius, turn = dr.sqrt(square.x), dr.two_pi * square.y
-        sine, cosine = dr.sincos(turn)
-        toward = frame.to_world(mi.Vector3f(radius * cosine, radius * sine, dr.sqrt(1 - square.x)))
+        square = (mi.Float(number) + shift) / RAYS
+        sine, cosine = dr.sincos(dr.two_pi * (mi.radical_inverse_2(number, 0) + turn))
+        radius = dr.sqrt(square)
+        toward = frame.to_world(mi.Vector3f(radius * cosine, radius * sine, dr.sqrt(1 - square)))
         count += dr.select(visible(toward, distance), 1, 0)
         number += 1
     return count / RAYS
 
 
 def reach_of(scene: Any, reach: float) -> float:
-    """Return the length of a share of the diagonal of the scene's box."""
-    return reach * float(np.linalg.norm(np.ravel(scene.bbox().max - scene.bbox().min)))
+    """Return a share of the size of what the camera sees, in units of the scene.
+
+    The size is the median distance of the points seen from their median: a floor or a wall that is
+    much larger than what stands before it does not change it.
+    """
+    si = gathering.seen(scene, wavelengths=tabulated.batches()[0]).si
+    places = np.array(si.p, float).T[np.array(si.is_valid() & dr.full(mi.Bool, True, 1))]
+    if not len(places):
+        return reach
+    return reach * float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=1)))
 
 
 def calibrated(scene: Any, hidden: Callable[[gathering.Seen], Any]) -> Table:
@@ -70,16 +91,16 @@ def prepare(scene: Any, reach: float) -> Hidden:
     """Gather the mean of the indirect light of a scene, and of the openness where it arrives."""
     distance = mi.Float(reach_of(scene, reach))
     dr.make_opaque(distance)
-    light = calibrated(scene, lambda at: openness(at.visible(scene), at.normal, distance))
+    light = calibrated(scene, lambda at: openness(at.visible(scene), at.si.p, at.normal, distance))
     return Hidden(light, distance, has_environment(scene))
 
 
 def shade(point: Point) -> Array:
     """Return the chapters' model with the mean of the indirect light, hidden near by."""
     prepared = point.prepared
-    share = openness(point.given.visible, point.normal, prepared.distance)
+    share = openness(point.given.visible, point.position, point.normal, prepared.distance)
     arriving = prepared.arriving.at(point.wavelengths) * share
-    return lit(point, arriving, prepared.replaces_ambient)
+    return lit(point, arriving, prepared.replaces_ambient, share)
 
 
 OPENNESS = HEURISTICS.own(
