@@ -36,8 +36,7 @@ OWN = 1e-3
 """What is nearer than this share of the reach is the surface itself."""
 
 ABOVE = 0.05
-"""And so is what rises less above its tangent plane: the sine of an angle. The image is as coarse as
-its pixels."""
+"""And so is what rises less above its tangent plane: the sine of an angle. Pixels are coarse."""
 
 
 @dataclass(frozen=True)

@@ -132,20 +132,21 @@ def _arriving(scene: Any, at: Seen) -> Any:
     sampler.seed(0, GRID**2 * STRATA**2)
     active = at.si.is_valid()
     cell = dr.arange(mi.UInt32, GRID**2 * STRATA**2) % STRATA**2
-    place = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
-    toward = mi.warp.square_to_cosine_hemisphere((place + sampler.next_2d()) / STRATA)
+    corner = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
+    toward = mi.warp.square_to_cosine_hemisphere((corner + sampler.next_2d()) / STRATA)
     ray = at.si.spawn_ray(mi.Frame3f(at.normal).to_world(toward))
     # What is seen of the environment is added below: a sun would be met too seldom.
     paths = mi.load_dict({"type": "path", "max_depth": REFLECTIONS + 1, "hide_emitters": True})
     reflected, _, _ = paths.sample(scene, sampler, ray, active=active)
-    return dr.select(active, reflected, 0) + _from_environment(scene, at, sampler, active)
+    from_around = _from_environment(scene, at, (corner + sampler.next_2d()) / STRATA, active)
+    return dr.select(active, reflected, 0) + from_around
 
 
-def _from_environment(scene: Any, at: Seen, sampler: Any, active: Any) -> Any:
+def _from_environment(scene: Any, at: Seen, place: Any, active: Any) -> Any:
     environment = scene.environment()
     if environment is None:
         return mi.Spectrum(0)
-    sample, light = environment.sample_direction(at.si, sampler.next_2d(), active)
+    sample, light = environment.sample_direction(at.si, place, active)
     cosine = dr.maximum(dr.dot(at.normal, sample.d), 0)
     active &= (sample.pdf > 0) & (cosine > 0)
     active &= ~scene.ray_test(at.si.spawn_ray_to(sample.p), active)

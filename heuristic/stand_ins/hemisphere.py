@@ -19,7 +19,7 @@ from heuristic.stand_ins.ambient_light import has_environment, lit
 from heuristic.stand_ins.gathering import Gathered, gather
 from heuristic.stand_ins.tabulated import Table
 
-EVENNESS = 1e-2
+EVENNESS = 1e-3
 """Weight, relative to that of all points, by which sky and ground are alike where nothing tells
 them apart: where all surfaces seen are inclined alike."""
 

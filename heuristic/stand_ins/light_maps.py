@@ -107,10 +107,26 @@ class SquareMap(LightMap):
         return dr.gather(mi.Float, self.depths, mi.UInt32(y * size + x))
 
 
+def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (3,) of a scene's box; Mitsuba's own leaves out meshes that it merged."""
+    corners = [np.zeros((0, 3))]
+    for shape in scene.shapes():
+        if shape.is_mesh():
+            corners.append(np.array(shape.vertex_positions_buffer(), float).reshape(-1, 3))
+        else:
+            ends = shape.bbox().min, shape.bbox().max
+            corners.append(np.array([np.ravel(end) for end in ends], float))
+    corners = np.concatenate(corners)
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if not len(corners):
+        return np.zeros(3), np.zeros(3)
+    return corners.min(axis=0), corners.max(axis=0)
+
+
 def light_map(scene: Any, light: Any, resolution: int) -> LightMap:
     """Trace the depth image of a lamp of the kernel."""
-    low, high = (np.ravel(corner).astype(float) for corner in (scene.bbox().min, scene.bbox().max))
-    radius = 0.5 * float(np.linalg.norm(high - low)) + 1e-6
+    low, high = box(scene)
+    radius = 0.5 * float(np.linalg.norm(high - low)) + np.finfo(np.float32).tiny
     if isinstance(light, DirectionalLight):
         return _square(scene, light, resolution, (low + high) / 2, radius)
     return _cube(scene, light, resolution, LEAST * radius)

@@ -8,13 +8,13 @@ half shadow of a lamp grows with the distance from what casts it.
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic.heuristics import HEURISTICS, Heuristic, Parameter
-from heuristic.materials import Material
 from heuristic.points import INPUTS, Array, Point
 from heuristic.stand_ins.light_maps import LEAST, SMALLEST_SINE, LightMap, light_map
 
@@ -69,8 +69,7 @@ def _shaded(point: Point, taps: Iterable[tuple], width: Any) -> Array:
     """Return the sum over lamps, each with its share; ``width`` is half the filter's diagonal."""
     taps = tuple(taps)
     colour = point.textbook(lights=[])
-    material = point.material
-    bare = Material(k_d=material.k_d, k_s=material.k_s, n=material.n, form=material.form)
+    bare = replace(point.given.material, k_i=0, k_a=0)
     for light, depths in zip(point.given.lights, point.prepared, strict=True):
         own = point.textbook(lights=[light], material=bare, ambient=0, visible=None)
         colour += own * _share(point, light, depths, taps, width)
