@@ -143,7 +143,7 @@ def define():
                 begin = perf_counter()
                 prepared = self.model.prepared(scene, values)
                 dr.sync_thread()
-                seconds = perf_counter() - begin
+                seconds = perf_counter() - begin if self.model.prepare else 0.0
                 self._known = _Known(parts, values, materials, prepared, seconds)
             return self._known
 

@@ -96,11 +96,16 @@ def _rungs(record):
             _all_names(record, point.rung),
             f"{point.spp}",
             *_timed(point.seconds.median, point.seconds),
-            _time(point.first_s),
+            _first(point),
             f"{point.error:.3f} ± {point.error_stderr:.3f}",
             f"{max(point.mse, 0) ** 0.5:.2g}",
             "front" if point.pareto else "",
         )
+
+
+def _first(point):
+    prepared = f" ({_time(point.prepare_s)} to prepare)" if point.prepare_s else ""
+    return f"{_time(point.first_s)}{prepared}"
 
 
 def _equal_time(record):
