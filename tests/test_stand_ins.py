@@ -11,6 +11,8 @@ from heuristic.heuristics import named
 from heuristic.stand_ins import depth_image, gathering, harmonics, hemisphere, openness
 from reference.pairing.halves import pair
 from reference.rendering.renderer import Renderer
+from tests import fuzzed_stand_ins
+from tests.fuzzed_stand_ins import MODELS
 from tests.sky import sky_above, two_colours
 
 STAND_INS = ("mean-ambient", "hemisphere-ambient", "ambient-occlusion", "screen-occlusion")
@@ -420,6 +422,64 @@ def test_a_scene_that_cannot_be_shaded_so_is_refused_with_the_reason(rgb, model,
     with pytest.raises(InputError, match=reason):
         image(mi.load_dict(given), model)
     assert named(model).refuse(mi.load_dict(given))
+
+
+def extreme(name):
+    """Scenes at the ends of what there is."""
+    given = integrating_sphere(0.5)
+    if name == "nothing seen":
+        given["wall"] |= {"center": (0, 0, 90)}
+    elif name == "no shape":
+        del given["wall"]
+    elif name == "black":
+        given["wall"]["bsdf"] = {"type": "phong"}
+    elif name == "more than white":
+        given["wall"]["bsdf"] = {"type": "phong", "k_d": 1.0, "k_s": 1.0, "n": 3}
+    elif name == "bright":
+        given["lamp"]["intensity"] = 1e25
+    elif name == "tiny":
+        given["wall"]["radius"] = 2e-5
+        given["sensor"] = looking((5e-6, 3e-6, 1e-6), (2e-5, 0, 0), near_clip=1e-9)
+    elif name == "camera on the lamp":
+        given["sensor"] = looking((0, 0, 0), (2, 0, 0))
+    return mi.load_dict(given)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nothing seen",
+        "no shape",
+        "black",
+        "more than white",
+        "bright",
+        "tiny",
+        "camera on the lamp",
+    ],
+)
+def test_scenes_at_the_ends_of_what_there_is_are_finite(rgb, name, model):
+    scene = extreme(name)
+    if named(model).refuse is None or not named(model).refuse(scene):
+        found = image(scene, model, 1)
+        assert np.isfinite(found).all()
+        assert found.min() >= 0
+
+
+@pytest.mark.parametrize(
+    ("variant", "seeds"),
+    [("llvm_ad_rgb", (3, 5, 8)), ("llvm_ad_mono", (12,)), ("llvm_ad_spectral", (28,))],
+    indirect=["variant"],
+)
+def test_random_scenes_are_finite_and_not_negative(variant, seeds, tmp_path):
+    for seed in seeds:
+        assert list(fuzzed_stand_ins.wrong(seed, tmp_path)) == []
+
+
+def test_a_negative_picture_is_found_out(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(gathering.Gathered, "mean", lambda self, of=None: np.full(3, -1.0))
+    found = list(fuzzed_stand_ins.wrong(3, tmp_path))
+    assert any("mean-ambient" in line for line in found)
 
 
 def test_a_prepared_parameter_prepares_again_where_it_changes(rgb, monkeypatch):
