@@ -482,6 +482,20 @@ def test_a_negative_picture_is_found_out(rgb, tmp_path, monkeypatch):
     assert any("mean-ambient" in line for line in found)
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_later_passes_replay_the_first(rgb, model):
+    """Under an environment and a parallel lamp, which no scene of ``test_replays`` has."""
+    given = sky_above(two_colours, ambient=0.25)
+    given["lamp"] = {"type": "heuristic_directional", "direction": (1, 2, -1)}
+    scene = mi.load_dict(given)
+    renderer = Renderer(scene, mi.load_dict({"type": "heuristic", "model": model}), 2, model)
+    for seed in (1, 2, 3):
+        found = np.array(renderer.render(seed))
+        again = mi.render(scene, integrator=renderer.integrator, spp=2, seed=seed)
+        np.testing.assert_array_equal(found, np.array(again))
+    assert renderer.replays
+
+
 def test_a_prepared_parameter_prepares_again_where_it_changes(rgb, monkeypatch):
     asked = []
     right = openness.reach_of

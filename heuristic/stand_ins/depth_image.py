@@ -39,7 +39,7 @@ ABOVE = 0.05
 """And so is what rises less above its tangent plane: the sine of an angle. Pixels are coarse."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class DepthImage:
     """What each pixel of a camera sees, at its centre.
 
@@ -132,7 +132,7 @@ def _horizon(
     return dr.safe_acos(cosine)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Shown:
     """Ambient light where nothing is near, the depth image, and the reach in units of the scene."""
 

@@ -68,7 +68,7 @@ def project(radiance: Callable[[Directions], np.ndarray]) -> np.ndarray:
     return CONVOLVED[:, None] * (weighted @ radiance(directions))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Harmonics:
     """The coefficients of ``E / pi``."""
 

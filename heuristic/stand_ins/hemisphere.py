@@ -24,13 +24,13 @@ EVENNESS = 1e-3
 them apart: where all surfaces seen are inclined alike."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class SkyAndGround:
     """The colours of both halves, where up is, and whether they are in place of ``I_a``."""
 
     sky: Table
     ground: Table
-    up: np.ndarray
+    up: list[float]
     replaces_ambient: bool
 
 
@@ -80,14 +80,14 @@ def prepare(scene: Any) -> SkyAndGround:
     """Fit sky and ground to the indirect light of a scene."""
     up = upward(scene)
     sky, ground = fit(gather(scene), up)
-    return SkyAndGround(Table(sky), Table(ground), up, has_environment(scene))
+    return SkyAndGround(Table(sky), Table(ground), up.tolist(), has_environment(scene))
 
 
 def shade(point: Point) -> Array:
     """Return the chapters' model with the light of sky and ground."""
     prepared = point.prepared
     sky, ground = (one.at(point.wavelengths) for one in (prepared.sky, prepared.ground))
-    cosine = dr.dot(point.normal, mi.Vector3f(prepared.up.tolist()))
+    cosine = dr.dot(point.normal, mi.Vector3f(prepared.up))
     return lit(point, irradiance(sky, ground, cosine), prepared.replaces_ambient)
 
 

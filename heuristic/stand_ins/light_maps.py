@@ -26,7 +26,7 @@ SMALLEST_SINE = 0.1
 """For the height above surfaces that face the lamp: they may be curved."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class LightMap:
     """The depth image of one lamp.
 
@@ -58,7 +58,7 @@ class LightMap:
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
+@dataclass
 class CubeMap(LightMap):
     """Of a lamp with a position."""
 
@@ -79,7 +79,7 @@ class CubeMap(LightMap):
         return dr.gather(mi.Float, self.depths, _cube_texel(place, self.resolution))
 
 
-@dataclass(frozen=True)
+@dataclass
 class SquareMap(LightMap):
     """Of parallel light: ``frame`` has its third axis along the rays; ``radius`` is the scene's."""
 

@@ -16,7 +16,7 @@ from heuristic.stand_ins.gathering import gather
 from heuristic.stand_ins.tabulated import Table
 
 
-@dataclass(frozen=True)
+@dataclass
 class Constant:
     """Light that is the same everywhere, and whether it is in place of ``I_a``."""
 

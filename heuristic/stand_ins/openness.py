@@ -28,7 +28,7 @@ REACH = Parameter("reach", 0.5, 0.01, 100.0, prepared=True)
 Without a bound a closed room would be dark."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Hidden:
     """Ambient light where nothing is near, the reach in units of the scene."""
 
