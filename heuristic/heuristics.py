@@ -1,9 +1,10 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are built in. A program declares its own with :func:`declare`, a package by an entry point
-of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are no
-heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A program declares its own with
+:func:`declare`, a package by an entry point of the group :data:`GROUP` whose object is a
+:class:`Heuristic`. Flat and Gouraud shading are no heuristics: they interpolate whatever heuristic
+there is (:mod:`heuristic.interpolation`).
 """
 
 import sys

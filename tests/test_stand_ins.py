@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons.gallery.builtin import SCENES
+from heuristic import meshes
 from heuristic.errors import InputError
 from heuristic.heuristics import named
 from heuristic.stand_ins import depth_image, gathering, harmonics, hemisphere, openness
@@ -480,6 +481,17 @@ def test_a_negative_picture_is_found_out(rgb, tmp_path, monkeypatch):
     monkeypatch.setattr(gathering.Gathered, "mean", lambda self, of=None: np.full(3, -1.0))
     found = list(fuzzed_stand_ins.wrong(3, tmp_path))
     assert any("mean-ambient" in line for line in found)
+
+
+@pytest.mark.parametrize("interpolation", ["flat", "gouraud"])
+@pytest.mark.parametrize("model", MODELS)
+def test_vertices_and_faces_are_shaded_too(rgb, interpolation, model):
+    given = sky_above(two_colours)
+    given["lamp"] = {"type": "heuristic_directional", "direction": (1, 2, -1)}
+    given["ball"] = meshes.to_mesh(mi.load_dict(given["ball"]), 24)
+    scene = mi.load_dict(given)
+    found, smooth = image(scene, model, interpolation=interpolation), image(scene, model)
+    assert found.mean() == pytest.approx(smooth.mean(), rel=0.03)
 
 
 @pytest.mark.parametrize("model", MODELS)

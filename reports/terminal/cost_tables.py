@@ -90,7 +90,8 @@ def closure(record):
 
 
 def _rungs(record):
-    yield "method", "samples", "median", "interval", "first run", "mean ΔE2000", "RMSE", ""
+    first = "first run (preparing)"
+    yield "method", "samples", "median", "interval", first, "mean ΔE2000", "RMSE", ""
     for point in record.points:
         yield (
             _all_names(record, point.rung),
@@ -104,7 +105,7 @@ def _rungs(record):
 
 
 def _first(point):
-    prepared = f" ({_time(point.prepare_s)} to prepare)" if point.prepare_s else ""
+    prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
     return f"{_time(point.first_s)}{prepared}"
 
 
