@@ -310,17 +310,17 @@ def test_rays_find_the_openness_of_closed_forms(rgb, make, expected):
         else:
             x, y = distance * np.cos(turn), distance * np.sin(turn)
         position, normal, visible = floor_points(scene, x, y)
-        found = np.array(openness.openness(visible, position, normal, mi.Float(250.0)))
+        found = np.array(openness.openness(visible, position, normal, mi.Float(250.0), 16))
         # 65,536 rays, stratified by sixteens: well below the half percent of as many at random.
         assert found.mean() == pytest.approx(expected(distance), abs=0.004)
-        assert set(np.unique(found * openness.RAYS % 1)) == {0.0}
+        assert set(np.unique(found * 16 % 1)) == {0.0}
 
 
 def test_what_lies_beyond_the_reach_hides_nothing(rgb):
     scene = mi.load_dict(corner())
     position, normal, visible = floor_points(scene, np.full(64, 0.5), np.linspace(-1, 1, 64))
     near, far = (
-        np.array(openness.openness(visible, position, normal, mi.Float(reach))).mean()
+        np.array(openness.openness(visible, position, normal, mi.Float(reach), 16)).mean()
         for reach in (0.45, 0.55)
     )
     assert near == 1
@@ -365,7 +365,7 @@ def test_few_horizons_find_about_what_rays_do(rgb):
     found, places = beside_the_wall(1.5)
     scene = mi.load_dict(corner())
     position, normal, visible = floor_points(scene, *np.repeat(places[:, :2].T, 64, axis=1))
-    rays = np.array(openness.openness(visible, position, normal, mi.Float(1.5)))
+    rays = np.array(openness.openness(visible, position, normal, mi.Float(1.5), 16))
     rays = rays.reshape(-1, 64).mean(axis=1)
     assert found.mean() == pytest.approx(rays.mean(), abs=0.05)
     assert np.corrcoef(found, rays)[0, 1] > 0.9

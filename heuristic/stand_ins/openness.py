@@ -21,7 +21,11 @@ from heuristic.stand_ins import gathering, tabulated
 from heuristic.stand_ins.ambient_light import has_environment, lit
 from heuristic.stand_ins.tabulated import Table
 
-RAYS = 16
+RAYS = Parameter("rays", 8, 1, 256)
+"""From each point; a pixel of several samples has as many times more."""
+
+MANY = 64
+"""Rays for the mean openness that the ambient light is calibrated by."""
 
 REACH = Parameter("reach", 0.5, 0.01, 100.0, prepared=True)
 """How far away things hide light, in units of the size of what the camera sees (:func:`reach_of`).
@@ -48,20 +52,23 @@ def hashed(position: Any) -> tuple[Any, Any]:
 
 
 @dr.syntax
-def openness(visible: Callable, position: Any, normal: Any, distance: Any) -> Any:
-    """Return the share of the cosine-weighted hemisphere that nothing hides within a distance."""
+def openness(visible: Callable, position: Any, normal: Any, distance: Any, rays: Any) -> Any:
+    """Return the share of the cosine-weighted hemisphere that nothing hides within a distance.
+
+    ``rays`` is their number, as a plain or Dr.Jit number.
+    """
     frame = mi.Frame3f(normal)
     shift, turn = hashed(position)
-    distance = mi.Float(distance)  # a loop may widen what it is given
+    distance, rays = mi.Float(distance), dr.round(mi.Float(rays))  # loops widen what they are given
     count, number = mi.Float(0), mi.UInt32(0)
-    while number < RAYS:
-        square = (mi.Float(number) + shift) / RAYS
+    while mi.Float(number) < rays:
+        square = (mi.Float(number) + shift) / rays
         sine, cosine = dr.sincos(dr.two_pi * (mi.radical_inverse_2(number, 0) + turn))
         radius = dr.sqrt(square)
         toward = frame.to_world(mi.Vector3f(radius * cosine, radius * sine, dr.sqrt(1 - square)))
         count += dr.select(visible(toward, distance), 1, 0)
         number += 1
-    return count / RAYS
+    return count / rays
 
 
 def reach_of(scene: Any, reach: float) -> float:
@@ -91,14 +98,17 @@ def prepare(scene: Any, reach: float) -> Hidden:
     """Gather the mean of the indirect light of a scene, and of the openness where it arrives."""
     distance = mi.Float(reach_of(scene, reach))
     dr.make_opaque(distance)
-    light = calibrated(scene, lambda at: openness(at.visible(scene), at.si.p, at.normal, distance))
+    light = calibrated(
+        scene, lambda at: openness(at.visible(scene), at.si.p, at.normal, distance, MANY)
+    )
     return Hidden(light, distance, has_environment(scene))
 
 
 def shade(point: Point) -> Array:
     """Return the chapters' model with the mean of the indirect light, hidden near by."""
     prepared = point.prepared
-    share = openness(point.given.visible, point.position, point.normal, prepared.distance)
+    place = point.position, point.normal, prepared.distance
+    share = openness(point.given.visible, *place, point.parameters.rays)
     arriving = prepared.arriving.at(point.wavelengths) * share
     return lit(point, arriving, prepared.replaces_ambient, share)
 
@@ -109,7 +119,7 @@ OPENNESS = HEURISTICS.own(
         shade,
         "ambient occlusion",
         needs=frozenset(INPUTS) - {"uv"},
-        parameters=(REACH,),
+        parameters=(REACH, RAYS),
         prepare=prepare,
         refuse=lambda scene: "" if scene.shapes() else "it has no shape",
     )
