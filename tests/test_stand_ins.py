@@ -91,11 +91,32 @@ def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
 
 def test_an_environment_is_gathered_where_nothing_hides_it(rgb):
     """A sphere under an even sky receives it everywhere, whatever ``I_a`` says."""
-    scene = sky_above(lambda toward: np.full((len(toward), 3), 0.25), ambient=9.0)
+    scene = sky_above(lambda toward: np.full((len(toward), 3), 0.25))
     assert gathering.gather(mi.load_dict(scene)).mean() == pytest.approx(0.25, rel=0.005)
-    for model in ("mean-ambient", "harmonics-ambient", "hemisphere-ambient"):
-        seen = image(mi.load_dict(scene), model)[16, 16]
+    for model in ("mean-ambient", "harmonics-ambient", "hemisphere-ambient", "ambient-occlusion"):
+        seen = image(mi.load_dict(scene), model, ambient=9.0)[16, 16]
         assert seen == pytest.approx(0.25 * 0.8, rel=0.01), model
+
+
+def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
+    """A corner of no lamps: even light on all, and as much less as is hidden."""
+    given = corner()
+    for name in ("floor", "wall"):
+        given[name]["bsdf"] = given[name]["bsdf"] | {"k_a": 0.4}
+    scene = mi.load_dict(given)
+    plain = image(scene, "phong", ambient=2.0)
+    assert plain.max() == pytest.approx(0.8)
+    for model in ("mean-ambient", "hemisphere-ambient"):
+        np.testing.assert_allclose(image(scene, model, ambient=2.0), plain, atol=1e-6)
+    at = gathering.seen(scene)
+    distance = openness.reach_of(scene, openness.REACH.default)
+    share = openness.openness(at.visible(scene), at.si.p, at.normal, mi.Float(distance), 256)
+    share = np.array(share)[np.array(at.si.is_valid())]
+    for model, within in (("ambient-occlusion", 0.01), ("screen-occlusion", 0.04)):
+        found = image(scene, model, 16, ambient=2.0)
+        seen = plain.max(axis=2) > 0.4
+        assert found[seen].mean() == pytest.approx(0.8 * share.mean(), rel=within), model
+    assert share.mean() < 0.97
 
 
 def test_a_sun_is_gathered_without_noise(rgb):
