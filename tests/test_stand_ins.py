@@ -119,6 +119,20 @@ def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
     assert share.mean() < 0.97
 
 
+def test_what_is_reflected_and_what_comes_from_around_add_up(rgb):
+    """The mean of a picture by ``path``, of the same surfaces under the same sky and lamp."""
+    given = corner()
+    given["sky"] = sky_above(two_colours)["sky"]
+    given["wall"]["bsdf"] = {"type": "phong", "k_d": 0.9, "twosided": True}
+    given["lamp"] = {"type": "heuristic_directional", "direction": (-2, 1, -1)}
+    scene = mi.load_dict(given)
+    path = mi.load_dict({"type": "path", "hide_emitters": True})
+    expected = np.array(mi.render(scene, integrator=path, spp=64)).mean(axis=(0, 1))
+    for model in STAND_INS:
+        found = image(scene, model, 4, occlusion=True, hide_emitters=True).mean(axis=(0, 1))
+        np.testing.assert_allclose(found, expected, rtol=0.02, err_msg=model)
+
+
 def test_a_sun_is_gathered_without_noise(rgb):
     """One texel of the sky holds all light: paths alone would meet it once in ten thousand."""
     size = gathering.GRID

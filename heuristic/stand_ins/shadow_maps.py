@@ -72,7 +72,7 @@ def _shaded(point: Point, taps: Iterable[tuple], width: Any) -> Array:
     bare = replace(point.given.material, k_i=0, k_a=0)
     for light, depths in zip(point.given.lights, point.prepared, strict=True):
         own = point.textbook(lights=[light], material=bare, ambient=0, visible=None)
-        colour += own * _share(point, light, depths, taps, width)
+        colour = colour + own * _share(point, light, depths, taps, width)
     return colour
 
 
