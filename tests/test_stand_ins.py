@@ -416,6 +416,27 @@ def test_horizons_find_the_openness_beside_a_ball(rgb):
     assert np.corrcoef(found[chosen], expected)[0, 1] > 0.9
 
 
+@pytest.mark.parametrize("camera", ["perspective", "thinlens", "crop", "shifted"])
+def test_what_a_pixel_sees_is_found_there_again(rgb, camera):
+    """For every camera that has a viewpoint, and whatever part of the film is kept."""
+    given = ball_on_a_floor()
+    sensor = given["sensor"]
+    if camera == "thinlens":
+        sensor |= {"type": "thinlens", "aperture_radius": 0.01, "focus_distance": 4.0}
+    elif camera == "crop":
+        sensor["film"] |= {"crop_width": 40, "crop_height": 25}
+        sensor["film"] |= {"crop_offset_x": 30, "crop_offset_y": 61}
+    elif camera == "shifted":
+        sensor |= {"principal_point_offset_x": 0.2, "principal_point_offset_y": -0.1}
+    found = depth_image.depth_image(mi.load_dict(given))
+    places = np.array(found.places, float).reshape(-1, 3)
+    places = places[np.isfinite(places).all(axis=1)]
+    assert len(places) > 500
+    again = np.array(found.at(mi.Point3f(places.T)), float).T
+    # A pixel's centre lies on no border, so that rounding leads to no other pixel.
+    assert np.mean(np.any(abs(again - places) > 1e-3, axis=1)) < 0.01
+
+
 def test_an_open_floor_has_all_light_from_every_side(rgb):
     given = ball_on_a_floor()
     del given["ball"]

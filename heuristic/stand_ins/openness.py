@@ -34,7 +34,7 @@ Without a bound a closed room would be dark."""
 
 @dataclass
 class Hidden:
-    """Ambient light where nothing is near, the reach in units of the scene."""
+    """Ambient light where nothing is near, and the reach in units of the scene."""
 
     arriving: Table
     distance: Any
@@ -78,7 +78,7 @@ def reach_of(scene: Any, reach: float) -> float:
     much larger than what stands before it does not change it.
     """
     si = gathering.seen(scene, wavelengths=tabulated.batches()[0]).si
-    places = np.array(si.p, float).T[np.array(si.is_valid() & dr.full(mi.Bool, True, 1))]
+    places = np.array(si.p, float).T[np.array(si.is_valid())]
     if not len(places):
         return reach
     return reach * float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=1)))
