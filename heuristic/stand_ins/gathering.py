@@ -77,8 +77,8 @@ class Gathered:
     def mean(self, of: np.ndarray | None = None) -> np.ndarray:
         """Return the mean (K,) of what arrives, or of values (N, 1 or K), as the image shows it.
 
-        The weight of a point is its ``k_d``: a surface that all points' mean reaches then has the
-        light's true mean in the image.
+        The weight of a point is its ``k_d``, so that ``k_d`` times the mean has the same mean over
+        the image as ``k_d`` times what arrives.
         """
         values = self.arriving if of is None else of
         weight = self.k_d.sum(axis=0)
