@@ -476,7 +476,7 @@ def test_a_scene_that_cannot_be_shaded_so_is_refused_with_the_reason(rgb, model,
     if "camera" in change:
         del given["sensor"]["fov"]
         given["sensor"]["type"] = "orthographic"
-    with pytest.raises(InputError, match=reason):
+    with pytest.raises(InputError, match=f"^heuristic {model} cannot shade this scene: .*{reason}"):
         image(mi.load_dict(given), model)
     assert named(model).refuse(mi.load_dict(given))
 
