@@ -1,6 +1,7 @@
 """Declarations by name: the package's own, a program's, and those of installed packages."""
 
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Generic, Protocol, TypeVar
 
@@ -26,10 +27,12 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     group
         Of the entry points by which installed packages declare theirs. They are loaded once, when
         the declarations are listed or a name is not known.
+    home
+        A package of our own whose import declares more; it is imported as late as those.
     """
 
-    def __init__(self, kind: str, group: str) -> None:
-        self.kind, self.group = kind, group
+    def __init__(self, kind: str, group: str, home: str = "") -> None:
+        self.kind, self.group, self.home = kind, group, home
         self._own: dict[str, Declaration] = {}
         self._others: dict[str, Declaration] = {}
         self._loaded = False
@@ -47,7 +50,7 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         InputError
             When the name is one of the package's own.
         """
-        if declaration.name in self._own:
+        if declaration.name in self._all_own():
             raise InputError(
                 f"{self.kind} {declaration.name!r} is declared already, by fotismos itself: give"
                 " another name."
@@ -58,7 +61,7 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     @property
     def built_in(self) -> tuple[str, ...]:
         """The names of the package's own."""
-        return tuple(self._own)
+        return tuple(self._all_own())
 
     def others(self) -> tuple[Declaration, ...]:
         """Return what was declared from outside.
@@ -81,13 +84,19 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         return tuple(self._others.values())
 
     def __getitem__(self, name: str) -> Declaration:
-        if name not in self._own and name not in self._others:
+        if name not in self._own and name not in self._others and name not in self._all_own():
             self.others()
         return self._own[name] if name in self._own else self._others[name]
 
     def __iter__(self) -> Iterator[str]:
         self.others()
-        return iter((*self._own, *self._others))
+        return iter((*self._all_own(), *self._others))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
+
+    def _all_own(self) -> dict[str, Declaration]:
+        """Return the package's own, those of its :attr:`home` among them."""
+        if self.home:
+            import_module(self.home)
+        return self._own

@@ -1,9 +1,10 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are built in. A program declares its own with :func:`declare`, a package by an entry point
-of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are no
-heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A program declares its own with
+:func:`declare`, a package by an entry point of the group :data:`GROUP` whose object is a
+:class:`Heuristic`. Flat and Gouraud shading are no heuristics: they interpolate whatever heuristic
+there is (:mod:`heuristic.interpolation`).
 """
 
 import sys
@@ -36,6 +37,9 @@ class Parameter:
         A Python name: of the attribute in ``point.parameters`` and of the integrator's parameter.
     default, low, high
         In the heuristic's own unit; both bounds are allowed.
+    prepared
+        Whether what is prepared depends on it. ``prepare`` then gets it by its name, as a plain
+        number, and is called again where it changes.
 
     Raises
     ------
@@ -47,6 +51,7 @@ class Parameter:
     default: float
     low: float
     high: float
+    prepared: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier() or self.name in RESERVED:
@@ -85,7 +90,11 @@ class Heuristic:
         Numbers that it can be tuned by.
     prepare
         ``prepare(scene)`` is called once for a Mitsuba scene, before its first sample, and returns
-        anything: a table, a depth image. Later edits of the scene do not call it again.
+        anything: a table, a depth image. Later edits of the scene do not call it again. It gets
+        the parameters that are ``prepared`` by their names.
+    refuse
+        ``refuse(scene)`` returns why a scene cannot be shaded so, in words such as "there is no
+        environment"; empty where it can.
     form
         Form of the specular lobe that materials are read with; None for their own.
 
@@ -100,8 +109,9 @@ class Heuristic:
     label: str = ""
     needs: frozenset[str] = frozenset(INPUTS) - {"visible"}
     parameters: tuple[Parameter, ...] = ()
-    prepare: Callable[[Any], Any] | None = None
+    prepare: Callable[..., Any] | None = None
     form: str | None = None
+    refuse: Callable[[Any], str] | None = None
 
     def __post_init__(self) -> None:
         if not self.name.replace("-", "").isalnum() or self.name != self.name.lower():
@@ -119,6 +129,20 @@ class Heuristic:
         object.__setattr__(self, "needs", frozenset(self.needs))
         object.__setattr__(self, "label", self.label or self.name)
 
+    def prepared(self, scene: Any, values: dict[str, float]) -> Any:
+        """Return what is prepared for a scene, with the values of all parameters.
+
+        Raises
+        ------
+        InputError
+            With the reason why the scene cannot be shaded so.
+        """
+        if self.refuse is not None and (reason := self.refuse(scene)):
+            raise InputError(
+                f"heuristic {self.name} cannot shade this scene: {reason}. Choose another one."
+            )
+        return self.prepare(scene, **values) if self.prepare is not None else None
+
     def digest(self) -> str:
         """Return a digest of the files that ``shade`` and ``prepare`` are in."""
         modules = {function.__module__ for function in (self.shade, self.prepare) if function}
@@ -126,13 +150,19 @@ class Heuristic:
         return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
 
     def evaluate(
-        self, given: Given, uv: Array, parameters: dict[str, Array], prepared: Any
+        self,
+        given: Given,
+        uv: Array,
+        parameters: dict[str, Array],
+        prepared: Any,
+        wavelengths: Array = (),
     ) -> Array:
         """Return the colour at points; the arguments are what :class:`Point` hands on."""
-        return self.shade(Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared))
+        tuned = SimpleNamespace(**parameters)
+        return self.shade(Point(self.needs, given, uv, tuned, prepared, wavelengths))
 
 
-HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP)
+HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
 """All heuristics by name."""
 
 declare = HEURISTICS.declare

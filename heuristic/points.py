@@ -78,6 +78,8 @@ class Point:
         The heuristic's parameters by name, as attributes.
     prepared
         What the heuristic's ``prepare`` returned for the scene; None without it.
+    wavelengths
+        Those that colours are for, in nm: four in spectral variants, otherwise none.
 
     Raises
     ------
@@ -90,6 +92,7 @@ class Point:
     _uv: Array
     parameters: SimpleNamespace
     prepared: Any = None
+    wavelengths: Array = ()
 
     @_input
     def position(self) -> Array:
@@ -133,9 +136,12 @@ class Point:
         """The scene's lights at the points, in the order of the scene."""
         return tuple(map(self._light, self.given.lights))
 
-    def textbook(self) -> Array:
-        """Return the chapters' model at the points, :func:`heuristic.shade`."""
-        return shading.shade(*self.given)
+    def textbook(self, **instead: Any) -> Array:
+        """Return the chapters' model at the points, :func:`heuristic.shade`.
+
+        Arguments by name stand in place of those that are given there, such as ``ambient=0``.
+        """
+        return shading.shade(*self.given._replace(**instead))
 
     def _light(self, light: Any) -> LightAtPoint:
         toward, intensity, distance = light.illuminate(self.given.position)

@@ -132,8 +132,8 @@ def rendering_options(command):
         click.option("--resolution", type=resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
         click.option("--heuristic", metavar="NAME",
-                     help="Which heuristic shades: phong, blinn, or one that a package declares."
-                     " [default: phong]"),
+                     help="Which heuristic shades: phong, blinn, what engines use (such as"
+                     " mean-ambient), or one that a package declares. [default: phong]"),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
                      help="Shading of polygons in the heuristic half. [default: the scene's own,"
                      " else phong]"),

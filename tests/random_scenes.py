@@ -275,7 +275,7 @@ def examine(seed, folder):
     if (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2)):
         return Examined(seed, word, "same")
     stock = mi.load_dict(scene, optimize=False)
-    if seed % BOTH == 0 and not _is_sound(np.array(ready.heuristic.render(seed))):
+    if seed % BOTH == 0 and not is_sound(np.array(ready.heuristic.render(seed))):
         return Examined(seed, f"{word}, the heuristic half", "not finite or negative")
     found = _judged(seed, word, ready, stock, SPP)
     doubtful = abs(found.departure) > TOLERANCE and found.errors > DOUBT
@@ -290,7 +290,7 @@ def _judged(seed, word, ready, stock, spp):
         own = [_rgb(np.array(mi.render(stock, spp=spp, seed=each))) for each in seeds]
     except (FotismosError, RuntimeError) as error:
         return Examined(seed, str(error)[:200], "failed")
-    if not all(_is_sound(image) for image in (*planned, *own)):
+    if not all(is_sound(image) for image in (*planned, *own)):
         return Examined(seed, word, "not finite or negative")
     means = [np.mean(images, axis=(1, 2)) for images in (planned, own)]  # (passes, channels)
     errors = [m.std(axis=0, ddof=1) / PASSES**0.5 for m in means]
@@ -304,7 +304,7 @@ def _judged(seed, word, ready, stock, spp):
     return Examined(seed, word, state, a[worst], b[worst], departure[worst], size)
 
 
-def _is_sound(image):
+def is_sound(image):
     """Tell whether all values are finite, and none negative but for colours beyond RGB."""
     lowest = -1e-6 if not mi.is_spectral else -0.1
     return bool(np.isfinite(image).all() and image.min() >= lowest * max(image.max(), 1.0))

@@ -1,6 +1,7 @@
 """Heuristics declared from outside the package: shading, records, parameters, messages."""
 
 import json
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -374,7 +375,7 @@ def test_parameters_can_be_edited_without_a_new_kernel(rgb, declared):
 
 @pytest.mark.parametrize("name", ["fong", ""])
 def test_an_unknown_name_lists_what_there_is(name):
-    with pytest.raises(InputError, match="not declared: choose one of blinn, phong"):
+    with pytest.raises(InputError, match=r"not declared: choose one of .*blinn, .*phong"):
         Options(heuristic=name)
 
 
@@ -434,7 +435,8 @@ def test_the_record_the_page_and_the_terminal_name_it(run, declared, tmp_path, s
 def test_the_command_refuses_an_unknown_one(run, tmp_path):
     code, _, said = run("compare", "fig-8-9", "--heuristic", "fong", "-o", tmp_path / "out")
     assert code == 2
-    assert "'fong' is not declared: choose one of blinn, phong" in " ".join(said.split())
+    words = " ".join(said.split())
+    assert re.search(r"'fong' is not declared: choose one of .*blinn, .*phong", words)
 
 
 def test_its_picture_is_another_one_than_that_of_phong(rgb, declared):

@@ -1,5 +1,6 @@
 """Rungs from outside the package: found on the ladder, in the study, and in its tables."""
 
+import re
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -14,8 +15,10 @@ from comparisons.options import Options
 from heuristic import declared
 from heuristic.errors import InputError
 from reference.effects.light_forms import EXTENDED
-from reference.effects.obstacles import OCCLUSION
+from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
+from reference.scene.source import Source
 from reports.terminal import cost_tables, tables
+from tests.small_scene import SCENE as SMALL
 from tests.test_cost import TINY
 
 TOY = Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION}), max_depth=2))
@@ -55,6 +58,59 @@ def test_a_declared_rung_that_the_scene_cannot_tell_apart_is_merged(rgb):
     """Nothing shadows the one ball of the figure."""
     declare(TOY)
     assert named("fig-8-9")[-1] == ("direct", "path 3", TOY.name, "full plan")
+
+
+STAND_IN = Rung(
+    "half lit", "kernel", Kernel(heuristic="mean-ambient"), frozenset({INTERREFLECTION})
+)
+
+
+def left_out(name, rung):
+    declare(rung)
+    source = SCENES[name].source()
+    chosen = Options(resolution=(12, 12))
+    return Methods(source, chosen, prepare(source, chosen), (3,)).left_out
+
+
+def test_a_stand_in_is_left_out_with_the_reason_where_there_is_nothing_to_stand_in_for(rgb):
+    reason = left_out("fig-8-9", STAND_IN)[STAND_IN.name]
+    assert reason == "it stands in for interreflection, which the scene does not have"
+    assert STAND_IN.name not in left_out("cornell-box", STAND_IN)
+    assert (STAND_IN.name,) in named("cornell-box")
+
+
+def test_a_rung_whose_heuristic_refuses_the_scene_is_left_out_with_the_reason(rgb):
+    method = Kernel(heuristic="harmonics-ambient")
+    found = left_out("cornell-box", Rung("nine terms", "kernel", method))
+    assert found["nine terms"] == "it has no environment"
+
+
+def named_depths(source, chosen):
+    return Methods(source, chosen, prepare(source, chosen), (3, 4)).left_out
+
+
+def test_meshes_and_depths_that_a_scene_does_not_have_are_named(rgb, tmp_path):
+    path = tmp_path / "parallel.xml"
+    path.write_text(SMALL.replace("perspective", "orthographic"), encoding="utf-8")
+    source = Source("parallel", path)
+    chosen = Options(resolution=(12, 12))
+    found = Methods(source, chosen, prepare(source, chosen), (3,)).left_out
+    assert "has no single viewpoint" in found["Gouraud kernel"]
+    assert "so no depth image" in found["ambient occlusion, depth image"]
+    assert "path 4" not in found
+    assert named_depths(source, chosen)["path 4"] == "the scene's own paths end at depth 3"
+
+
+def test_a_study_records_what_it_left_out_and_what_was_prepared(rgb):
+    record = cost(SCENES["cornell-box"].source(), Options(resolution=(12, 12)), TINY).record
+    (nine,) = (method for method in record.left_out if method.name == "spherical harmonics")
+    assert nine.reason == "it stands in for environment, which the scene does not have"
+    lines = "\n".join(cost_tables.lines(record))
+    assert f"left out: {nine.name}: {nine.reason}" in lines
+    prepared = {point.rung: point.prepare_s for point in record.points}
+    assert prepared["constant ambient"] > 0
+    assert prepared["Phong kernel"] == prepared["direct"] == 0
+    assert re.search(r"constant ambient .*s \([\d.]+ m?s\)", lines)
 
 
 def test_declaring_a_name_again_replaces_the_rung():

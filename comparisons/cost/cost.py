@@ -1,19 +1,16 @@
 """What accuracy costs on one scene: the whole study."""
 
-import gc
 from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.compare import guarded
-from comparisons.cost.cost_record import Converged, Cost, Pictures, Point, Rung, Split
-from comparisons.cost.effort import DETERMINISTIC_SPP, QUICK, QUICK_WIDTH, WIDTH, Effort, reduced
+from comparisons.cost.climbing import climb
+from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Point, Rung, Split
+from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
-from comparisons.cost.methods import Methods
-from comparisons.cost.prediction import predict, require_shape
-from comparisons.cost.timing import Judge, measure
+from comparisons.cost.prediction import predict
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -21,9 +18,6 @@ from comparisons.effects.split import split
 from comparisons.options import Options
 from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import image_size
-from reference.rendering.passes import Stream, passes
-from reference.rendering.renderer import Renderer
-from reference.rendering.sums import Accumulator, Mean
 
 
 @dataclass(frozen=True)
@@ -77,8 +71,8 @@ def cost(
     Parameters
     ----------
     source, options, progress, command
-        As of :func:`comparisons.compare.compare`. ``options.spp`` are the most samples of a Monte
-        Carlo rung. Without a resolution, the film's own is reduced to :data:`WIDTH`.
+        As of :func:`comparisons.compare.compare`. What an omitted resolution and ``options.spp``
+        mean is said in :func:`comparisons.cost.climbing.climb`.
     effort : Effort, optional
         How much is rendered.
     at : tuple of int, optional
@@ -97,33 +91,21 @@ def cost(
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
-    options, effort = options or Options(), effort or Effort()
     progress = progress or (lambda *_: None)
-    if options.resolution is None:
-        shaped = replace(options, resolution=at)
-        options = replace(options, resolution=reduced(source, shaped, WIDTH))
-    elif at is not None:
-        require_shape(options.resolution, at)
-    if options.spp is not None:
-        effort = replace(effort, largest=options.spp)
-    ready = guarded(source, replace(options, spp=None, allow_empty=False))
+    found = climb(source, options or Options(), effort or Effort(), progress, at=at)
+    options, effort, ready, judge = found.options, found.effort, found.ready, found.judge
+    methods, reference, counted = found.methods, found.reference, ready.counted
     width, height = image_size(ready.scene)
-    counted = ready.counted
-    reference, groups = _converged(ready, effort, options.seed, progress)
-    judge = Judge(reference, counted, options.viewing)
-
-    methods = Methods(source, options, ready, effort.depths)
-    measured, images = _measured(methods, effort, judge, options.seed, progress)
     lattice = Lattice(options, methods, effort.replicates, effort.replicate_spp, options.seed)
     progress("pricing effects", 0, 1)
-    noiseless = Noiseless(judge, groups)
+    noiseless = Noiseless(judge, found.groups)
     priced = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders)
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
     # It changes the sizes of the scenes' films, and comes last.
     prediction = predict(methods, at, effort, options.seed, is_measured, progress) if at else None
 
-    found = Cost(
+    made = Cost(
         scene=source.name,
         variant=ready.reference.variant,
         heuristic_variant=methods.heuristic_variant,
@@ -141,7 +123,7 @@ def cost(
             mean_variance=judge.variance,
         ),
         rungs=tuple(Rung(r.name, r.names, r.monte_carlo, r.family) for r in methods.rungs),
-        **_compared(measured),
+        **_compared(found.measured),
         prices=priced.prices,
         closure=priced.closure,
         split=Split(tuple(part for part, _ in parts), whole),
@@ -152,11 +134,12 @@ def cost(
         command=command,
         guard=record.guard_record(ready.guard),
         prediction=prediction,
+        left_out=tuple(LeftOut(*pair) for pair in methods.left_out.items()),
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
     return Study(
-        record=found,
-        rungs={name: image for (name, _), image in images.items()},
+        record=made,
+        rungs={name: image for (name, _), image in found.images.items()},
         parts={part.name: image for part, image in parts},
         difference=difference,
         effects=priced.maps,
@@ -172,37 +155,6 @@ def quick(source, options=None, progress=None, command=""):
     options = options or Options()
     small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
     return cost(source, small, QUICK, progress, command)
-
-
-def _measured(methods, effort, judge, seed, progress):
-    """Time and judge the rungs; their scenes are released, since they slow what follows."""
-    renderers = {
-        (rung.name, spp): methods.renderer(rung.method, spp)
-        for rung in methods.rungs
-        for spp in (effort.counts if rung.monte_carlo else (DETERMINISTIC_SPP,))
-    }
-    gc.collect()  # scenes that pairing left behind
-    measured = measure(renderers, judge, effort.rounds, seed, progress)
-    methods.forget()
-    return measured
-
-
-def _converged(ready, effort, seed, progress):
-    """Render the reference that errors are told against, with seeds that no rung has.
-
-    Returns its :class:`~reference.rendering.sums.Estimate`, and the means (R, H, W, 3) of its
-    passes in as many groups as there are replicates.
-    """
-    renderer = Renderer(
-        ready.scene, ready.reference.integrator, effort.reference_spp, "reference image"
-    )
-    total, groups = Accumulator(), [Mean() for _ in range(effort.replicates)]
-    each = 2 * -(-ready.plan.passes // (2 * len(groups)))
-    count, stream = each * len(groups), Stream.OTHER_SIDE
-    for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
-        total.add(one.images[0])
-        groups[one.number % len(groups)].add(one.images[0])
-    return total.estimate(), np.stack([group.mean() for group in groups])
 
 
 def _compared(measured):

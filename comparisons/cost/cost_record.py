@@ -47,6 +47,13 @@ class Rung(Record):
     family: Family
 
 
+class LeftOut(Record):
+    """A method that the scene cannot have, and why not."""
+
+    name: str
+    reason: str
+
+
 class Interval(Record):
     """The median of repeats, their quartiles, and an interval for the median.
 
@@ -73,6 +80,8 @@ class Measured(Record):
         Name of the rung, and samples per pixel as rendered.
     first_s, compile_s
         Time of the first run, and what LLVM took of it.
+    prepare_s
+        Of the first run, what the heuristic took to prepare the scene; 0 where it prepares nothing.
     seconds
         Of the rounds.
     error, error_stderr
@@ -93,6 +102,7 @@ class Measured(Record):
     mse: float
     mse_stderr: Amount
     pareto: bool = False
+    prepare_s: Amount = 0.0
 
 
 class Point(Record):
@@ -326,6 +336,7 @@ class Cost(Record, kw_only=True):
     pictures: Pictures
     guard: GuardRecord | None = None
     prediction: Prediction | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     def points_of(self, rung: str) -> tuple[Measured, ...]:
         """Return the points of a rung, by its name."""

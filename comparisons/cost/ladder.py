@@ -4,12 +4,12 @@ What the plan leaves out is struck out of each rung's method first, so that meth
 which the scene cannot tell apart come out equal. They become one, which keeps their names.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from comparisons.cost.rungs import DEPTHS, Family, Kernel, Physical, Rung, rungs
 from heuristic.heuristics import PHONG, Heuristic
-from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.effect import Effect
 from reference.effects.light_forms import ENVIRONMENT
@@ -17,6 +17,8 @@ from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 from reference.planning.plan import Plan
 
 UNLIMITED = -1
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -65,15 +67,25 @@ class Scope:
         The scene's own limit of path length; -1 is none.
     random
         Whether direct light needs random numbers.
+    background
+        Whether the heuristic half has an environment, which its own ``I_a`` does not need.
     """
 
     effects: frozenset[Effect]
     kernel_shadows: bool
     max_depth: int
     random: bool
+    background: bool = True
+
+    @property
+    def indirect(self) -> frozenset[Effect]:
+        """The effects that a stand-in finds in the heuristic half."""
+        return self.effects - (frozenset() if self.background else {ENVIRONMENT})
 
 
-def scope(plan: Plan, differences: Collection[Effect], kernel_shadows: bool) -> Scope:
+def scope(
+    plan: Plan, differences: Collection[Effect], kernel_shadows: bool, background: bool
+) -> Scope:
     """Read the :class:`Scope` of a scene off its plan and its halves' differences."""
     # Where both halves have shadows, a method without them differs from both.
     shadows = {OCCLUSION} if plan.calls_for(OCCLUSION) else set()
@@ -86,12 +98,13 @@ def scope(plan: Plan, differences: Collection[Effect], kernel_shadows: bool) -> 
         max_depth=plan.scene_depth,
         random=plan.light_samples > 0
         or any(plan.calls_for(effect) or effect in differences for effect in sampled),
+        background=background,
     )
 
 
 def ladder(
     scope: Scope,
-    interpolations: Collection[Interpolation] = tuple(Interpolation),
+    refusals: Mapping[str, str] = NOTHING,
     depths: tuple[int, ...] = DEPTHS,
 ) -> tuple[Distinct, ...]:
     """Return the methods of a scene, cheapest idea first.
@@ -100,14 +113,14 @@ def ladder(
     ----------
     scope
         What the scene has.
-    interpolations
-        Those that its shapes allow.
+    refusals
+        Why it allows an interpolation or a heuristic not, by their names.
     depths
         Depths of ``path`` that are rungs.
     """
     found: dict[Kernel | Physical, tuple[Rung, ...]] = {}
     for rung in rungs(depths):
-        if _is_possible(rung.method, scope, interpolations):
+        if not why_not(rung, scope, refusals):
             method = _distinguished(rung.method, scope)
             found[method] = (*found.get(method, ()), rung)
     return tuple(
@@ -117,18 +130,27 @@ def ladder(
 
 def shaded_by(heuristic: Heuristic, distinct: Distinct) -> Distinct:
     """Return a method; of the kernel, with a name that tells of a heuristic other than Phong."""
-    if heuristic is PHONG or not isinstance(distinct.method, Kernel):
+    method = distinct.method
+    if heuristic is PHONG or not isinstance(method, Kernel) or method.heuristic:
         return distinct
     first = distinct.rungs[0]
     told = replace(first, name=f"{first.name}: {heuristic.label}")
     return replace(distinct, rungs=(told, *distinct.rungs))
 
 
-def _is_possible(method, scope, interpolations):
+def why_not(rung: Rung, scope: Scope, refusals: Mapping[str, str]) -> str:
+    """Return why a scene cannot have a rung, in words; empty where it can."""
+    if rung.stands_in_for and not rung.stands_in_for & scope.indirect:
+        labels = " or ".join(e.label for e in EFFECTS if e in rung.stands_in_for)
+        return f"it stands in for {labels}, which the scene does not have"
+    method = rung.method
     if isinstance(method, Kernel):
-        return method.interpolation in interpolations
+        words = (refusals.get(name, "") for name in (method.interpolation.value, method.heuristic))
+        return next(filter(None, words), "")
     depth = method.max_depth
-    return depth is None or scope.max_depth == UNLIMITED or depth <= scope.max_depth
+    if depth is None or scope.max_depth == UNLIMITED or depth <= scope.max_depth:
+        return ""
+    return f"the scene's own paths end at depth {scope.max_depth}"
 
 
 def _distinguished(method, scope):

@@ -5,9 +5,9 @@ from functools import cache
 import mitsuba as mi
 
 from comparisons.compare import Prepared
-from comparisons.cost.ladder import ladder, scope, shaded_by
+from comparisons.cost.ladder import ladder, scope, shaded_by, why_not
 from comparisons.cost.pairs import Pairs
-from comparisons.cost.rungs import DEPTHS, Kernel, Physical
+from comparisons.cost.rungs import DEPTHS, Kernel, Physical, rungs
 from comparisons.effects.between import Between
 from comparisons.options import Options
 from heuristic.errors import InputError
@@ -31,6 +31,13 @@ class Methods:
         The scene, paired and planned.
     depths
         Depths of ``path`` that are rungs.
+
+    Attributes
+    ----------
+    rungs
+        The ladder.
+    left_out
+        ``{name: why}`` of the rungs that the scene cannot have.
     """
 
     def __init__(
@@ -46,9 +53,17 @@ class Methods:
 
         self.pairs = Pairs(source, options, ready)
         self.between = Between(self.pairs.plain(), ready.plan, ready.scene)
-        self.scope = scope(ready.plan, self.between.differences, self.between.facts.has_shadows)
-        found = ladder(self.scope, self._interpolations(), depths)
+        self.scope = scope(
+            ready.plan,
+            self.between.differences,
+            self.between.facts.has_shadows,
+            ready.heuristic.scene.environment() is not None,
+        )
+        refusals = self._refused_interpolations() | self._refused_heuristics()
+        found = ladder(self.scope, refusals, depths)
         self.rungs = tuple(shaded_by(named(options.heuristic), rung) for rung in found)
+        reasons = {rung.name: why_not(rung, self.scope, refusals) for rung in rungs(depths)}
+        self.left_out = {name: reason for name, reason in reasons.items() if reason}
         self._asked_for = options.interpolation
         self._kernel_scene = cache(self._make_kernel_scene)
 
@@ -80,19 +95,31 @@ class Methods:
     def _kernel(self, method: Kernel) -> mi.Integrator:
         """Return the integrator alone: a scene of its own would slow all others."""
         graph = self.pairs.interpolated(method.interpolation).heuristic.copy()
-        graph.props(graph.nodes(INTEGRATOR)[0])["occlusion"] = method.shadows
+        props = graph.props(graph.nodes(INTEGRATOR)[0])
+        props["occlusion"] = method.shadows
+        if method.heuristic:
+            props["model"] = method.heuristic
         return graph.instantiate().integrator()
 
-    def _interpolations(self) -> tuple[Interpolation, ...]:
-        """Return the interpolations that shapes and sensor allow: some make no meshes."""
-        allowed = []
+    def _refused_interpolations(self) -> dict[str, str]:
+        """Return why shapes or sensor do not allow interpolations: some make no meshes."""
+        refused = {}
         for interpolation in Interpolation:
             try:
                 with variant(self.heuristic_variant):
                     self.pairs.interpolated(interpolation)
-            except InputError:
+            except InputError as error:
                 if interpolation is Interpolation.PHONG:
                     raise
-                continue
-            allowed.append(interpolation)
-        return tuple(allowed)
+                refused[interpolation.value] = str(error)
+        return refused
+
+    def _refused_heuristics(self) -> dict[str, str]:
+        """Return why the scene does not allow the heuristics of rungs that have their own."""
+        refused = {}
+        with variant(self.heuristic_variant):
+            for rung in rungs():
+                name = getattr(rung.method, "heuristic", "")
+                refuse = named(name).refuse if name else None
+                refused[name] = refuse(self.ready.heuristic.scene) if refuse else ""
+        return refused

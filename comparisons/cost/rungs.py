@@ -19,7 +19,8 @@ from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.effect import Effect
-from reference.effects.obstacles import INTERREFLECTION
+from reference.effects.light_forms import ENVIRONMENT
+from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
 
 DEPTHS = (3, 4, 5)
 """Depths of ``path`` that are rungs, as Mitsuba counts: 2 is direct light."""
@@ -40,10 +41,13 @@ class Kernel:
         Of its shading.
     shadows
         Whether it traces shadow rays.
+    heuristic
+        Name of the declaration that shades; empty for the one that the study is of.
     """
 
     interpolation: Interpolation = Interpolation.PHONG
     shadows: bool = False
+    heuristic: str = ""
 
 
 @dataclass(frozen=True)
@@ -88,11 +92,15 @@ class Rung:
         What shades.
     method
         What is simulated.
+    stands_in_for
+        Effects of which the scene must have one; others leave the rung out. Empty for a rung of
+        every scene.
     """
 
     name: str
     family: Family
     method: Kernel | Physical
+    stands_in_for: frozenset[Effect] = frozenset()
 
 
 KERNELS = (
@@ -101,6 +109,21 @@ KERNELS = (
     Rung("Phong kernel", "kernel", Kernel()),
     Rung("kernel with shadows", "kernel", Kernel(shadows=True)),
 )
+INDIRECT = frozenset({INTERREFLECTION, ENVIRONMENT})
+STAND_INS = tuple(
+    Rung(name, "kernel", Kernel(shadows="map" not in heuristic, heuristic=heuristic), effects)
+    for name, heuristic, effects in (
+        ("shadow map", "shadow-map", frozenset({OCCLUSION})),
+        ("filtered shadow map", "soft-shadow-map", frozenset({OCCLUSION})),
+        ("constant ambient", "mean-ambient", INDIRECT),
+        ("hemisphere ambient", "hemisphere-ambient", INDIRECT),
+        ("spherical harmonics", "harmonics-ambient", frozenset({ENVIRONMENT})),
+        ("ambient occlusion", "ambient-occlusion", frozenset({OCCLUSION})),
+        ("ambient occlusion, depth image", "screen-occlusion", frozenset({OCCLUSION})),
+    )
+)
+"""What engines use in place of transport, each with shadows and a textbook's lights."""
+
 PHONG_BSDF = Rung("phong BSDF, full transport", "phong BSDF", Physical(BSDF_FORMS))
 DIRECT = Rung("direct", "physical", Physical(frozenset({INTERREFLECTION})))
 FULL_PLAN = Rung("full plan", "physical", Physical())
@@ -126,7 +149,7 @@ def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:
 
 def _own(depths: tuple[int, ...]) -> tuple[Rung, ...]:
     paths = [Rung(f"path {depth}", "physical", Physical(max_depth=depth)) for depth in depths]
-    return (*KERNELS, PHONG_BSDF, DIRECT, *paths, FULL_PLAN)
+    return (*KERNELS, *STAND_INS, PHONG_BSDF, DIRECT, *paths, FULL_PLAN)
 
 
 for _rung in _own(DEPTHS):

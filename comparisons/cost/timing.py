@@ -40,29 +40,35 @@ class Judge:
         (H, W): the pixels that count.
     viewing : comparisons.departure.spaces.Viewing
         How linear values are looked at.
+    metric : comparisons.departure.metric.Metric
+        Whose mean is the error, ΔE2000 where it is not given.
     """
 
-    def __init__(self, reference, counted, viewing):
-        self.metric = LEADING
+    def __init__(self, reference, counted, viewing, metric=LEADING):
+        self.metric = metric
         self.viewing = viewing
         self.counted = counted
         self.reference = reference.mean[counted]
-        self.coordinates = self.metric.coordinates(self.reference, viewing)
+        self._distances = metric.against(reference.mean, counted, viewing)
         self.variance = float(np.mean(reference.standard_error[counted] ** 2))
         """Mean variance of the reference, which a mean squared error holds on top of its own."""
-        self.floor = self.distance(reference.mean[counted] + reference.noise[counted])
-        """Mean ΔE2000 that the reference's noise alone gives."""
+        self.floor = metric.mean(self._distances(reference.mean + reference.noise))
+        """Error that the reference's noise alone gives."""
 
     def errors(self, image):
-        """Return mean ΔE2000, and the linear MSE without the reference's share (can be < 0)."""
-        image = np.asarray(image, float)[self.counted]
-        mse = float(np.mean((image - self.reference) ** 2)) - self.variance
-        return self.distance(image), mse
+        """Return the metric's mean, and the linear MSE without the reference's share (may be < 0).
+
+        ``image`` is (H, W, 3).
+        """
+        image = np.asarray(image, float)
+        mse = float(np.mean((image[self.counted] - self.reference) ** 2)) - self.variance
+        return self.metric.mean(self._distances(image)), mse
 
     def distance(self, pixels):
-        """Return the mean ΔE2000 of the counted pixels (N, 3)."""
-        here = self.metric.coordinates(pixels, self.viewing)
-        return float(np.mean(self.metric.difference(self.coordinates, here)))
+        """Return the metric's mean over the counted pixels (N, 3), as if the others were black."""
+        image = np.zeros((*self.counted.shape, 3))
+        image[self.counted] = pixels
+        return self.metric.mean(self._distances(image))
 
 
 def measure(renderers, judge, rounds, seed, progress):
@@ -107,6 +113,7 @@ def _summarise(key, renderer, errors):
         spp=key[1],
         first_s=renderer.times[0],
         compile_s=renderer.compilation,
+        prepare_s=getattr(renderer.integrator, "preparation", 0.0),
         seconds=interval(renderer.times[2:]),
         error=float(means[0]),
         error_stderr=float(stderrs[0]),

@@ -29,6 +29,7 @@ equal seeds give equal rays. Python::
 from dataclasses import dataclass
 from functools import cache
 from operator import is_
+from time import perf_counter
 
 import drjit as dr
 import mitsuba as mi
@@ -49,16 +50,20 @@ LAYERS = 64
 class _Known:
     """What a rendering needs to know of a scene, and the scene's parts.
 
-    ``prepared`` is what the heuristic prepares for it, None where it prepares nothing.
+    ``prepared`` is what the heuristic prepares for it with ``values`` of its parameters, None where
+    it prepares nothing, and ``seconds`` the time that this took.
     """
 
     parts: list[mi.Object]
+    values: dict[str, float]
     materials: SceneMaterials
     prepared: object
+    seconds: float
 
-    def is_of(self, parts: list[mi.Object]) -> bool:
-        """Tell whether these are the parts of the scene."""
-        return len(parts) == len(self.parts) and all(map(is_, parts, self.parts))
+    def is_of(self, parts: list[mi.Object], values: dict[str, float]) -> bool:
+        """Tell whether these are the parts of the scene, and the values it was prepared with."""
+        is_same = len(parts) == len(self.parts) and all(map(is_, parts, self.parts))
+        return is_same and values == self.values
 
 
 def define():
@@ -125,22 +130,31 @@ def define():
             """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
             prepared = self.known(scene).prepared
             return lambda *given: self.model.evaluate(
-                Given(*given), si.uv, self.parameters, prepared
+                Given(*given), si.uv, self.parameters, prepared, si.wavelengths
             )
 
         def known(self, scene):
             """Return what is :class:`_Known` of a scene, made once for all that is traced of it."""
             # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
-            if self._known is None or not self._known.is_of(parts):
+            values = self._prepared_with
+            if self._known is None or not self._known.is_of(parts, values):
                 materials = SceneMaterials(scene, self.prune, self.model.form)
-                prepared = self.model.prepare(scene) if self.model.prepare else None
-                self._known = _Known(parts, materials, prepared)
+                begin = perf_counter()
+                prepared = self.model.prepared(scene, values)
+                dr.sync_thread()
+                seconds = perf_counter() - begin if self.model.prepare else 0.0
+                self._known = _Known(parts, values, materials, prepared, seconds)
             return self._known
 
         def prepare(self, scene):
             """Make what a rendering needs to know of a scene, which the first sample does else."""
             self.known(scene)
+
+        @property
+        def preparation(self):
+            """Seconds that preparing took for the scene rendered last."""
+            return self._known.seconds if self._known is not None else 0.0
 
         def lights(self, scene, si, active):
             """Return the kernel's form of the scene's lights."""
@@ -166,6 +180,8 @@ def define():
         def parameters_changed(self, keys=()):
             """Make edited numbers opaque, so that a new value compiles nothing."""
             dr.make_opaque(self.parameters)
+            prepared = [known.name for known in self.model.parameters if known.prepared]
+            self._prepared_with = {name: float(self.parameters[name][0]) for name in prepared}
 
         def to_string(self):
             return f"HeuristicIntegrator[model = {self.model.name}, ambient = {self.ambient}]"

@@ -132,6 +132,8 @@ class Renderer:
                     self.integrator.prepare(self.scene)
                 with _no_collection():
                     return self._replayed(*given)
+            except InputError:  # what is asked for cannot be prepared
+                raise
             except Exception:  # whatever a plugin raises, it says better when it is traced
                 self._replayed = None
         return _rendered(*given)

@@ -12,26 +12,45 @@ from reports.terminal import verbosity
 @jobs.scene_argument
 @jobs.json_option
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
+@click.option(
+    "--within",
+    type=jobs.Within(min=0, min_open=True),
+    metavar="ERROR",
+    help="Measure the ladder of cost, and name its cheapest method of no larger error.",
+)
+@click.option(
+    "--metric", default="dE2000", show_default=True, help="With --within: whose mean the error is."
+)
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.verbose_option
-def plan(scene, as_json, verify, timeout, **rendering):
+def plan(scene, as_json, verify, within, metric, timeout, **rendering):
     """Say which effects a scene calls for, by which rule, and what will be simulated.
+
+    With --within the exit code is 1 where no method measured stays within the error.
 
     \b
     Examples:
       fotismos plan cornell-box
       fotismos plan --verify fig-8-9 --resolution 128x128
+      fotismos plan --within 5 cornell-box
     """  # noqa: D301 click reads the \b as: keep these lines
+    if verify and within is not None:
+        raise click.UsageError("--verify and --within are two questions: ask one at a time.")
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons.records import to_json
-        from reports.terminal import plan_lines, progress
+        from reports.terminal import choice_lines, plan_lines, progress
 
-        request = jobs.request(rendering)
-        if verify:
+        request, code = jobs.request(rendering), 0
+        if within is not None:
+            with progress.shown() as bar:
+                words = (scene, request, within, metric)
+                found = pool.do(Task(scene, tasks.chosen, words, bar.of(scene)))
+            lines, code = [choice_lines.sentence(found)], int(found.chosen is None)
+        elif verify:
             with progress.shown() as bar:
                 task = Task(scene, tasks.verified, (scene, request, None), bar.of(scene))
                 found = pool.do(task)
@@ -43,3 +62,5 @@ def plan(scene, as_json, verify, timeout, **rendering):
         lines = [to_json(found).rstrip()]
     for line in lines:
         click.echo(line)
+    if code:
+        click.get_current_context().exit(code)

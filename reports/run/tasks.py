@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from comparisons.case import Request
+    from comparisons.cost.choice import Choice
     from comparisons.cost.cost_record import Cost
     from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit_record import FitRecord
@@ -35,6 +36,15 @@ def verified(name: str, request: Request, level: float | None, progress: Any) ->
 
     case = open_case(name, request)
     return verify(case.source, case.options, progress, LEVEL if level is None else level)
+
+
+def chosen(name: str, request: Request, within: float, metric: str, progress: Any) -> Choice:
+    """Measure the ladder of a scene, and name the cheapest method within an error."""
+    from comparisons.case import open_case
+    from comparisons.cost.choice import choose
+
+    case = open_case(name, request)
+    return choose(case.source, within, case.options, None, metric, progress)
 
 
 def hard_cases() -> HardCases:

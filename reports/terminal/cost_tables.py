@@ -17,6 +17,8 @@ def lines(record):
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so that everything is simulated: please report it"
     yield from _section("Error and time of each method", _rungs(record))
+    for method in record.left_out:
+        yield f"left out: {method.name}: {method.reason}"
     yield from _section("Best within a time", _equal_time(record))
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
     if record.prices.effects:
@@ -88,17 +90,23 @@ def closure(record):
 
 
 def _rungs(record):
-    yield "method", "samples", "median", "interval", "first run", "mean ΔE2000", "RMSE", ""
+    first = "first run (preparing)"
+    yield "method", "samples", "median", "interval", first, "mean ΔE2000", "RMSE", ""
     for point in record.points:
         yield (
             _all_names(record, point.rung),
             f"{point.spp}",
             *_timed(point.seconds.median, point.seconds),
-            _time(point.first_s),
+            _first(point),
             f"{point.error:.3f} ± {point.error_stderr:.3f}",
             f"{max(point.mse, 0) ** 0.5:.2g}",
             "front" if point.pareto else "",
         )
+
+
+def _first(point):
+    prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
+    return f"{_time(point.first_s)}{prepared}"
 
 
 def _equal_time(record):

@@ -1,0 +1,115 @@
+"""The cheapest method whose error stays within a tolerance, out of those measured."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from comparisons.cost.climbing import climb
+from comparisons.cost.cost_record import LeftOut, Measured
+from comparisons.cost.effort import Effort
+from comparisons.cost.rungs import FULL_PLAN
+from comparisons.departure.metrics import METRICS
+from comparisons.options import Options
+from comparisons.records import VERSION, Amount, Positive, Record, Resolution
+from heuristic.errors import unknown
+from reference.rendering.gbuffer import image_size
+from reference.scene.source import Source
+
+
+class Offer(Record):
+    """A method at one sample count, what it takes and what it leaves.
+
+    Attributes
+    ----------
+    method, spp
+        Name of the rung, and samples per pixel.
+    seconds, prepare_s
+        Median for one image, and what the heuristic took once to prepare the scene.
+    error, error_stderr
+        The metric's mean, and its standard error over the rounds.
+    """
+
+    method: str
+    spp: int
+    seconds: Positive
+    prepare_s: Amount
+    error: Amount
+    error_stderr: Amount
+
+
+class Choice(Record, kw_only=True):
+    """The answer of ``fotismos plan --within``.
+
+    Attributes
+    ----------
+    metric, within
+        Name of the metric, and the most that its mean may be.
+    chosen
+        The cheapest that stays within; None where none does.
+    best
+        The one of the least error.
+    full
+        The full plan with the fewest samples that stay within, or else with the most.
+    left_out
+        Methods that the scene cannot have.
+    """
+
+    scene: str
+    resolution: Resolution
+    metric: str
+    within: Positive
+    chosen: Offer | None
+    best: Offer
+    full: Offer
+    left_out: tuple[LeftOut, ...] = ()
+    record_version: int = VERSION
+
+
+def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
+    """Return the fastest of those whose error is not larger; of equal ones the most accurate."""
+    allowed = (point for point in points if point.error <= within)
+    return min(allowed, key=lambda point: (point.seconds.median, point.error), default=None)
+
+
+def choose(
+    source: Source,
+    within: float,
+    options: Options | None = None,
+    effort: Effort | None = None,
+    metric: str = "dE2000",
+    progress: Callable[..., Any] | None = None,
+) -> Choice:
+    """Measure the ladder of a scene, in the current variant, and choose from it.
+
+    Raises
+    ------
+    InputError
+        For a metric that is not known, and as :func:`comparisons.cost.climbing.climb`.
+    """
+    if metric not in METRICS:
+        raise unknown("metric", metric, METRICS)
+    told = progress or (lambda *_: None)
+    found = climb(source, options or Options(), effort or Effort(), told, METRICS[metric])
+    (full,) = (rung.name for rung in found.methods.rungs if FULL_PLAN.name in rung.names)
+    of_full = [point for point in found.measured if point.rung == full]
+    chosen = cheapest(found.measured, within)
+    return Choice(
+        scene=source.name,
+        resolution=image_size(found.ready.scene),
+        metric=metric,
+        within=within,
+        chosen=chosen and _offer(chosen),
+        best=_offer(min(found.measured, key=lambda point: (point.error, point.seconds.median))),
+        full=_offer(cheapest(of_full, within) or max(of_full, key=lambda point: point.spp)),
+        left_out=tuple(LeftOut(*pair) for pair in found.methods.left_out.items()),
+    )
+
+
+def _offer(point: Measured) -> Offer:
+    return Offer(
+        method=point.rung,
+        spp=point.spp,
+        seconds=point.seconds.median,
+        prepare_s=point.prepare_s,
+        error=point.error,
+        error_stderr=point.error_stderr,
+    )
