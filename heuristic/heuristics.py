@@ -1,8 +1,9 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are built in. A program declares its own with :func:`declare`, a package by an entry point
-of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are no
+``blinn`` are built in. A user's own is a function in a file (:mod:`heuristic.shading_files`); a
+program declares its own with :func:`declare`, a package by an entry point of the group
+:data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are no
 heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interpolation`).
 """
 
@@ -10,11 +11,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
+from importlib import import_module
 from numbers import Real
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from heuristic import trial
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.materials import check_form
@@ -24,6 +27,14 @@ GROUP = "fotismos.heuristics"
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic``, which those of heuristics stand beside."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The bounds of a number, both allowed."""
+
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -71,7 +82,8 @@ class Heuristic:
     Parameters
     ----------
     name
-        In commands, records and messages: lower case, digits and hyphens.
+        In commands, records and messages: lower case, digits and hyphens; or ``FILE.py:function``
+        of one in a file.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
@@ -88,6 +100,10 @@ class Heuristic:
         anything: a table, a depth image. Later edits of the scene do not call it again.
     form
         Form of the specular lobe that materials are read with; None for their own.
+    reads
+        What it was seen to read (:func:`heuristic.trial.examine`), such as ``material.k_d``.
+    code
+        Digest of the files that it is made of, where they are known.
 
     Raises
     ------
@@ -102,9 +118,12 @@ class Heuristic:
     parameters: tuple[Parameter, ...] = ()
     prepare: Callable[[Any], Any] | None = None
     form: str | None = None
+    reads: tuple[str, ...] = ()
+    code: str = ""
 
     def __post_init__(self) -> None:
-        if not self.name.replace("-", "").isalnum() or self.name != self.name.lower():
+        is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
+        if not is_word and not _in_file(self.name):
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
             )
@@ -121,6 +140,8 @@ class Heuristic:
 
     def digest(self) -> str:
         """Return a digest of the files that ``shade`` and ``prepare`` are in."""
+        if self.code:
+            return self.code
         modules = {function.__module__ for function in (self.shade, self.prepare) if function}
         files = [getattr(sys.modules[module], "__file__", None) for module in sorted(modules)]
         return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
@@ -128,8 +149,20 @@ class Heuristic:
     def evaluate(
         self, given: Given, uv: Array, parameters: dict[str, Array], prepared: Any
     ) -> Array:
-        """Return the colour at points; the arguments are what :class:`Point` hands on."""
-        return self.shade(Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared))
+        """Return the colour at points; the arguments are what :class:`Point` hands on.
+
+        Raises
+        ------
+        InputError
+            When a user's own fails, or returns something else than a colour.
+        """
+        point = Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared)
+        return self.shade(point) if self.is_own else trial.shaded(self, point)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is the package's own."""
+        return self.name in HEURISTICS.built_in
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP)
@@ -145,15 +178,35 @@ def named(name: str) -> Heuristic:
     Raises
     ------
     InputError
-        When none has the name, or an entry point cannot be loaded.
+        When none has the name, an entry point cannot be loaded, or a file cannot be used.
     """
+    if _in_file(name):
+        return import_module("heuristic.shading_files").opened(name)
     if name not in HEURISTICS:
         raise InputError(
-            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}. A"
+            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
+            " give a file with a function `shade(point)`, as FILE.py or FILE.py:FUNCTION. A"
             f" package declares its own by an entry point of the group {GROUP}, a program by"
             " heuristic.heuristics.declare."
         )
     return HEURISTICS[name]
+
+
+def name_of(given: "str | Heuristic | Callable[[Point], Array]") -> str:
+    """Return the name of a heuristic; declare one that is given as an object or a function.
+
+    A function of a notebook's or program's own is known in its process alone.
+    """
+    if isinstance(given, str):
+        return given
+    if not isinstance(given, Heuristic):
+        name = getattr(given, "__name__", "shade").lower().replace("_", "-").strip("-")
+        given = import_module("heuristic.functions").heuristic_of(given, name)
+    return declare(given).name
+
+
+def _in_file(name: str) -> bool:
+    return ".py" in name and import_module("heuristic.shading_files").is_file(name)
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}

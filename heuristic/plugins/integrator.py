@@ -78,7 +78,8 @@ def define():
             self.parameters_changed()
             self._known = None
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
-            self.prune = props.get("prune", True)
+            # A user's own gets arrays alone: a plain 0 has no components.
+            self.prune = props.get("prune", True) and self.model.is_own
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
@@ -133,7 +134,9 @@ def define():
             # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
             if self._known is None or not self._known.is_of(parts):
-                materials = SceneMaterials(scene, self.prune, self.model.form)
+                materials = SceneMaterials(
+                    scene, self.prune, self.model.form, not self.model.is_own
+                )
                 prepared = self.model.prepare(scene) if self.model.prepare else None
                 self._known = _Known(parts, materials, prepared)
             return self._known

@@ -16,7 +16,7 @@ from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
-from reference.pairing import bsdfs, lights
+from reference.pairing import bsdfs, lights, partners
 from reference.pairing.factors import Convention, Miss, specular_albedo
 from reference.pairing.lights import areas, environments
 from reference.rendering.gbuffer import gbuffer
@@ -130,7 +130,9 @@ def _paired(graph, settings, convention, interpolation, tessellation, prune, heu
     geometry = cache(_bare(graph).instantiate)
 
     model, half = named(heuristic), graph.copy()
+    asked = {} if model.is_own else partners.read(half, convention)
     given_physical = bsdfs.to_heuristic(half, convention)
+    partners.give(half, asked)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form
