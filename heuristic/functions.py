@@ -51,8 +51,8 @@ def heuristic_of(given: Any, name: str, label: str = "") -> Heuristic:
         return found if found.prepare else replace(found, reads=trial.examine(found))
     if not callable(given):
         raise InputError(
-            f"{name}: a {type(given).__name__} is not a heuristic: give a function of a point that"
-            " returns a colour, or a heuristic.heuristics.Heuristic."
+            f"{name} is of type {type(given).__name__}: give a function of a point that returns a"
+            " colour, or a heuristic.Heuristic."
         )
     parameters = _parameters(given)
     names = [parameter.name for parameter in parameters]

@@ -40,9 +40,12 @@ def shaded(heuristic: "Heuristic", point: Point) -> Any:
     try:
         value = heuristic.shade(point)
     except FotismosError as error:
-        raise type(error)(_with_place(heuristic, error)) from error
+        where, line, _ = told(error).partition(f"{type(error).__name__}: ")
+        raise type(error)(f"{where if line else ''}{error}") from error
     except Exception as error:  # whatever a user's own code raises
-        raise InputError(f"heuristic {heuristic.name}: {told(error)}{_advice(error)}") from error
+        raise InputError(
+            f"{told(error)}. The heuristic {heuristic.name} cannot shade with that.{_advice(error)}"
+        ) from error
     _require_colour(heuristic, value, point)
     return value
 
@@ -86,6 +89,8 @@ class _Watched:
 
 class _Trial(Point):
     """Points that note which of their inputs are read, of those that the heuristic declares."""
+
+    __qualname__ = "Point"  # as a user's errors have it
 
     def require(self, name: str) -> None:
         super().require(name)
@@ -216,12 +221,6 @@ def _kind(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"a {kind} of shape {value.shape}"
     return "None" if value is None else f"a {kind}"
-
-
-def _with_place(heuristic: "Heuristic", error: FotismosError) -> str:
-    """Return the message of one of our own errors, after the user's line where there is one."""
-    where, line, _ = told(error).partition(f"{type(error).__name__}: ")
-    return f"heuristic {heuristic.name}: {where if line else ''}{error}"
 
 
 def _advice(error: Exception) -> str:

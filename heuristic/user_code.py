@@ -1,5 +1,6 @@
 """Code of a user's: run without a trace in its process, and its errors told by file and line."""
 
+import inspect
 import os
 import sys
 import traceback
@@ -8,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from heuristic.errors import suggestion
 from heuristic.opened import is_users, noted
 
 
@@ -28,13 +30,15 @@ def told(error: BaseException) -> str:
     place = _place(error)
     where = f"{place[0]}, line {place[1]}: " if place else ""
     message = error.msg if isinstance(error, SyntaxError) else str(_first(error))
-    kind = type(_first(error)).__name__
-    return f"{where}{kind}: {message}".strip().rstrip(":")
+    first = _first(error)
+    if isinstance(first, AttributeError) and first.name:
+        message += suggestion(first.name, [each for each in dir(first.obj) if each[0] != "_"])
+    return f"{where}{type(first).__name__}: {message}".strip().rstrip(":")
 
 
 def defined(function: Callable[..., Any]) -> str:
     """Return where a function stands, as file and line; its name where that is not known."""
-    code = getattr(function, "__code__", None)
+    code = getattr(inspect.unwrap(function), "__code__", None)
     if code is None:
         return getattr(function, "__qualname__", repr(function))
     return f"{_shown(code.co_filename)}, line {code.co_firstlineno}"
