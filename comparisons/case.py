@@ -13,7 +13,7 @@ from comparisons.processes.worker import end_after_task
 from heuristic import program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG
+from heuristic.heuristics import PHONG, known_as
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
 from reference.planning.plan import wants_spectra
@@ -36,6 +36,9 @@ class Request:
 
     Parameters
     ----------
+    heuristic
+        A name, ``FILE.py:function``, a function of a point, or a :class:`heuristic.Heuristic`; the
+        latter two are declared in this process, and their name is kept.
     define
         Values for the placeholders of a scene file, by name.
     """
@@ -58,6 +61,8 @@ class Request:
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
         object.__setattr__(self, "define", values)
+        if self.heuristic is not None:
+            object.__setattr__(self, "heuristic", known_as(self.heuristic))
         if isinstance(self.resolution, Iterable):
             object.__setattr__(self, "resolution", tuple(self.resolution))
         for word, kinds in (("pairing", Convention), ("interpolation", Interpolation)):

@@ -86,6 +86,9 @@ class Simulation(Record):
             " they give; 0 where it asks each."
         ),
     ] = 0
+    heuristic_reads: Annotated[
+        tuple[str, ...], Meta(description="What the heuristic reads of the points that it shades.")
+    ] = ()
 
 
 class GuardRecord(Record):

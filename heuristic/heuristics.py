@@ -7,17 +7,16 @@ program declares its own with :func:`declare`, a package by an entry point of th
 heuristics: they interpolate whatever heuristic there is (:mod:`heuristic.interpolation`).
 """
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
-from importlib import import_module
 from numbers import Real
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from heuristic import trial
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.materials import check_form
@@ -123,7 +122,7 @@ class Heuristic:
 
     def __post_init__(self) -> None:
         is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
-        if not is_word and not _in_file(self.name):
+        if not is_word and not in_file(self.name):
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
             )
@@ -157,7 +156,16 @@ class Heuristic:
             When a user's own fails, or returns something else than a colour.
         """
         point = Point(self.needs, given, uv, SimpleNamespace(**parameters), prepared)
-        return self.shade(point) if self.is_own else trial.shaded(self, point)
+        if self.is_own:
+            return self.shade(point)
+        from heuristic import trial  # which what is the package's own does without
+
+        return trial.shaded(self, point)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What it reads, as far as that is known: what it was seen to read, or else its needs."""
+        return self.reads or tuple(sorted(self.needs))
 
     @property
     def is_own(self) -> bool:
@@ -180,8 +188,10 @@ def named(name: str) -> Heuristic:
     InputError
         When none has the name, an entry point cannot be loaded, or a file cannot be used.
     """
-    if _in_file(name):
-        return import_module("heuristic.shading_files").opened(name)
+    if in_file(name):
+        from heuristic import shading_files
+
+        return shading_files.opened(name)
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
@@ -192,7 +202,7 @@ def named(name: str) -> Heuristic:
     return HEURISTICS[name]
 
 
-def name_of(given: "str | Heuristic | Callable[[Point], Array]") -> str:
+def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
     """Return the name of a heuristic; declare one that is given as an object or a function.
 
     A function of a notebook's or program's own is known in its process alone.
@@ -201,12 +211,22 @@ def name_of(given: "str | Heuristic | Callable[[Point], Array]") -> str:
         return given
     if not isinstance(given, Heuristic):
         name = getattr(given, "__name__", "shade").lower().replace("_", "-").strip("-")
-        given = import_module("heuristic.functions").heuristic_of(given, name)
+        from heuristic.functions import heuristic_of
+
+        given = heuristic_of(given, name)
     return declare(given).name
 
 
-def _in_file(name: str) -> bool:
-    return ".py" in name and import_module("heuristic.shading_files").is_file(name)
+_WORDS = re.compile(r"(.+\.py)(?::(\w+))?", re.DOTALL)
+
+
+def in_file(name: str) -> tuple[str, str] | None:
+    """Return the file and the function that a name ``FILE.py:function`` has, None for others.
+
+    The function is empty where the name has none.
+    """
+    found = _WORDS.fullmatch(name)
+    return found and (found[1], found[2] or "")
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}

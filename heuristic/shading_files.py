@@ -5,7 +5,6 @@ command names no other, or an object :class:`heuristic.heuristics.Heuristic`. An
 same by the same words, and a file that changed is read again.
 """
 
-import re
 import runpy
 from dataclasses import replace
 from hashlib import sha256
@@ -16,7 +15,7 @@ import mitsuba as mi
 
 from heuristic.errors import InputError, suggestion
 from heuristic.functions import heuristic_of
-from heuristic.heuristics import Heuristic
+from heuristic.heuristics import Heuristic, in_file
 from heuristic.user_code import contained, told
 
 FUNCTION = "shade"
@@ -25,26 +24,7 @@ FUNCTION = "shade"
 MODULE = "_shading_of_a_user"
 """What a file's functions have as their module: a name that hides nobody else's."""
 
-_WORDS = re.compile(r"(?P<file>.+\.py)(:(?P<function>\w+))?", re.DOTALL)
-
 _opened: dict[tuple[str, Path, str | None], tuple[Heuristic, frozenset[Path]]] = {}
-
-
-def is_file(word: str) -> bool:
-    """Tell whether a word names a heuristic in a file."""
-    return _WORDS.fullmatch(word) is not None
-
-
-def parts(word: str) -> tuple[Path, str]:
-    """Return the file and the function that a word names."""
-    found = _WORDS.fullmatch(word)
-    return Path(found["file"]), found["function"] or FUNCTION
-
-
-def beside(word: str, folder: Path) -> str:
-    """Return the word for a file that is named as seen from a folder."""
-    path, function = parts(word)
-    return f"{folder / path}:{function}"
 
 
 def opened(word: str) -> Heuristic:
@@ -55,7 +35,8 @@ def opened(word: str) -> Heuristic:
     InputError
         When there is no such file or function, or its code fails: by its line.
     """
-    path, function = parts(word)
+    file, function = in_file(word)
+    path, function = Path(file), function or FUNCTION
     key = word, path.resolve(), mi.variant()
     if key in _opened:
         known, files = _opened[key]

@@ -43,9 +43,7 @@ def shaded(heuristic: "Heuristic", point: Point) -> Any:
         where, line, _ = told(error).partition(f"{type(error).__name__}: ")
         raise type(error)(f"{where if line else ''}{error}") from error
     except Exception as error:  # whatever a user's own code raises
-        raise InputError(
-            f"{told(error)}. The heuristic {heuristic.name} cannot shade with that.{_advice(error)}"
-        ) from error
+        raise InputError(f"{told(error)} (heuristic {heuristic.name}).{_advice(error)}") from error
     _require_colour(heuristic, value, point)
     return value
 
@@ -90,8 +88,6 @@ class _Watched:
 class _Trial(Point):
     """Points that note which of their inputs are read, of those that the heuristic declares."""
 
-    __qualname__ = "Point"  # as a user's errors have it
-
     def require(self, name: str) -> None:
         super().require(name)
         self.prepared[name] = None
@@ -100,6 +96,9 @@ class _Trial(Point):
     def material(self) -> Any:
         found = Point.material.func(self)
         return _Watched(found, lambda name: self.prepared.setdefault(name))
+
+
+_Trial.__name__ = "Point"  # for a user's AttributeError
 
 
 def _points(heuristic: "Heuristic", read: dict[str, None]) -> tuple[Point, Callable[[int], str]]:

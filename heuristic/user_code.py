@@ -33,7 +33,7 @@ def told(error: BaseException) -> str:
     first = _first(error)
     if isinstance(first, AttributeError) and first.name:
         message += suggestion(first.name, [each for each in dir(first.obj) if each[0] != "_"])
-    return f"{where}{type(first).__name__}: {message}".strip().rstrip(":")
+    return f"{where}{type(first).__name__}: {message}".strip().rstrip(":.")
 
 
 def defined(function: Callable[..., Any]) -> str:

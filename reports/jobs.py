@@ -131,9 +131,9 @@ def rendering_options(command):
                      help="Samples per pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
-        click.option("--heuristic", metavar="NAME",
-                     help="Which heuristic shades: phong, blinn, or one that a package declares."
-                     " [default: phong]"),
+        click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
+                     help="Which heuristic shades: phong, blinn, one that a package declares, or a"
+                     " function shade(point) of a file of yours. [default: phong]"),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
                      help="Shading of polygons in the heuristic half. [default: the scene's own,"
                      " else phong]"),

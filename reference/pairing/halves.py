@@ -16,7 +16,7 @@ from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
-from reference.pairing import bsdfs, lights, partners
+from reference.pairing import bsdfs, lights
 from reference.pairing.factors import Convention, Miss, specular_albedo
 from reference.pairing.lights import areas, environments
 from reference.rendering.gbuffer import gbuffer
@@ -51,6 +51,8 @@ class Pair:
         Labels and plugins of participating media.
     overridden
         What the scene asks for and does not get, :class:`reference.scene.preparation.Overridden`.
+    shading
+        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     """
 
     name: str
@@ -67,6 +69,7 @@ class Pair:
     rr_depth: int | None = None
     media: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
+    shading: str = PHONG.name
 
 
 def pair(
@@ -130,9 +133,14 @@ def _paired(graph, settings, convention, interpolation, tessellation, prune, heu
     geometry = cache(_bare(graph).instantiate)
 
     model, half = named(heuristic), graph.copy()
-    asked = {} if model.is_own else partners.read(half, convention)
-    given_physical = bsdfs.to_heuristic(half, convention)
-    partners.give(half, asked)
+    if model.is_own:
+        given_physical = bsdfs.to_heuristic(half, convention)
+    else:
+        from reference.pairing import partners
+
+        asked = partners.read(half, convention)
+        given_physical = bsdfs.to_heuristic(half, convention)
+        partners.give(half, asked)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form
@@ -167,6 +175,7 @@ def _paired(graph, settings, convention, interpolation, tessellation, prune, heu
         rr_depth=settings.rr_depth,
         media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
         overridden=tuple(settings.overridden),
+        shading=model.name,
     )
 
 
