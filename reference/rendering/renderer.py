@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError, NonFiniteError
+from heuristic.errors import FotismosError, InputError, NonFiniteError
 from reference.rendering import direct
 from reference.rendering.albedo_table import AlbedoTable
 from reference.rendering.gbuffer import image_size, resize
@@ -109,9 +109,12 @@ class Renderer:
                 dr.eval(image)
                 dr.sync_thread()
             except RuntimeError as error:
-                raise InputError(
-                    f"{self.label}: Mitsuba cannot render it: {_reason(error)}"
-                ) from error
+                chain = list(_chain(error))
+                for own in chain:
+                    if isinstance(own, FotismosError):
+                        raise own from None
+                reason = str(chain[-1]).strip()
+                raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
         # The film keeps what it has developed, which is as large as the image.
@@ -216,11 +219,11 @@ def _rendered(scene, integrator, spp, seed):
     return mi.render(scene, integrator=integrator, spp=spp, seed=seed)
 
 
-def _reason(error):
-    """Return the message of the error that began a chain of them."""
-    while (cause := error.__cause__ or error.__context__) is not None:
-        error = cause
-    return str(error).strip()
+def _chain(error):
+    """Yield an error, and those that led to it: Dr.Jit wraps what Python code raised."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
 
 
 def require_finite(image, layer):
