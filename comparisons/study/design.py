@@ -16,8 +16,9 @@
     light_angle = [0, 30, 60]
     int_ior = 1.5
 
-What is not named has its default; ``heuristic.NAME`` is a parameter of the heuristic's own. A part of a scene that is rendered may set ``resolution`` and
-``spp`` too. Figures (``[[figure]]``) are read by :mod:`reports.charts.study_charts`.
+What is not named has its default; ``heuristic.NAME`` is a parameter that the heuristic declares. A
+part of a scene that is rendered may set ``resolution`` and ``spp`` too. Figures (``[[figure]]``) are
+read by :mod:`reports.charts.study_charts`.
 """
 
 import tomllib
