@@ -17,8 +17,8 @@
     int_ior = 1.5
 
 What is not named has its default; ``heuristic.NAME`` is a parameter that the heuristic declares. A
-part of a scene that is rendered may set ``resolution`` and ``spp`` too. Figures (``[[figure]]``) are
-read by :mod:`reports.charts.study_charts`.
+part of a scene that is rendered may set ``resolution`` and ``spp`` too. Figures (``[[figure]]``)
+are read by :mod:`reports.charts.study_charts`.
 """
 
 import tomllib
