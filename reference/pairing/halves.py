@@ -200,6 +200,7 @@ def _set_integrator(graph, ambient, settings, interpolation, prune, model):
     )
     if ambient is not None:
         props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
+    props.set_id("integrator")  # by which its parameters are found
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 
