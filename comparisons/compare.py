@@ -14,6 +14,7 @@ from msgspec import structs
 from comparisons import record, render
 from comparisons.comparison import (
     ComparisonRecord,
+    PictureRecord,
     Significant,
     TimeSpent,
 )
@@ -65,6 +66,10 @@ class Prepared:
 def prepare(source, options=None):
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
+    if options.image:
+        from comparisons.pictures import pictured
+
+        options = pictured.sized(source, options)
     pair = options.pair(source)
     physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
@@ -87,7 +92,7 @@ def prepare(source, options=None):
         scene=physical,
         heuristic=_heuristic_renderer(source, pair, chosen, planned.spp, options),
         reference=Renderer(physical, integrator, planned.spp, "reference image"),
-        passes=planned.passes,
+        passes=len(options.image) if len(options.image) > 1 else planned.passes,
         planning_seconds=planning,
     )
 
@@ -169,7 +174,10 @@ def _compare(source, options, progress, command, kept):
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
-    numbers, images = _measure(estimates, ready.surface, options, ready.plan.exact)
+    numbers, images = _measure(
+        estimates, ready.surface, options, ready.plan.exact and not options.image
+    )
+    picture = _picture(ready, options, images) if options.image else None
     stages.done("metrics")
     faults = limits.count(
         ready.scene,
@@ -182,7 +190,7 @@ def _compare(source, options, progress, command, kept):
         scene=source.name,
         variant=reference.variant,
         heuristic_variant=heuristic.variant,
-        heuristic=options.heuristic,
+        heuristic=f"picture {', '.join(options.image)}" if options.image else options.heuristic,
         interpolation=options.interpolation.value,
         seed=options.seed,
         resolution=(width, height),
@@ -202,6 +210,7 @@ def _compare(source, options, progress, command, kept):
         integrator_given=ready.pair.integrator,
         overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
         warnings=(
+            *(picture.odd if picture else ()),
             *ready.pair.warnings,
             *record.guard_warnings(ready.guard),
             *record.path_warnings(ready),
@@ -209,6 +218,7 @@ def _compare(source, options, progress, command, kept):
         versions=record.versions(),
         command=command,
         noise_target=estimates.stop,
+        picture=picture,
         **numbers,
     )
     return Comparison(made, images)
@@ -220,7 +230,29 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         if options.heuristic_variant:
             pair = options.pair(source)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, spp, "heuristic image")
+        made = Renderer(scene, None, spp, "heuristic image")
+        if not options.image:
+            return made
+        from comparisons.pictures import pictured
+
+        return pictured.Pictured(pictured.read(options), made)
+
+
+def _picture(ready, options, images):
+    """Return the record of the pictures, and what is odd about them."""
+    from comparisons.pictures import suspicions
+
+    place = ready.heuristic.located(ready.scene)
+    shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
+    found = PictureRecord(
+        files=options.image,
+        transfer=options.transfer,
+        repeats=len(options.image),
+        shift=None if place.x is None else (place.x, place.y),
+        edges=place.correlation,
+        ratio=suspicions.ratios(shown, reference),
+    )
+    return structs.replace(found, odd=tuple(suspicions.told(found, shown, reference)))
 
 
 def _measure(estimates, surface, options, exact):
