@@ -170,6 +170,8 @@ def _compare(source, options, progress, command, kept):
     stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
     stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
     width, height = image_size(ready.scene)
+    # Before anything is rendered that takes long: a picture may be turned over.
+    place = ready.heuristic.located(ready.scene) if options.image else None
     estimates = render.render(ready, options, ready.counted, progress, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
@@ -177,7 +179,7 @@ def _compare(source, options, progress, command, kept):
     numbers, images = _measure(
         estimates, ready.surface, options, ready.plan.exact and not options.image
     )
-    picture = _picture(ready, options, images) if options.image else None
+    picture = _picture(place, options, images) if place else None
     stages.done("metrics")
     faults = limits.count(
         ready.scene,
@@ -238,11 +240,10 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         return pictured.Pictured(pictured.read(options), made)
 
 
-def _picture(ready, options, images):
+def _picture(place, options, images):
     """Return the record of the pictures, and what is odd about them."""
     from comparisons.pictures import suspicions
 
-    place = ready.heuristic.located(ready.scene)
     shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
     found = PictureRecord(
         files=options.image,
@@ -252,7 +253,8 @@ def _picture(ready, options, images):
         edges=place.correlation,
         ratio=suspicions.ratios(shown, reference),
     )
-    return structs.replace(found, odd=tuple(suspicions.told(found, shown, reference)))
+    given = images.heuristic, images.reference, images.counted
+    return structs.replace(found, odd=tuple(suspicions.told(found, *given)))
 
 
 def _measure(estimates, surface, options, exact):

@@ -103,6 +103,14 @@ class Options:
                 " numbers of at least 1."
             )
 
+    def require_model(self, what: str) -> None:
+        """Raise InputError where a picture is in the place of what has to be rendered again."""
+        if self.image:
+            raise InputError(
+                f"{what} needs a heuristic that can be rendered, and {self.image[0]} is a picture."
+                " Leave the image out."
+            )
+
     def pair(self, source: Source) -> Pair:
         """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""
         return pair(

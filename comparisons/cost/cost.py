@@ -106,6 +106,7 @@ def cost(
         require_shape(options.resolution, at)
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
+    options.require_model("a study of cost")
     ready = guarded(source, replace(options, spp=None, allow_empty=False))
     width, height = image_size(ready.scene)
     counted = ready.counted

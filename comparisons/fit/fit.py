@@ -138,6 +138,7 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
 
 def _completed(options):
     """Fill in a fit's own defaults."""
+    options.require_model("a fit")
     if options.heuristic != PHONG.name and named(options.heuristic).is_own:
         raise InputError(
             f"heuristic {options.heuristic} cannot be fitted: the forms of --form are fitted, phong"

@@ -105,6 +105,8 @@ def _exr(path: Path, layer: str) -> np.ndarray:
     prefix = f"{layer}." if layer else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
         layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+        if layer and {*"RGB"} <= set(channels):
+            raise InputError(f"{path}: it has no layer {layer!r}, but R, G and B: give {path}.")
         if not layers:
             raise InputError(
                 f"{path}: its channels are {', '.join(sorted(channels))}. R, G and B are needed."
