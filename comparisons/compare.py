@@ -86,13 +86,15 @@ def prepare(source, options=None):
     # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
     gc.collect()
     planned = render.schedule(chosen, width * height, options.spp, options.noise)
+    if len(options.image) > 1:
+        planned = render.Schedule.of(planned.spp * planned.passes, len(options.image))
     return Prepared(
         pair=pair,
         plan=chosen,
         scene=physical,
         heuristic=_heuristic_renderer(source, pair, chosen, planned.spp, options),
         reference=Renderer(physical, integrator, planned.spp, "reference image"),
-        passes=len(options.image) if len(options.image) > 1 else planned.passes,
+        passes=planned.passes,
         planning_seconds=planning,
     )
 

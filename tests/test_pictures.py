@@ -123,6 +123,7 @@ def test_repeats_tell_the_pictures_noise(rgb, tmp_path, cornell):
     alone = picture_of("cornell-box", files[0], seed=9)
     several, one = (each.metrics["dE2000"] for each in (found, alone))
     assert found.picture.repeats == found.plan.passes == 8
+    assert found.plan.spp == 64
     assert several.noise_floor > 0.7 * several.mean
     assert one.noise_floor < 0.7 * one.mean
     assert not any("one file" in words for words in found.warnings)
@@ -282,6 +283,8 @@ def test_repeats_are_alike_and_even(rgb, tmp_path):
         picture_of("fig-8-9", tuple(files))
     with pytest.raises(InputError, match="3 repeats: give an even number"):
         picture_of("fig-8-9", (files[0], files[1], files[0]))
+    with pytest.raises(InputError, match=r"noise = 1 and 2 repeats: .* Give --spp"):
+        picture_of("fig-8-9", (files[0], files[1]), noise=1.0)
 
 
 def test_a_picture_excludes_what_renders_again(run, tmp_path):
