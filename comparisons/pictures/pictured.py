@@ -80,8 +80,8 @@ def read(options: Options) -> list[np.ndarray]:
         raise InputError(f"pictures of {shown}: repeats have one size.")
     if len(images) > 1 and options.noise is not None:
         raise InputError(
-            f"noise = {options.noise:g} and {len(images)} repeats: a run with a target takes as many"
-            " passes as it needs, and each takes a picture. Give --spp in place of --noise."
+            f"noise = {options.noise:g} and {len(images)} repeats: a run with a target takes as"
+            " many passes as it needs, and each takes a picture. Give --spp in place of --noise."
         )
     if len(images) > 1 and len(images) % 2:
         raise InputError(

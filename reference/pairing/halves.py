@@ -81,6 +81,7 @@ def pair(
     prune=True,
     sensor=0,
     heuristic: str = PHONG.name,
+    with_partners: bool = False,
 ) -> Pair:
     """Derive both halves of a scene, for the current variant.
 
@@ -103,6 +104,9 @@ def pair(
         Number of the sensor among those of the scene.
     heuristic
         Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
+    with_partners
+        Whether its materials know their physical partners (:mod:`reference.pairing.partners`), as
+        they do for every heuristic of a user's own.
 
     Raises
     ------
@@ -114,7 +118,8 @@ def pair(
     graph = source.parse()
     settings = preparation.prepare(graph, resolution, sensor)
     with _refused_by_mitsuba(graph):
-        return _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic)
+        chosen = interpolation, tessellation, prune, heuristic, with_partners
+        return _paired(graph, settings, convention, *chosen)
 
 
 @contextmanager
@@ -129,11 +134,13 @@ def _refused_by_mitsuba(graph):
         raise
 
 
-def _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic):
+def _paired(
+    graph, settings, convention, interpolation, tessellation, prune, heuristic, with_partners
+):
     geometry = cache(_bare(graph).instantiate)
 
     model, half = named(heuristic), graph.copy()
-    if model.is_own:
+    if model.is_own and not with_partners:
         given_physical = bsdfs.to_heuristic(half, convention)
     else:
         from reference.pairing import partners
