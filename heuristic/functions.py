@@ -17,7 +17,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
-from math import inf
+from math import inf, isfinite
 from numbers import Real
 from typing import Any, get_args
 
@@ -82,7 +82,8 @@ def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
 def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Parameter:
     if one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD, one.POSITIONAL_ONLY):
         raise _refused(function, f"{one} is not a number")
-    if not isinstance(one.default, Real) or isinstance(one.default, bool):
+    is_number = isinstance(one.default, Real) and not isinstance(one.default, bool)
+    if not (is_number and isfinite(one.default)):
         raise _refused(function, f"{one.name!r} has no number as its default")
     stated = [part for part in (one.annotation, *get_args(one.annotation))
               if isinstance(part, Range)]  # fmt: skip

@@ -65,7 +65,7 @@ def _run(path: Path) -> dict[str, Any]:
         return runpy.run_path(str(path.resolve()), run_name=MODULE)
     except (Exception, SystemExit) as error:  # whatever a user's own code raises
         raise InputError(
-            f"{told(error)}. This file was to give a heuristic, and cannot be run."
+            f"{told(error)}. {path} was to give a heuristic, and cannot be run."
         ) from error
 
 

@@ -5,6 +5,7 @@ It finds what fails, is not finite or is negative in most scenes, and what is re
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from numbers import Real
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ ROUNDING = 1e-5
 
 
 def shaded(heuristic: "Heuristic", point: Point) -> Any:
-    """Return the colour that a heuristic gives at points.
+    """Return the colour that a heuristic gives at points, as a spectrum of the current variant.
 
     Raises
     ------
@@ -42,10 +43,12 @@ def shaded(heuristic: "Heuristic", point: Point) -> Any:
     except FotismosError as error:
         where, line, _ = told(error).partition(f"{type(error).__name__}: ")
         raise type(error)(f"{where if line else ''}{error}") from error
-    except Exception as error:  # whatever a user's own code raises
+    except (Exception, SystemExit) as error:  # whatever a user's own code raises
         raise InputError(f"{told(error)} (heuristic {heuristic.name}).{_advice(error)}") from error
     _require_colour(heuristic, value, point)
-    return value
+    import mitsuba as mi
+
+    return mi.Spectrum(value)
 
 
 def examine(heuristic: "Heuristic") -> tuple[str, ...]:
@@ -73,11 +76,12 @@ def examine(heuristic: "Heuristic") -> tuple[str, ...]:
     return tuple(sorted(read))
 
 
+@dataclass(frozen=True)  # as what it stands for
 class _Watched:
     """Notes which attributes of an object are read."""
 
-    def __init__(self, inner: Any, note: Callable[[str], None]) -> None:
-        self._inner, self._note = inner, note
+    _inner: Any
+    _note: Callable[[str], None]
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(self._inner, name)

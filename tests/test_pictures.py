@@ -130,6 +130,20 @@ def test_repeats_tell_the_pictures_noise(rgb, tmp_path, cornell):
     assert any("one file" in words for words in alone.warnings)
 
 
+def test_noise_of_repeats_is_not_marked_where_the_halves_have_none(rgb, tmp_path):
+    """The plan of this scene is exact; pictures of it need not be."""
+    case = open_case("lambert-sphere", Request(resolution=(32, 32), spp=64))
+    clean = np.array(prepare(case.source, case.options).reference.render(5), float)
+    random = np.random.default_rng(3)
+    files = [
+        write(tmp_path / f"{number}.exr", clean * random.normal(1, 0.3, clean.shape).clip(0))
+        for number in range(8)
+    ]
+    found = picture_of("lambert-sphere", tuple(files))
+    assert found.metrics["dE2000"].mean > 1
+    assert found.significant.fraction < 0.1
+
+
 # --- Where it lies -------------------------------------------------------------------------------
 
 

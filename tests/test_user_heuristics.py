@@ -335,6 +335,22 @@ MISTAKES = {
         "def shade(point, ambient=1.0): return ambient\n",
         r"^mine.py, line 1: parameter 'ambient' is not allowed",
     ),
+    "infinite default": (
+        "def shade(point, gloss=float('inf')): return 1\n",
+        r"^mine.py, line 1: 'gloss' has no number as its default",
+    ),
+    "exit while shading": (
+        "def shade(point):\n    raise SystemExit(4)\n",
+        r"^mine.py, line 2: SystemExit: 4",
+    ),
+    "writes to the material": (
+        "def shade(point):\n    point.material.k_d = 3\n    return 1\n",
+        r"^mine.py, line 2: FrozenInstanceError: cannot assign to field 'k_d'",
+    ),
+    "a coroutine": (
+        "def shade(point):\n    yield point.ambient\n",
+        r"^mine.py, line 1: .* returned a generator",
+    ),
     "undeclared": (
         "from heuristic import Heuristic\n"
         "shade = Heuristic('x', lambda point: point.uv.x, needs={'normal'})\n",
@@ -352,6 +368,25 @@ def test_a_mistake_is_told_with_file_and_line(rgb, written, mistake):
     text, message = MISTAKES[mistake]
     with pytest.raises(InputError, match=f"(?s){message}"):
         named(written(text))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "mi.Float(np.array(point.ambient.x))",  # which Dr.Jit cannot record
+        "dr.float64_array_t(mi.Float)(point.ambient.x)",
+        "np.float32(1)",
+        "point.ambient",
+    ],
+)
+def test_a_colour_may_come_in_any_kind_of_array(written, value):
+    name = written(
+        "import drjit as dr\nimport mitsuba as mi\nimport numpy as np\n"
+        f"def shade(point):\n    return {value} * 0 + 0.25\n"
+    )
+    for interpolation in ("phong", "gouraud"):
+        shown = image("fig-6-10", name, interpolation=interpolation)
+        assert shown.max() == pytest.approx(0.25)
 
 
 def test_a_missing_file_says_what_is_wanted(rgb, tmp_path, monkeypatch):

@@ -84,7 +84,8 @@ class Renderer:
         self.variant = mi.variant()
         self.times = []
         self.compilation = 0.0
-        self._replayed = dr.freeze(_rendered)
+        # Of a user's own code nobody knows whether it can be recorded: NumPy ends the process.
+        self._replayed = None if self._is_users else dr.freeze(_rendered)
 
     def render(self, seed):
         """Render one pass and return it as a tensor (H, W, 3), noting the time.
