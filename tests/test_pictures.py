@@ -76,6 +76,8 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch, 
     assert second["heuristic"] == f"picture {file}"
     assert max(map(abs, second["picture"]["shift"])) < 0.3
     assert file in second["command"]
+    page = (tmp_path / "theirs/index.html").read_text(encoding="utf-8")
+    assert 0 < page.index("Its content lies") < page.index(f"Mean {METRICS['dE2000'].label}")
 
 
 def test_a_png_has_it_to_its_bits(rgb, tmp_path):
