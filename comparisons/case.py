@@ -13,7 +13,7 @@ from comparisons.processes.worker import end_after_task
 from heuristic import program
 from heuristic.backend import VARIANTS
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG
+from heuristic.heuristics import PHONG, known_as
 from heuristic.interpolation import Interpolation
 from reference.pairing.factors import Convention
 from reference.planning.plan import wants_spectra
@@ -36,6 +36,9 @@ class Request:
 
     Parameters
     ----------
+    heuristic
+        A name, ``FILE.py:function``, a function of a point, or a :class:`heuristic.Heuristic`; the
+        latter two are declared in this process, and their name is kept.
     define
         Values for the placeholders of a scene file, by name.
     """
@@ -54,10 +57,16 @@ class Request:
     define: Mapping[str, str] = field(default_factory=dict)
     sensor: int | None = None
     allow_empty: bool = False
+    image: tuple[str, ...] = ()
+    transfer: str | None = None
 
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
         object.__setattr__(self, "define", values)
+        if self.heuristic is not None:
+            object.__setattr__(self, "heuristic", known_as(self.heuristic))
+        images = (self.image,) if isinstance(self.image, str) else tuple(self.image)
+        object.__setattr__(self, "image", images)
         if isinstance(self.resolution, Iterable):
             object.__setattr__(self, "resolution", tuple(self.resolution))
         for word, kinds in (("pairing", Convention), ("interpolation", Interpolation)):
@@ -89,7 +98,7 @@ class Request:
     def stated(self) -> dict[str, Any]:
         """Return what is asked for as plain data, without what is None, False or empty."""
         plain = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
-        return {k: v for k, v in plain.items() if v is not None and v is not False and v != {}}
+        return {k: v for k, v in plain.items() if v not in (None, {}, []) and v is not False}
 
 
 @dataclass(frozen=True)
@@ -137,6 +146,8 @@ class Case:
             everything=asked.everything,
             sensor=asked.sensor or 0,
             allow_empty=asked.allow_empty,
+            image=asked.image,
+            transfer=asked.transfer,
         )
 
     def asking(self, **changes: Any) -> "Case":
@@ -148,7 +159,10 @@ class Case:
         words = [verb, self.word]
         for name, value in self.request.define.items():
             words += ["-D", f"{name}={value}"]
-        stated = {key: value for key, value in asdict(self.request).items() if key != "define"}
+        for image in self.request.image:
+            words += ["--image", image]
+        several = ("define", "image")
+        stated = {key: value for key, value in asdict(self.request).items() if key not in several}
         for key, value in (stated | more).items():
             option = f"--{key.replace('_', '-')}"
             if value is True:

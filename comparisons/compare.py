@@ -14,6 +14,7 @@ from msgspec import structs
 from comparisons import record, render
 from comparisons.comparison import (
     ComparisonRecord,
+    PictureRecord,
     Significant,
     TimeSpent,
 )
@@ -65,6 +66,10 @@ class Prepared:
 def prepare(source, options=None):
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
+    if options.image:
+        from comparisons.pictures import pictured
+
+        options = pictured.sized(source, options)
     pair = options.pair(source)
     physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
@@ -81,6 +86,8 @@ def prepare(source, options=None):
     # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
     gc.collect()
     planned = render.schedule(chosen, width * height, options.spp, options.noise)
+    if len(options.image) > 1:
+        planned = render.Schedule.of(planned.spp * planned.passes, len(options.image))
     return Prepared(
         pair=pair,
         plan=chosen,
@@ -165,11 +172,16 @@ def _compare(source, options, progress, command, kept):
     stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
     stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
     width, height = image_size(ready.scene)
+    # Before anything is rendered that takes long: a picture may be turned over.
+    place = ready.heuristic.located(ready.scene) if options.image else None
     estimates = render.render(ready, options, ready.counted, progress, kept)
     # Passes of an earlier run took their time then, not now.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
-    numbers, images = _measure(estimates, ready.surface, options, ready.plan.exact)
+    numbers, images = _measure(
+        estimates, ready.surface, options, ready.plan.exact and not options.image
+    )
+    picture = _picture(place, options, images) if place else None
     stages.done("metrics")
     faults = limits.count(
         ready.scene,
@@ -182,7 +194,7 @@ def _compare(source, options, progress, command, kept):
         scene=source.name,
         variant=reference.variant,
         heuristic_variant=heuristic.variant,
-        heuristic=options.heuristic,
+        heuristic=f"picture {', '.join(options.image)}" if options.image else options.heuristic,
         interpolation=options.interpolation.value,
         seed=options.seed,
         resolution=(width, height),
@@ -202,6 +214,7 @@ def _compare(source, options, progress, command, kept):
         integrator_given=ready.pair.integrator,
         overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
         warnings=(
+            *(picture.odd if picture else ()),
             *ready.pair.warnings,
             *record.guard_warnings(ready.guard),
             *record.path_warnings(ready),
@@ -209,6 +222,7 @@ def _compare(source, options, progress, command, kept):
         versions=record.versions(),
         command=command,
         noise_target=estimates.stop,
+        picture=picture,
         **numbers,
     )
     return Comparison(made, images)
@@ -220,7 +234,29 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         if options.heuristic_variant:
             pair = options.pair(source)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, spp, "heuristic image")
+        made = Renderer(scene, None, spp, "heuristic image")
+        if not options.image:
+            return made
+        from comparisons.pictures import pictured
+
+        return pictured.Pictured(pictured.read(options), made)
+
+
+def _picture(place, options, images):
+    """Return the record of the pictures, and what is odd about them."""
+    from comparisons.pictures import suspicions
+
+    shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
+    found = PictureRecord(
+        files=options.image,
+        transfer=options.transfer,
+        repeats=len(options.image),
+        shift=None if place.x is None else (place.x, place.y),
+        edges=place.correlation,
+        ratio=suspicions.ratios(shown, reference),
+    )
+    given = images.heuristic, images.reference, images.counted
+    return structs.replace(found, odd=tuple(suspicions.told(found, *given)))
 
 
 def _measure(estimates, surface, options, exact):

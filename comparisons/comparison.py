@@ -86,6 +86,9 @@ class Simulation(Record):
             " they give; 0 where it asks each."
         ),
     ] = 0
+    heuristic_reads: Annotated[
+        tuple[str, ...], Meta(description="What the heuristic reads of the points that it shades.")
+    ] = ()
 
 
 class GuardRecord(Record):
@@ -221,6 +224,37 @@ class NoiseTarget(Record):
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
 
 
+class PictureRecord(Record):
+    """The pictures that stand in the place of the heuristic half.
+
+    Attributes
+    ----------
+    files
+        As they were given.
+    transfer
+        Transfer function of their values, as stated; null for an EXR's own, linear.
+    repeats
+        Number of the pictures.
+    shift
+        Pixels that their content lies to the right and below of where the camera sees it; null
+        where their edges do not tell.
+    edges
+        Correlation of their edges with those that were expected.
+    ratio
+        Means of red, green and blue over those of the reference.
+    odd
+        What is odd about them, in words; where they lie comes first.
+    """
+
+    files: tuple[str, ...]
+    transfer: str | None
+    repeats: Size
+    shift: tuple[float, float] | None
+    edges: float
+    ratio: tuple[float, float, float]
+    odd: tuple[str, ...] = ()
+
+
 class ComparisonRecord(Record, kw_only=True):
     """One scene by textbook shading (heuristic) and by physically based rendering (reference).
 
@@ -259,4 +293,5 @@ class ComparisonRecord(Record, kw_only=True):
     versions: Versions
     command: Annotated[str, Meta(description="What repeats this comparison.")]
     noise_target: NoiseTarget | None = None
+    picture: PictureRecord | None = None
     record_version: int = VERSION

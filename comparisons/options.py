@@ -56,6 +56,9 @@ class Options:
         Switch off all pruning, in the kernel and in the reference.
     sensor
         Number of the sensor, of several, from 0.
+    image, transfer
+        Pictures in the place of the heuristic half, several as repeats, and the transfer function
+        of their values (:mod:`comparisons.pictures.picture_files`).
     allow_empty
         Take a picture in which no pixel sees a surface, which is refused otherwise.
 
@@ -79,9 +82,15 @@ class Options:
     everything: bool = False
     sensor: int = 0
     allow_empty: bool = False
+    image: tuple[str, ...] = ()
+    transfer: str | None = None
 
     def __post_init__(self):
         heuristics.named(self.heuristic)
+        if self.image and self.heuristic != heuristics.PHONG.name:
+            raise InputError(
+                f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
+            )
         for name, bounds in WHOLE.items():
             _require_whole(name, getattr(self, name), *bounds)
         if self.noise is not None and not (isinstance(self.noise, Real) and 0 < self.noise < inf):
@@ -92,6 +101,14 @@ class Options:
             raise InputError(
                 f"resolution {self.resolution!r} is not allowed: give width and height, whole"
                 " numbers of at least 1."
+            )
+
+    def require_model(self, what: str) -> None:
+        """Raise InputError where a picture is in the place of what has to be rendered again."""
+        if self.image:
+            raise InputError(
+                f"{what} needs a heuristic that can be rendered, and {self.image[0]} is a picture."
+                " Leave the image out."
             )
 
     def pair(self, source: Source) -> Pair:

@@ -25,6 +25,7 @@ from comparisons.comparison import (
 )
 from comparisons.processes.pool import cores
 from heuristic import __version__
+from heuristic.heuristics import named
 from reference.planning.light_by_light import loses_light
 from reference.rendering.guard import Verdict
 
@@ -131,10 +132,12 @@ def overridden(pair, plan, spp):
     return tuple(found)
 
 
-def simulation(plan, spp, passes):
-    """Return what a plan simulates, with the samples and passes that were rendered, by field."""
+def simulation(ready, spp, passes):
+    """Return what is simulated, with the samples and passes that were rendered, by field."""
+    plan = ready.plan
     return {
         "kernel_terms": tuple(plan.kernel_terms),
+        "heuristic_reads": named(ready.pair.shading).inputs,
         "integrator": plan.integrator,
         "max_depth": plan.max_depth,
         "shadows": plan.shadows,
@@ -169,7 +172,7 @@ def plan_record(ready, passes):
     )
     samples = ready.reference.spp * passes
     guard = guard_record(ready.guard) if ready.guard else None
-    return PlanRecord(effects=effects, guard=guard, **simulation(plan, samples, passes))
+    return PlanRecord(effects=effects, guard=guard, **simulation(ready, samples, passes))
 
 
 def guard_record(guard):

@@ -39,6 +39,11 @@ class Schedule:
     spp: int
     passes: int
 
+    @classmethod
+    def of(cls, spp, passes):
+        """Split so many samples a pixel into so many passes."""
+        return cls(max(1, spp // passes), passes)
+
 
 def schedule(plan, pixels, spp=None, noise=None):
     """Return the :class:`Schedule` of a plan.

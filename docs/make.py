@@ -67,6 +67,7 @@ def main(words):
     _architecture()
     _example()
     _witnesses()
+    _shaders()
     _notebook()
 
 
@@ -185,6 +186,16 @@ def _witnesses():
     direct.register()
     for part in ("closed_forms", "figures", "elsewhere"):
         replace("witnesses.md", part.replace("_", " "), getattr(page, part)())
+
+
+def _shaders():
+    """Compare the shaders of docs/shaders."""
+    import examples  # beside this script
+
+    found = examples.comparisons()
+    replace("shaders.md", "shaders", examples.table(found))
+    shown = examples.pictures(found)
+    _sheet("shaders.png", list(shown), [list(shown.values())])
 
 
 def _notebook():

@@ -7,6 +7,7 @@ from heuristic import backend
 from heuristic.version import __version__
 
 if TYPE_CHECKING:
+    from heuristic.heuristics import Heuristic, Parameter, Range
     from heuristic.lights import DirectionalLight, PointLight, SpotLight
     from heuristic.materials import Material
     from heuristic.shading import shade
@@ -15,17 +16,23 @@ backend.configure()  # Dr.Jit looks for LLVM once, at its first import
 
 HOMES = {
     "DirectionalLight": "heuristic.lights",
+    "Heuristic": "heuristic.heuristics",
     "Material": "heuristic.materials",
+    "Parameter": "heuristic.heuristics",
     "PointLight": "heuristic.lights",
     "SpotLight": "heuristic.lights",
+    "Range": "heuristic.heuristics",
     "shade": "heuristic.shading",
 }
 """Where names come from when they are asked for: errors and options need no Dr.Jit."""
 
 __all__ = [
     "DirectionalLight",
+    "Heuristic",
     "Material",
+    "Parameter",
     "PointLight",
+    "Range",
     "SpotLight",
     "__version__",
     "register",

@@ -1,12 +1,14 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A program declares its own with
-:func:`declare`, a package by an entry point of the group :data:`GROUP` whose object is a
-:class:`Heuristic`. Flat and Gouraud shading are no heuristics: they interpolate whatever heuristic
-there is (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A user's own is a function in a
+file (:mod:`heuristic.shading_files`); a program declares its own with :func:`declare`, a package by
+an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud
+shading are not heuristics: they interpolate whatever heuristic there is
+(:mod:`heuristic.interpolation`).
 """
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +27,14 @@ GROUP = "fotismos.heuristics"
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic``, which those of heuristics stand beside."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The bounds of a number, both allowed."""
+
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -76,7 +86,8 @@ class Heuristic:
     Parameters
     ----------
     name
-        In commands, records and messages: lower case, digits and hyphens.
+        In commands, records and messages: lower case, digits and hyphens; or ``FILE.py:function``
+        of one in a file.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
@@ -97,6 +108,10 @@ class Heuristic:
         environment"; empty where it can.
     form
         Form of the specular lobe that materials are read with; None for their own.
+    reads
+        What it was seen to read (:func:`heuristic.trial.examine`), such as ``material.k_d``.
+    code
+        Digest of the files that it is made of, where they are known.
 
     Raises
     ------
@@ -112,9 +127,12 @@ class Heuristic:
     prepare: Callable[..., Any] | None = None
     form: str | None = None
     refuse: Callable[[Any], str] | None = None
+    reads: tuple[str, ...] = ()
+    code: str = ""
 
     def __post_init__(self) -> None:
-        if not self.name.replace("-", "").isalnum() or self.name != self.name.lower():
+        is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
+        if not is_word and not in_file(self.name):
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
             )
@@ -145,6 +163,8 @@ class Heuristic:
 
     def digest(self) -> str:
         """Return a digest of the files that ``shade`` and ``prepare`` are in."""
+        if self.code:
+            return self.code
         modules = {function.__module__ for function in (self.shade, self.prepare) if function}
         files = [getattr(sys.modules[module], "__file__", None) for module in sorted(modules)]
         return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
@@ -157,9 +177,30 @@ class Heuristic:
         prepared: Any,
         wavelengths: Array = (),
     ) -> Array:
-        """Return the colour at points; the arguments are what :class:`Point` hands on."""
+        """Return the colour at points; the arguments are what :class:`Point` hands on.
+
+        Raises
+        ------
+        InputError
+            When a user's own fails, or returns something else than a colour.
+        """
         tuned = SimpleNamespace(**parameters)
-        return self.shade(Point(self.needs, given, uv, tuned, prepared, wavelengths))
+        point = Point(self.needs, given, uv, tuned, prepared, wavelengths)
+        if self.is_own:
+            return self.shade(point)
+        from heuristic import trial  # which what is the package's own does without
+
+        return trial.shaded(self, point)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What it reads, as far as that is known: what it was seen to read, or else its needs."""
+        return self.reads or tuple(sorted(self.needs))
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is the package's own."""
+        return self.name in HEURISTICS.built_in
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
@@ -175,15 +216,47 @@ def named(name: str) -> Heuristic:
     Raises
     ------
     InputError
-        When none has the name, or an entry point cannot be loaded.
+        When none has the name, an entry point cannot be loaded, or a file cannot be used.
     """
+    if in_file(name):
+        from heuristic import shading_files
+
+        return shading_files.opened(name)
     if name not in HEURISTICS:
         raise InputError(
-            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}. A"
+            f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
+            " give a file with a function `shade(point)`, as FILE.py or FILE.py:FUNCTION. A"
             f" package declares its own by an entry point of the group {GROUP}, a program by"
             " heuristic.heuristics.declare."
         )
     return HEURISTICS[name]
+
+
+def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
+    """Return the name of a heuristic; declare one that is given as an object or a function.
+
+    A function of a notebook's or program's own is known in its process alone.
+    """
+    if isinstance(given, str):
+        return given
+    if not isinstance(given, Heuristic):
+        name = getattr(given, "__name__", "shade").lower().replace("_", "-").strip("-")
+        from heuristic.functions import heuristic_of
+
+        given = heuristic_of(given, name)
+    return declare(given).name
+
+
+_WORDS = re.compile(r"(.+\.py)(?::(\w+))?", re.DOTALL)
+
+
+def in_file(name: str) -> tuple[str, str] | None:
+    """Return the file and the function that a name ``FILE.py:function`` has, None for others.
+
+    The function is empty where the name has none.
+    """
+    found = _WORDS.fullmatch(name)
+    return found and (found[1], found[2] or "")
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}

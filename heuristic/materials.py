@@ -11,6 +11,9 @@ FORMS = ("phong", "blinn")
 
 COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
 
+PHYSICAL = ("base_color", "alpha", "ior", "metallic")
+"""What a material may know of its physical partner; all but the first are single numbers."""
+
 
 @dataclass(frozen=True)
 class Material:
@@ -74,6 +77,29 @@ class Material:
         check_form(self.form)
         if numerics.is_moderate(self.n):
             object.__setattr__(self, "n_is_moderate", True)
+
+
+@dataclass(frozen=True)
+class PairedMaterial(Material):
+    """A material with the parameters of its physical partner, as engines have them.
+
+    Parameters
+    ----------
+    base_color
+        Reflectance of the diffuse base, 0..1; of metals, that of the surface at normal incidence.
+    alpha
+        Root mean square slope of the microfacets, as of Beckmann's distribution and GGX: the square
+        of what engines call roughness. 1e-4 to 1; 1 for a surface without an interface.
+    ior
+        Index of refraction, inside over outside; 1 for a surface without an interface.
+    metallic
+        1 for metals, 0 for all other materials; ``principled`` has its own, 0..1.
+    """
+
+    base_color: colours.Coefficient = 0
+    alpha: float = 1
+    ior: float = 1
+    metallic: float = 0
 
 
 def _exponent(n):

@@ -116,9 +116,10 @@ class Point:
 
     @_input
     def material(self) -> Material:
-        """``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation.
+        """What the surface is made of, a :class:`heuristic.materials.PairedMaterial`.
 
-        A coefficient that no material of the scene has is a plain 0.
+        ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
+        ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
         """
         material = self.given.material
         if not material.normalised:

@@ -131,9 +131,10 @@ def rendering_options(command):
                      help="Samples per pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
-        click.option("--heuristic", metavar="NAME",
+        click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
                      help="Which heuristic shades: phong, blinn, what engines use (such as"
-                     " mean-ambient), or one that a package declares. [default: phong]"),
+                     " mean-ambient), one that a package declares, or a function shade(point) of a"
+                     " file. [default: phong]"),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
                      help="Shading of polygons in the heuristic half. [default: the scene's own,"
                      " else phong]"),

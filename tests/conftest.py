@@ -80,6 +80,18 @@ def scene_file(tmp_path):
 
 
 @pytest.fixture
+def written(tmp_path, monkeypatch):
+    """A function that writes a file of a user's, beside which commands are given."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text, name="mine.py"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return name
+
+    return write
+
+
+@pytest.fixture
 def no_service(monkeypatch):
     """No CI service."""
     for name in small_baselines.SERVICES:

@@ -260,7 +260,7 @@ def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):
     for _ in range(24):
         noisy = image + noise * rng.normal(size=image.shape)
         residuals = residuals_of(surface, noisy, loss="linear")
-        fits.append(optimise._descend(residuals, start(residuals.model.parameters))[0])
+        fits.append(optimise.descend(residuals, start(residuals.model.parameters))[0])
     reached = np.full(len(fits[0]), len(image))
     error = np.full(image.shape, noise)
     _, covariance = identify.identify(residuals, fits[-1], reached, error)

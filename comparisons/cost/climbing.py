@@ -74,6 +74,7 @@ def climb(
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
+    options.require_model("a study of cost")
     if options.resolution is None:
         shaped = replace(options, resolution=at)
         options = replace(options, resolution=reduced(source, shaped, WIDTH))

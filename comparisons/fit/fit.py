@@ -4,6 +4,9 @@ What is left of the loss at the best parameters is the *model error*: no values 
 it. What they removed is the *parameter error* of those that the pairing table gave. Both are told
 of the loss, which was minimised, and not of other metrics, of which other parameters may leave
 less.
+
+Of Phong's model the forms of its lobe are fitted; of a heuristic of a user's own the parameters
+that it declares (:mod:`comparisons.fit.own_parameters`).
 """
 
 from dataclasses import dataclass, replace
@@ -12,12 +15,13 @@ from time import perf_counter
 import numpy as np
 
 from comparisons.compare import guarded
-from comparisons.fit import summary
+from comparisons.fit import own_parameters, summary
 from comparisons.fit.fit_record import FitRecord, FitTimes, FormFit, LossName
 from comparisons.fit.identify import identify
 from comparisons.fit.loss import LOSSES
 from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
+from comparisons.fit.own_parameters import OwnAttempt
 from comparisons.fit.parameters import parameters
 from comparisons.fit.rendering import filter_by_box, render
 from comparisons.fit.summary import Attempt, Fit, FitImages
@@ -25,7 +29,7 @@ from comparisons.options import Options
 from comparisons.record import guard_warnings, versions
 from comparisons.records import Pixels
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG
+from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
 
@@ -97,10 +101,16 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     begin = perf_counter()
     chosen = chosen or FitOptions()
     options = replace(_completed(options or Options()), allow_empty=False)
+    heuristic = named(options.heuristic)
     ready = guarded(source.edited(filter_by_box), options)
-    rendered = render(ready, options, progress or (lambda *_: None))
+    rendered = render(ready, options, progress or (lambda *_: None), heuristic is PHONG)
     rendering = perf_counter() - begin
-    attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
+    if heuristic is PHONG:
+        attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
+    else:
+        attempts = [
+            own_parameters.attempt(ready, heuristic, rendered, LOSSES[chosen.loss], options)
+        ]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
     fits, maps = _judged(ready, rendered, attempts, options.viewing, chosen.intensities)
     record = FitRecord(
@@ -128,7 +138,8 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
 
 def _completed(options):
     """Fill in a fit's own defaults."""
-    if options.heuristic != PHONG.name:
+    options.require_model("a fit")
+    if options.heuristic != PHONG.name and named(options.heuristic).is_own:
         raise InputError(
             f"heuristic {options.heuristic} cannot be fitted: the forms of --form are fitted, phong"
             " and blinn among them. Leave --heuristic out."
@@ -174,8 +185,26 @@ def _judged(ready, rendered, attempts, viewing, intensities):
             viewing,
         )
         maps.append(residual)
-        fits += _form_fits(attempt, departure, physical, lights)
+        if isinstance(attempt, OwnAttempt):
+            fits.append(_own_fit(attempt, ready.pair.shading, departure))
+        else:
+            fits += _form_fits(attempt, departure, physical, lights)
     return tuple(fits), maps
+
+
+def _own_fit(attempt, name, departure):
+    """Return the fit of the parameters that a heuristic declares."""
+    return FormFit(
+        form=name,
+        normalised=False,
+        loss=attempt.solution.loss,
+        parameter_error=attempt.paired_loss - attempt.solution.loss,
+        departure=departure,
+        materials=(),
+        lights=(),
+        convergence=attempt.solution.starts,
+        own=attempt.fitted(),
+    )
 
 
 def _light_names(scene):

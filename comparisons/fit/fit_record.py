@@ -31,6 +31,8 @@ class Fitted(Record, kw_only=True):
 
     Attributes
     ----------
+    name
+        ``k_a``, ``k_d``, ``k_s``, ``n`` or ``intensity``, or a name that a heuristic declares.
     channel
         Of a coefficient that has a number for each; otherwise empty.
     is_factor
@@ -45,18 +47,20 @@ class Fitted(Record, kw_only=True):
         95 %, by the reference's noise alone; null at a bound, and where not identifiable.
     reason
         Why it is not identifiable, otherwise empty.
+    bounds
+        Null where there is none.
     partners
         Parameters that make up for it.
     """
 
-    name: Literal["k_a", "k_d", "k_s", "n", "intensity"]
+    name: str
     channel: Literal["", "R", "G", "B"] = ""
     is_factor: bool
     paired: float
     fitted: float | None
     stopped_at: float
     interval: tuple[float, float] | None
-    bounds: tuple[float, float]
+    bounds: tuple[float | None, float | None]
     at_bound: bool
     identifiable: bool
     reason: str
@@ -91,6 +95,9 @@ class FormFit(Record):
 
     Attributes
     ----------
+    form
+        Of the lobe, ``phong`` or ``blinn``; the name of a heuristic whose own parameters were
+        fitted.
     normalised
         Whether k_s is the lobe's albedo at normal incidence.
     loss
@@ -102,9 +109,11 @@ class FormFit(Record):
         Factors on intensities; empty where they were not fitted.
     convergence
         All searches.
+    own
+        Parameters that the heuristic declares.
     """
 
-    form: Literal["phong", "blinn"]
+    form: str
     normalised: bool
     loss: Amount
     parameter_error: float
@@ -112,6 +121,7 @@ class FormFit(Record):
     materials: tuple[FittedMaterial, ...]
     lights: tuple[FittedLight, ...]
     convergence: tuple[Start, ...]
+    own: tuple[Fitted, ...] = ()
 
 
 class LossName(Record):

@@ -172,8 +172,8 @@ def minimise(residuals):
     starts, best = [], (inf, paired)
     for place, (n, x) in enumerate(candidates):
         if place in followed:
-            x, _, before, _ = _descend(residuals.smoothed(), x)
-            x, loss, evaluations, converged = _descend(residuals, x)
+            x, _, before, _ = descend(residuals.smoothed(), x)
+            x, loss, evaluations, converged = descend(residuals, x)
             evaluations += before
             best = min(best, (loss, x), key=lambda pair: pair[0])
             starts.append(Start(n, losses[place], loss, evaluations, converged))
@@ -182,7 +182,7 @@ def minimise(residuals):
     return Solution(best[1], best[0], tuple(starts))
 
 
-def _descend(residuals, x):
+def descend(residuals, x):
     """Return the minimum that a search from ``x`` finds, its loss, evaluations and convergence."""
     low, high = parameters.bounds(residuals.model.parameters)
     loss, damping = residuals.loss(x), 1e-3

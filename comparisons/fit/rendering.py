@@ -40,19 +40,21 @@ class Rendered:
     counted: np.ndarray
 
 
-def render(ready, options, progress):
-    """Render the passes of both halves in turn, and keep the heuristic half's surface."""
+def render(ready, options, progress, with_surface=True):
+    """Render the passes of both halves in turn, and keep the heuristic half's surface if wanted."""
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
             f" --heuristic-variant {VARIANT}."
         )
-    recorder = Recorder(ready.heuristic)
+    recorder = Recorder(ready.heuristic) if with_surface else None
     sums = [Accumulator() for _ in range(3)]
     halves = (ready.heuristic, ready.reference)
     for one in passes(halves, options.seed, ready.passes, progress=progress):
         add_difference(sums, one.images)
-        recorder.render(one.seed)
+        if recorder:
+            recorder.render(one.seed)
     before, reference, difference = (total.estimate() for total in sums)
     with variant(VARIANT):
-        return Rendered(before.mean, reference, difference, recorder.surface(), ready.counted)
+        surface = recorder.surface() if recorder else None
+        return Rendered(before.mean, reference, difference, surface, ready.counted)

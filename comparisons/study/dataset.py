@@ -10,6 +10,7 @@ from comparisons import atomic
 from comparisons.record import versions
 from comparisons.store import require_regular
 from comparisons.study.columns import IDENTITY, PARAMETERS, Column, results
+from comparisons.study.design import OWN
 from heuristic.errors import InputError
 
 TYPES = {str: pa.string(), int: pa.int64(), float: pa.float64()}
@@ -25,7 +26,7 @@ def table(study, rows):
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
     paths = sorted(present - {*IDENTITY, *PARAMETERS, *results()})
-    own = {path: Column("", "parameter of the scene, by its path") for path in paths}
+    own = {path: Column("", _meaning(path)) for path in paths}
     columns = IDENTITY | PARAMETERS | own | results()
     columns = {name: column for name, column in columns.items() if name in present}
     schema = pa.schema(
@@ -44,6 +45,12 @@ def table(study, rows):
         },
     )
     return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in rows], schema)
+
+
+def _meaning(path):
+    if path.startswith(OWN):
+        return "parameter that the heuristic declares"
+    return "parameter of the scene, by its path"
 
 
 def fits(rows, points):

@@ -9,14 +9,16 @@
     scene = "lobe"                 # a study scene, a built-in scene, or a Mitsuba file
     design = "grid"                # or "random", or "sobol", with points = 256
     pairing = "matched"            # or "literal"
+    heuristic = "phong"            # or another by name, or "FILE.py:function"
 
     [part.parameters]
     alpha = { from = 0.05, to = 0.8, steps = 16, scale = "log" }
     light_angle = [0, 30, 60]
     int_ior = 1.5
 
-What is not named has its default. A part of a scene that is rendered may set ``resolution`` and
-``spp`` too. Figures (``[[figure]]``) are read by :mod:`reports.charts.study_charts`.
+What is not named has its default; ``heuristic.NAME`` is a parameter that the heuristic declares. A
+part of a scene that is rendered may set ``resolution`` and ``spp`` too. Figures (``[[figure]]``)
+are read by :mod:`reports.charts.study_charts`.
 """
 
 import tomllib
@@ -30,12 +32,14 @@ from scipy.stats import qmc
 from comparisons.case import SUFFIXES
 from comparisons.study.levels import Fixed, Span, values
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED
+from heuristic import heuristics
 from heuristic.errors import InputError, unknown
 from reference.pairing.factors import Convention
 
 DESIGNS = ("grid", "random", "sobol")
 LARGEST = 1_000_000
-KEYS = {"name", "scene", "design", "points", "pairing", "resolution", "spp", "seed", "parameters"}
+KEYS = {"name", "scene", "design", "points", "pairing", "heuristic", "resolution", "spp", "seed"}
+KEYS |= {"parameters"}
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class Part:
         What each parameter runs over, by name, slowest first in a grid.
     count
         Number of points of a random or Sobol design.
+    heuristic
+        Name of what shades, as of :func:`heuristic.heuristics.named`.
     seed
         Of the design and of the renderings.
     resolution, spp
@@ -67,6 +73,7 @@ class Part:
     design: str = "grid"
     count: int = 0
     convention: Convention = Convention.MATCHED
+    heuristic: str = heuristics.PHONG.name
     seed: int = 0
     resolution: tuple[int, int] = (64, 64)
     spp: int = 64
@@ -83,6 +90,11 @@ class Part:
                 strict=True,
             )
         return [dict(zip(names, map(float, row), strict=True)) for row in table]
+
+    @property
+    def reads_files(self):
+        """Whether its points need files of the user's."""
+        return bool(Path(self.scene).suffix in SUFFIXES or heuristics.in_file(self.heuristic))
 
     @property
     def varying(self):
@@ -158,7 +170,11 @@ def _part(table, folder):
         raise InputError(
             f"{where}: there is nothing to vary. Name parameters in [part.parameters]."
         )
-    known = _parameters(scene, given, where)
+    given = _flat(given)
+    heuristic = table.get("heuristic", heuristics.PHONG.name)
+    _check_heuristic(heuristic, scene, where)
+    own = {name: UNLIMITED for name in given if name.startswith(OWN)}
+    known = _parameters(scene, {k: v for k, v in given.items() if k not in own}, where) | own
     spans = {}
     for key, parameter in known.items():
         raw = given.get(key, parameter.default)
@@ -169,6 +185,7 @@ def _part(table, folder):
         spans=spans,
         design=design,
         count=_whole(table, "points", 0, where),
+        heuristic=_placed(heuristic, folder),
         convention=Convention(_choice(table, "pairing", ("matched", "literal"), where)),
         seed=_whole(table, "seed", 0, where),
         resolution=_resolution(table, where),
@@ -176,6 +193,35 @@ def _part(table, folder):
     )
     _check_size(part, where)
     return part
+
+
+OWN = "heuristic."
+"""What the names of a heuristic's own parameters begin with."""
+
+
+def _flat(given):
+    """Return parameters by name; TOML reads ``heuristic.gloss`` as a table in a table."""
+    own = given.get(OWN[:-1], {})
+    if not isinstance(own, dict):
+        return given
+    others = {name: value for name, value in given.items() if name != OWN[:-1]}
+    return others | {f"{OWN}{name}": value for name, value in own.items()}
+
+
+def _check_heuristic(name, scene, where):
+    if not isinstance(name, str):
+        raise InputError(f"{where}: heuristic = {name!r}: give a name, or FILE.py:FUNCTION.")
+    if name != heuristics.PHONG.name and scene in SCENES and SCENES[scene].make is None:
+        rendered = [each for each, one in SCENES.items() if one.make is not None]
+        raise InputError(
+            f"{where}: the scene {scene} is evaluated without an image, with Phong's model alone."
+            f" Study {name} on {' or '.join(rendered)}, or on a scene of yours."
+        )
+
+
+def _placed(heuristic, folder):
+    file, function = heuristics.in_file(heuristic) or ("", "")
+    return f"{folder / file}:{function}".rstrip(":") if file else heuristic
 
 
 def _parameters(scene, given, where):

@@ -22,6 +22,8 @@ EDITABLE = {
         "k_d": ("k_d.value", None),
         "k_s": ("k_s.value", None),
         "n": ("n", None),
+        "base_color": ("base_color.value", None),
+        **{name: (name, None) for name in ("alpha", "ior", "metallic")},
     },
     "roughplastic": {
         "diffuse_reflectance": ("diffuse_reflectance.value", None),
@@ -91,7 +93,7 @@ class Kept:
                 same = _same(before[key], value)
                 if same and not every:
                     continue
-                name, convert = EDITABLE.get(graph.plugin(index), {}).get(key, (None, None))
+                name, convert = _editable(graph.plugin(index), key)
                 path = f"{place}.{name}"
                 known = name is not None and path in self._kept.parameters
                 if known and type(before[key]) is type(value):
@@ -110,6 +112,13 @@ class Kept:
             self._kept = None  # half edited
             raise
         self._kept.graph = graph
+
+
+def _editable(plugin, key):
+    """Return what :data:`EDITABLE` says; parameters of a heuristic have names of their own."""
+    if plugin == "heuristic":
+        return key, None
+    return EDITABLE.get(plugin, {}).get(key, (None, None))
 
 
 def _transform(given):

@@ -15,7 +15,8 @@ from comparisons.study.editing import set_values
 from comparisons.study.measure import largest_miss, measure, measure_each
 from comparisons.study.scenes import SCENES
 from heuristic import plugins
-from heuristic.errors import FotismosError, InputError
+from heuristic.errors import FotismosError, InputError, unknown
+from heuristic.heuristics import named
 from reference.rendering import direct
 from reference.scene.graph import set_variant
 from reference.scene.identity import digest
@@ -36,7 +37,8 @@ class Block:
     first
         Number of the first.
     identity
-        Digest of the part's scene with every file that it reads, and of the versions in use.
+        Digest of the part's scene and heuristic with every file that they read, and of the versions
+        in use.
     """
 
     part: Part
@@ -52,6 +54,7 @@ class Block:
             "scene": part.scene,
             "identity": self.identity,
             "pairing": part.convention.value,
+            "heuristic": part.heuristic,
             "seed": part.seed,
             "resolution": part.resolution,
             "spp": part.spp,
@@ -91,22 +94,30 @@ def blocks(part):
 def _identity(part):
     _prepare()
     own = "" if part.scene in SCENES else digest(rendered.opened(part.scene))
-    return sha256(dumps([own, record.versions()], sort_keys=True).encode()).hexdigest()
+    told = [own, named(part.heuristic).digest(), record.versions()]
+    return sha256(dumps(told, sort_keys=True).encode()).hexdigest()
 
 
 def check(part):
-    """Ensure that a part's scene is there, and that paths into it lead to numbers.
+    """Ensure that a part's scene and heuristic are there, and that paths lead to numbers.
 
     Raises
     ------
     InputError
         Naming what is not there.
     """
+    _prepare()
+    known = {each.name: each for each in named(part.heuristic).parameters}
+    for point in part.points():
+        for name, value in rendered.own_parameters(point).items():
+            if name not in known:
+                raise unknown(f"part {part.name!r}: parameter of {part.heuristic}", name, known)
+            known[name].checked(value)
     if part.scene not in SCENES:
-        _prepare()
         try:
             source = rendered.opened(part.scene)
-            source.edited(partial(set_values, values=next(iter(part.points())))).parse()
+            values = rendered.scene_parameters(next(iter(part.points())))
+            source.edited(partial(set_values, values=values)).parse()
         except InputError as error:
             raise InputError(f"part {part.name!r}: {error}") from error
 

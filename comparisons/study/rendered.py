@@ -8,6 +8,7 @@ import numpy as np
 
 from comparisons.case import RGB, open_case
 from comparisons.study.columns import STEPPED, STEPS
+from comparisons.study.design import OWN
 from comparisons.study.editing import Kept, set_values
 from comparisons.study.measure import largest_miss, measure
 from comparisons.study.scenes import SCENES, bsdf
@@ -34,7 +35,11 @@ def row(part, point, identity):
     Under the names of :data:`comparisons.study.columns.STEPS` are the root mean square changes of
     the image as each of them is simulated too; ``dominant`` names the largest.
     """
-    pair = halves.pair(_source(part, point, identity), part.convention, part.resolution)
+    source = _source(part, scene_parameters(point), identity)
+    pair = halves.pair(source, part.convention, part.resolution, heuristic=part.heuristic)
+    graph = pair.heuristic
+    for name, value in own_parameters(point).items():
+        graph.props(graph.nodes(halves.INTEGRATOR)[0])[name] = value
     kept = _kept(part.scene, identity)
     physical = kept[1].scene(with_sampler(pair.physical, sampler()))
     surface = gbuffer(physical, *image_size(physical))
@@ -53,6 +58,16 @@ def row(part, point, identity):
     result |= _steps(dict(zip(plans, pairwise(images), strict=True)), counted)
     result["miss"] = largest_miss(pair.misses)
     return result | (_derived(pair) if part.scene in SCENES else {})
+
+
+def own_parameters(point):
+    """Return those parameters of a point that are the heuristic's own, by their names there."""
+    return {k.removeprefix(OWN): value for k, value in point.items() if k.startswith(OWN)}
+
+
+def scene_parameters(point):
+    """Return those parameters of a point that are the scene's."""
+    return {name: value for name, value in point.items() if not name.startswith(OWN)}
 
 
 def opened(scene):

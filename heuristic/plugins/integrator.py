@@ -83,7 +83,8 @@ def define():
             self.parameters_changed()
             self._known = None
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
-            self.prune = props.get("prune", True)
+            # A user's own gets arrays alone: a plain 0 has no components.
+            self.prune = props.get("prune", True) and self.model.is_own
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
@@ -139,7 +140,9 @@ def define():
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
             values = self._prepared_with
             if self._known is None or not self._known.is_of(parts, values):
-                materials = SceneMaterials(scene, self.prune, self.model.form)
+                materials = SceneMaterials(
+                    scene, self.prune, self.model.form, not self.model.is_own
+                )
                 begin = perf_counter()
                 prepared = self.model.prepared(scene, values)
                 dr.sync_thread()

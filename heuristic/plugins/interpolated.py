@@ -39,7 +39,9 @@ def interpolating(base):
                     mesh,
                     self.interpolation,
                     viewer,
-                    mesh.bsdf().material(at, form=self.model.form),
+                    mesh.bsdf().material(
+                        at, True, self.prune, self.model.form, not self.model.is_own
+                    ),
                     self.lights(scene, at, True),
                     self.ambient_at(at, True),
                     self.visibility(scene, at, True),

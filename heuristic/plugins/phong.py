@@ -39,7 +39,7 @@ import numpy as np
 from heuristic import lobes, numerics, terms, vectors
 from heuristic.convention import RADIANCE_PER_IRRADIANCE
 from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, Material, check_form
+from heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
 
 SMALLEST_SAMPLE = 2.0**-25
@@ -59,19 +59,33 @@ def define():
             self.transmittance = coefficient(props, "transmittance")
             self.tilt = props.get_texture("tilt") if "tilt" in props else None
             self.n = _exponent(props)
+            self.has_partner = "base_color" in props
+            self.base_color = coefficient(props, "base_color") if self.has_partner else self.k_d
+            self.partner = {
+                name: _number(props, name, default) for name, default in PARTNER.items()
+            }
             self.form = props.get("form", "phong")
             check_form(self.form)
             self.normalised = props.get("normalised", False)
             self.twosided = props.get("twosided", False)
             self.parameters_changed()
 
-        def material(self, si, active=True, prune=True, form=None):
-            """Return the material at a surface interaction; absent terms are plain zeros."""
+        def material(self, si, active=True, prune=True, form=None, physical=False):
+            """Return the material at a surface interaction; absent terms are plain zeros.
+
+            With ``physical`` it is a :class:`heuristic.materials.PairedMaterial`.
+            """
             coefficients = {
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else COEFFICIENTS)
             }
-            return Material(
+            if physical:
+                coefficients["base_color"] = self.base_color.eval(si, active)
+                coefficients |= {
+                    name: value.eval_1(si, active) if isinstance(value, mi.Texture) else value
+                    for name, value in self.partner.items()
+                }
+            return (PairedMaterial if physical else Material)(
                 **coefficients,
                 n=self.exponent(si, active),
                 form=form or self.form,
@@ -159,8 +173,10 @@ def define():
             return bs, dr.select(active, value / bs.pdf, 0)
 
         def traverse(self, callback):
-            for name in (*COEFFICIENTS, "n", "transmittance"):
-                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+            own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
+            partner = {"base_color": self.base_color} | self.partner if self.has_partner else {}
+            for name, value in (own | partner).items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
             """Note which coefficients can be other than zero, and make the exponent opaque.
@@ -174,6 +190,7 @@ def define():
             self.is_clear = may_be_nonzero(self.transmittance)
             self._set_components()
             self.n_is_moderate = False
+            dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
             if not isinstance(self.n, mi.Texture):
                 dr.make_opaque(self.n)
                 self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
@@ -265,6 +282,16 @@ def define():
             return density
 
     mi.register_bsdf("phong", PhongBSDF)
+
+
+PARTNER = {"alpha": 1.0, "ior": 1.0, "metallic": 0.0}
+"""Single numbers of the physical partner, and what they are where it has none."""
+
+
+def _number(props, name, default):
+    """Read a number that may vary over the surface."""
+    value = props.get(name, default)
+    return mi.Float(value) if isinstance(value, Real) else props.get_unbounded_texture(name)
 
 
 def _exponent(props):

@@ -7,13 +7,15 @@ import mitsuba as mi
 
 from heuristic import terms
 from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, Material
+from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
 
 
 class SceneMaterials:
     """The ``phong`` BSDFs of a scene, and what they are at a surface interaction.
 
-    ``prune`` leaves out the terms that no material has; ``form`` is in place of the materials' own.
+    ``prune`` leaves out the terms that no material has; ``form`` is in place of the materials' own;
+    ``physical`` reads the parameters of the physical partners, too
+    (:class:`heuristic.materials.PairedMaterial`).
 
     Raises
     ------
@@ -23,8 +25,8 @@ class SceneMaterials:
 
     DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
 
-    def __init__(self, scene, prune=True, form=None):
-        self.prune, self.form = prune, form
+    def __init__(self, scene, prune=True, form=None, physical=False):
+        self.prune, self.form, self.physical = prune, form, physical
         self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
         for bsdf in self.bsdfs:
             if not hasattr(bsdf, "material"):
@@ -45,17 +47,20 @@ class SceneMaterials:
         if not self.bsdfs:
             return []  # a scene without shapes
         if len(self.bsdfs) == 1:
-            return [(self.bsdfs[0].material(si, active, self.prune, self.form), True)]
+            chosen = self.prune, self.form, self.physical
+            return [(self.bsdfs[0].material(si, active, *chosen), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         present = present if self.prune else list(COEFFICIENTS)
-        readers = [_reader(bsdf, present, self.form) for bsdf in self.bsdfs]
+        readers = [_reader(bsdf, present, self.form, self.physical) for bsdf in self.bsdfs]
         *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
+        kind = PairedMaterial if self.physical else Material
+        names = (*present, *(PHYSICAL if self.physical else ()))
         forms = sorted({self.form or bsdf.form for bsdf in self.bsdfs})
         is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
-        coefficients = dict(zip(present, values, strict=True))
+        coefficients = dict(zip(names, values, strict=True))
         return [
             (
-                Material(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
+                kind(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
                 len(forms) == 1 or is_blinn == (form == "blinn"),
             )
             for form in forms
@@ -93,14 +98,17 @@ class SceneMaterials:
         return dr.gather(mi.UInt32, self.table, bsdf, active)
 
 
-def _reader(bsdf, present, form):
+def _reader(bsdf, present, form, physical):
     """Return the function that reads one BSDF's coefficients, normalisation applied."""
 
     def read(si, active):
-        material = bsdf.material(si, active, form=form)
+        material = bsdf.material(si, active, form=form, physical=physical)
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if bsdf.normalised and "k_s" in values:
             values["k_s"] *= terms.normalisation(material.form, material.n)
+        if physical:
+            values["base_color"] = mi.Spectrum(material.base_color)
+            values |= {name: mi.Float(getattr(material, name)) for name in PHYSICAL[1:]}
         return (*values.values(), mi.Float(material.n), mi.Bool(material.form == "blinn"))
 
     return read

@@ -160,6 +160,12 @@ def _physical_properties(graph, index, convention):
     return props, record
 
 
+def physical_partner(graph, index, convention):
+    """Return the properties of the physical BSDF that stands for a ``phong``."""
+    props, _ = _physical_properties(graph, index, convention)
+    return props
+
+
 def _unreal(plastic):
     """Return a note on an index of refraction that no real plastic has; empty for others."""
     low, high = PLASTICS

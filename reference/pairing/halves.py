@@ -51,6 +51,8 @@ class Pair:
         Labels and plugins of participating media.
     overridden
         What the scene asks for and does not get, :class:`reference.scene.preparation.Overridden`.
+    shading
+        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     """
 
     name: str
@@ -67,6 +69,7 @@ class Pair:
     rr_depth: int | None = None
     media: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
+    shading: str = PHONG.name
 
 
 def pair(
@@ -78,6 +81,7 @@ def pair(
     prune=True,
     sensor=0,
     heuristic: str = PHONG.name,
+    with_partners: bool = False,
 ) -> Pair:
     """Derive both halves of a scene, for the current variant.
 
@@ -100,6 +104,9 @@ def pair(
         Number of the sensor among those of the scene.
     heuristic
         Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
+    with_partners
+        Whether its materials know their physical partners (:mod:`reference.pairing.partners`), as
+        they do for every heuristic of a user's own.
 
     Raises
     ------
@@ -111,7 +118,8 @@ def pair(
     graph = source.parse()
     settings = preparation.prepare(graph, resolution, sensor)
     with _refused_by_mitsuba(graph):
-        return _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic)
+        chosen = interpolation, tessellation, prune, heuristic, with_partners
+        return _paired(graph, settings, convention, *chosen)
 
 
 @contextmanager
@@ -126,11 +134,20 @@ def _refused_by_mitsuba(graph):
         raise
 
 
-def _paired(graph, settings, convention, interpolation, tessellation, prune, heuristic):
+def _paired(
+    graph, settings, convention, interpolation, tessellation, prune, heuristic, with_partners
+):
     geometry = cache(_bare(graph).instantiate)
 
     model, half = named(heuristic), graph.copy()
-    given_physical = bsdfs.to_heuristic(half, convention)
+    if model.is_own and not with_partners:
+        given_physical = bsdfs.to_heuristic(half, convention)
+    else:
+        from reference.pairing import partners
+
+        asked = partners.read(half, convention)
+        given_physical = bsdfs.to_heuristic(half, convention)
+        partners.give(half, asked)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form
@@ -165,6 +182,7 @@ def _paired(graph, settings, convention, interpolation, tessellation, prune, heu
         rr_depth=settings.rr_depth,
         media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
         overridden=tuple(settings.overridden),
+        shading=model.name,
     )
 
 
@@ -189,6 +207,7 @@ def _set_integrator(graph, ambient, settings, interpolation, prune, model):
     )
     if ambient is not None:
         props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
+    props.set_id("integrator")  # by which its parameters are found
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 

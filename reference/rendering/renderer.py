@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError, NonFiniteError
+from heuristic.errors import FotismosError, InputError, NonFiniteError
 from reference.rendering import direct
 from reference.rendering.albedo_table import AlbedoTable
 from reference.rendering.gbuffer import image_size, resize
@@ -24,6 +24,10 @@ from reference.scene.preparation import PATHS
 
 LARGEST_PASS = 2**26
 """Samples of one pass, and pixels of an image; `reference.rendering.memory` may allow fewer."""
+
+
+ROUNDING = 1e-5
+"""A value below 0 by less than this is a rounding error, in units of display white."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +77,15 @@ class Renderer:
         self.scene = scene
         self.integrator = integrator or scene.integrator()
         self.spp = spp
-        self.label = label
+        shading = getattr(self.integrator, "model", None)  # of the integrator `heuristic` alone
+        self._is_users = shading is not None and not shading.is_own
+        self.label = f"{label} ({shading.name})" if self._is_users else label
         self.size = size
         self.variant = mi.variant()
         self.times = []
         self.compilation = 0.0
-        self._replayed = dr.freeze(_rendered)
+        # Of a user's own code nobody knows whether it can be recorded: NumPy ends the process.
+        self._replayed = None if self._is_users else dr.freeze(_rendered)
 
     def render(self, seed):
         """Render one pass and return it as a tensor (H, W, 3), noting the time.
@@ -89,6 +96,8 @@ class Renderer:
             With Mitsuba's own reason when it cannot render the scene.
         NonFiniteError
             Naming the first pixel that is NaN or infinite, and how many there are.
+        InputError
+            Likewise where a heuristic of a user's own gives negative light.
         """
         if self.size:
             resize(self.scene, self.size)
@@ -101,9 +110,12 @@ class Renderer:
                 dr.eval(image)
                 dr.sync_thread()
             except RuntimeError as error:
-                raise InputError(
-                    f"{self.label}: Mitsuba cannot render it: {_reason(error)}"
-                ) from error
+                chain = list(_chain(error))
+                for own in chain:
+                    if isinstance(own, FotismosError):
+                        raise own from None
+                reason = str(chain[-1]).strip()
+                raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
         # The film keeps what it has developed, which is as large as the image.
@@ -113,6 +125,8 @@ class Renderer:
             image = dr.repeat(image, 3, axis=2)
         if not dr.all(dr.isfinite(image.array)):
             require_finite(np.array(image), f"{self.label}, pass with seed {seed}")
+        if self._is_users and dr.any(image.array < -ROUNDING) and not self._may_overshoot():
+            require_light(np.array(image), f"{self.label}, pass with seed {seed}")
         return image
 
     @property
@@ -137,6 +151,11 @@ class Renderer:
             except Exception:  # whatever a plugin raises, it says better when it is traced
                 self._replayed = None
         return _rendered(*given)
+
+    def _may_overshoot(self):
+        """Tell whether the film's filter has negative lobes."""
+        found = self.scene.sensors()[0].film().rfilter().class_name()
+        return not any(kind in found for kind in ("Box", "Tent", "Gaussian"))
 
     def _require_room(self):
         width, height = image_size(self.scene)
@@ -203,11 +222,11 @@ def _rendered(scene, integrator, spp, seed):
     return mi.render(scene, integrator=integrator, spp=spp, seed=seed)
 
 
-def _reason(error):
-    """Return the message of the error that began a chain of them."""
-    while (cause := error.__cause__ or error.__context__) is not None:
-        error = cause
-    return str(error).strip()
+def _chain(error):
+    """Yield an error, and those that led to it: Dr.Jit wraps what Python code raised."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
 
 
 def require_finite(image, layer):
@@ -217,13 +236,28 @@ def require_finite(image, layer):
     from the top left in reading order.
     """
     finite = np.isfinite(image)
-    if finite.all():
-        return
-    wrong = ~finite if finite.ndim == 2 else ~finite.all(axis=-1)
+    if not finite.all():
+        raise NonFiniteError(
+            f"{layer}: {_wrong(image, finite, 'NaN or infinite')}. Look at the surface and the"
+            " lights seen there: an infinite light or a degenerate mesh is the usual cause."
+        )
+
+
+def require_light(image, layer):
+    """Raise `InputError` if an image holds a value that is negative by more than rounding."""
+    right = image >= -ROUNDING
+    if not right.all():
+        raise InputError(
+            f"{layer}: {_wrong(image, right, 'negative')}. Light is 0 or more: clamp what can be"
+            " negative, such as a cosine, by drjit.maximum(cosine, 0)."
+        )
+
+
+def _wrong(image, right, what):
+    """Say how many pixels are wrong, and which is the first."""
+    wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
     place = np.unravel_index(np.argmax(wrong), wrong.shape)
-    raise NonFiniteError(
-        f"{layer}: {np.count_nonzero(wrong)} of {wrong.size} pixels are NaN or infinite, the first"
-        f" at (x, y) = ({', '.join(str(index) for index in reversed(place))}):"
-        f" {np.asarray(image)[place]}. Look at the surface and the lights seen there: an infinite"
-        " light or a degenerate mesh is the usual cause."
+    return (
+        f"{np.count_nonzero(wrong)} of {wrong.size} pixels are {what}, the first at (x, y) ="
+        f" ({', '.join(str(index) for index in reversed(place))}): {np.asarray(image)[place]}"
     )

@@ -14,6 +14,7 @@ from comparisons.check.measurement import HALVES
 from comparisons.store import content, require_regular
 from heuristic import program
 from heuristic.errors import InputError
+from heuristic.heuristics import in_file
 from reports.files import exr
 
 
@@ -32,7 +33,8 @@ class BaselineFile:
         seed
             In place of the baseline's own.
         """
-        options = dict(self.baseline.options) | ({} if seed is None else {"seed": seed})
+        options = options_from(self.baseline.options, self.path)
+        options |= {} if seed is None else {"seed": seed}
         return open_case(scene_from(self.baseline.scene, self.path), Request.of(options))
 
     def pictures(self):
@@ -144,6 +146,25 @@ def scene_for(scene, path):
     """
     file = file_of(scene)
     return scene if file is None else Path(os.path.relpath(file, path.parent)).as_posix()
+
+
+def options_from(options, path):
+    """Return the options of a baseline as a :class:`comparisons.case.Request` takes them."""
+    return _with_heuristic(options, lambda file: os.path.relpath(path.parent / file))
+
+
+def options_for(options, path):
+    """Return options as a baseline at ``path`` has them: files relative to its own folder."""
+    return _with_heuristic(options, lambda file: os.path.relpath(file, path.parent))
+
+
+def _with_heuristic(options, placed):
+    """Return options whose heuristic, where it is in a file, has another path."""
+    file, function = in_file(options.get("heuristic", "")) or ("", "")
+    if not file:
+        return dict(options)
+    word = Path(placed(file)).as_posix() + (f":{function}" if function else "")
+    return dict(options) | {"heuristic": word}
 
 
 def name_of(scene):

@@ -141,7 +141,7 @@ def create(path, scene, case, images=False, progress=None):
     begin = perf_counter()
     case = check.made_small(case)
     measured = check.measure_scene(case.source, case.options, progress=progress)
-    options = case.asking(spp=measured.spp).request.stated()
+    options = baselines.options_for(case.asking(spp=measured.spp).request.stated(), path)
     status = "updated" if path.exists() else "created"
     new = baseline.of(scene, options, measured.measurement)
     baselines.write(path, new, check_pictures.reduced(measured.pictures) if images else None)

@@ -94,7 +94,7 @@ def update_one(path, scene, images, significance, given, progress=None):
 
 
 def _update(path, scene, images, significance, given, progress):
-    file = _readable(path, scene)
+    file, given = _readable(path, scene), baselines.options_for(given, path)
     if file is not None:
         old = file.baseline
         if scene is None or baselines.scene_for(scene, path) == old.scene:
@@ -107,7 +107,7 @@ def _update(path, scene, images, significance, given, progress):
                 " for this scene, or delete that one."
             )
         images = images or bool(old.images)
-    case = open_case(scene, Request.of(given))
+    case = open_case(scene, Request.of(baselines.options_from(given, path)))
     named = baselines.scene_for(scene, path)
     return checks.create(path, named, case, images, progress)
 

@@ -13,6 +13,7 @@ from comparisons.check.measurement import PASSES
 from comparisons.check.moved import LEVEL
 from comparisons.intervals import student
 from heuristic.errors import InputError, unknown
+from heuristic.heuristics import in_file, known_as
 from reports.ci import baselines, checks, lines
 
 
@@ -101,14 +102,17 @@ class Fotismos:
         metric
             ``dE2000``, ``dE_ITP``, ``dE_CAM16UCS``, ``rmse`` or ``log2_luminance``.
         options
-            Those of the command line: ``resolution``, ``spp``, ``seed``, ``pairing``, ... The
-            longer side is 64 pixels where no resolution is given.
+            Those of the command line: ``resolution``, ``spp``, ``seed``, ``heuristic``, ... A
+            heuristic may be a function of a point; a file is sought as a scene's is. The longer
+            side is 64 pixels where no resolution is given.
 
         Returns
         -------
         Departure
         """
-        case = check.made_small(_open(self._found(scene), self._given({}) | options, "scene"))
+        case = check.made_small(
+            _open(self._found(scene), self._given({}) | self._placed(options), "scene")
+        )
         found = check.measure_scene(case.source, case.options).measurement
         if metric not in found.metrics:
             raise unknown("metric", metric, found.metrics)
@@ -157,8 +161,8 @@ class Fotismos:
         file = baselines.read(path)
         if not _in_python(scene):
             scene = baselines.scene_from(file.baseline.scene, path)
-        case = _open(scene, dict(file.baseline.options) | given, name)
-        others = _other_options(file.baseline.options, given)
+        case = _open(scene, baselines.options_from(file.baseline.options, path) | given, name)
+        others = _other_options(file.baseline.options, baselines.options_for(given, path))
         if others:
             if not self.update:
                 raise AssertionError(
@@ -186,7 +190,16 @@ class Fotismos:
         return self.folder / f"{name or _name(scene)}{suffix}.json"
 
     def _given(self, options):
-        return options | ({"variant": self.variant} if self.variant else {})
+        return self._placed(options) | ({"variant": self.variant} if self.variant else {})
+
+    def _placed(self, options):
+        """Return options with a heuristic's file from the test's own folder, if it is there."""
+        if "heuristic" not in options:
+            return options
+        name = known_as(options["heuristic"])
+        file, _ = in_file(name) or ("", "")
+        is_beside = file and (self.folder.parent / file).is_file()
+        return options | {"heuristic": str(self.folder.parent / name) if is_beside else name}
 
 
 def _open(scene, options, name=None):

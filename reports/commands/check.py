@@ -59,7 +59,7 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     moved, the exit code is 1, and OUTPUT holds pictures of where. If one could not be checked, it
     is 2; the others are checked all the same.
 
-    A scene in Python is code, and so is a baseline that names one: it is executed.
+    A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
 
     \b
     Examples:

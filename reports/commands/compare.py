@@ -17,6 +17,18 @@ from reports.terminal import verbosity
 @jobs.workers_option
 @jobs.scheduler_option
 @jobs.rendering_options
+@click.option(
+    "--image",
+    multiple=True,
+    metavar="FILE",
+    help="A picture of the scene, .exr (FILE.exr:LAYER) or .png, in place of the heuristic half;"
+    " several are repeats, from which their noise is known.",
+)
+@click.option(
+    "--transfer",
+    type=click.Choice(["linear", "srgb"]),
+    help="What the values of the picture are. [default: linear for .exr]",
+)
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.option(
@@ -52,7 +64,11 @@ def compare(
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
       fotismos compare plastic-spheres --cost
       fotismos compare my_scenes/
+      fotismos compare my_scene.xml --heuristic my_shader.py
+      fotismos compare my_scene.xml --image theirs.exr
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
+    if rendering["image"] and (len(scenes) > 1 or with_cost):
+        raise click.UsageError("--image goes with one scene, and without --cost.")
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
     batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler))

@@ -71,8 +71,9 @@ def study(file, output, processes, workers, scheduler, findings, timeout):  # fm
         folder = study_files.prepare(wanted, studies / place)
         with ExitStack() as stack:
             if scheduler:
-                # Points need no files of this machine.
-                elsewhere = cluster.connected(scheduler, jobs.Ready.among(1))
+                needs_folder = any(part.reads_files for part in wanted.parts)
+                ready = jobs.Ready.far_away() if needs_folder else jobs.Ready.among(1)
+                elsewhere = cluster.connected(scheduler, ready)
                 spread = running.workers_of(stack.enter_context(elsewhere))
             elif workers:
                 of_ours = cluster.local(workers, jobs.Ready.among(workers))

@@ -141,6 +141,8 @@ def _parameters(fit):
     for owner in fit.materials:
         for parameter in owner.parameters:
             yield owner.name, *_parameter_cells(parameter)
+    for parameter in fit.own:
+        yield fit.form, *_parameter_cells(parameter)
     for light in fit.lights:
         yield light.light, *_parameter_cells(light)
 

@@ -57,15 +57,23 @@ def of_scene(folder, name, case):
     return KeptPasses(folder / f".{name}.fotismos-passes.npz", key)
 
 
+def _digest(word):
+    from comparisons.pictures.picture_files import path_of
+
+    path = path_of(word)
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
 def key_of(source, options, variant, versions):
     """Return a digest of all that the passes of a comparison depend on.
 
     These are the scene with the content of every file that it reads
-    (:func:`reference.scene.identity.digest`), the code of the heuristic, the options but for the
-    ones that only say how long to go on, variant and versions.
+    (:func:`reference.scene.identity.digest`), the code of the heuristic, the pictures in its place,
+    the options but for the ones that only say how long to go on, variant and versions.
     """
     told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
     told["heuristic code"] = named(options.heuristic).digest()
+    told["pictures"] = [_digest(word) for word in options.image]
     told["scene"] = digest(source)
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()

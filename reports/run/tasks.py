@@ -87,6 +87,17 @@ def priced(
     return study.record
 
 
+def exported(name: str, request: Request, place: Path) -> None:
+    """Write what another program needs to render a scene."""
+    from comparisons.case import open_case
+    from comparisons.exports.exported import exported
+    from reports.exports import export_files
+
+    case = open_case(name, request)
+    command = case.command(image="YOURS.exr")
+    export_files.write(place, exported(case.source, case.options), command)
+
+
 def fitted(
     name: str,
     request: Request,

@@ -23,6 +23,7 @@ class PlanReport(Simulation, kw_only=True):
 
     scene: str
     variant: str
+    shading: str
     effects: tuple[PlannedEffect, ...]
     planning_s: Amount
     record_version: int = VERSION
@@ -45,9 +46,10 @@ def report(scene, ready, variant):
     return PlanReport(
         scene=scene,
         variant=variant,
+        shading=ready.pair.shading,
         effects=tuple(effects),
         planning_s=ready.planning_seconds,
-        **record.simulation(ready.plan, ready.reference.spp * ready.passes, ready.passes),
+        **record.simulation(ready, ready.reference.spp * ready.passes, ready.passes),
     )
 
 
@@ -63,6 +65,8 @@ def lines(plan):
     rays += ", environment from a table" if plan.tabulated_environment else ""
     picks = plan.light_samples
     rays += f", {picks} lights a sample in proportion to what they give" if picks else ""
+    reads = ", ".join(plan.heuristic_reads) or "nothing"
+    yield f"heuristic     {plan.shading}, which reads {reads}"
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.integrator}{rays}"

@@ -48,9 +48,12 @@ def shown(unit="passes"):
 def summary(records):
     """Yield a line for each scene: departure, noise, shape, and times."""
     records = list(records)
+    for record in records:
+        if record.picture:
+            yield from _picture(record)
     yield from printed(_table(records), right=1)
     for record in records:
-        if record.heuristic != PHONG.name:
+        if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
         if record.noise_target:
             yield _noise(record)
@@ -60,6 +63,16 @@ def summary(records):
                 f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
                 " light, so that everything was simulated. Please report this scene."
             )
+
+
+def _picture(record):
+    """Yield where a picture lies, and what is odd about it: all numbers rest on that."""
+    shift, ratio = record.picture.shift, ", ".join(f"{value:.3g}" for value in record.picture.ratio)
+    place = "not known" if shift is None else f"{shift[0]:+.2f}, {shift[1]:+.2f} pixels"
+    yield f"{record.scene}: {record.heuristic}"
+    yield f"shift {place}; red, green, blue {ratio} times those of the reference"
+    yield from record.picture.odd
+    yield ""
 
 
 def _table(records):

@@ -41,11 +41,11 @@ def noted() -> Iterator[set[Path]]:
         _open.remove(paths)
         for name in set(sys.modules) - before:
             places = _places(sys.modules[name])
-            if places and all(_counts(Path(place)) for place in places):
+            if places and all(is_users(Path(place)) for place in places):
                 paths |= places
                 del sys.modules[name]
         sources = {Path(_source(path)) for path in paths}
-        files |= {path.resolve() for path in sources if _counts(path) and path.is_file()}
+        files |= {path.resolve() for path in sources if is_users(path) and path.is_file()}
 
 
 @cache
@@ -86,7 +86,8 @@ def _source(path: str) -> str:
     return source if os.path.exists(source) else path
 
 
-def _counts(path: Path) -> bool:
+def is_users(path: Path) -> bool:
+    """Tell whether a file is neither Python's, nor of an installed package, nor the project's."""
     return not any(path.is_relative_to(folder) for folder in _left_out())
 
 
@@ -94,7 +95,7 @@ def _counts(path: Path) -> bool:
 def _left_out() -> tuple[str, ...]:
     installed = sysconfig.get_paths()
     names = ("stdlib", "platstdlib", "purelib", "platlib")
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[1]
     own = [str(root / name) for name in OWN]
     places = [installed[name] for name in names] + site.getsitepackages() + own
     return (*places, *map(os.path.realpath, places), site.getusersitepackages(), *VOLATILE)

@@ -1,0 +1,1 @@
+"""What another program needs to render the same scene."""

@@ -1,0 +1,1 @@
+"""Pictures of other renderers in place of the heuristic half."""

@@ -1,0 +1,52 @@
+"""What docs/shaders.md shows of the shaders in docs/shaders: a table and a picture."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+
+from comparisons.case import Request, open_case
+from comparisons.compare import compare
+from comparisons.departure.metrics import LEADING
+from comparisons.record import Comparison
+from reports.terminal.tables import markdown
+
+SHADERS = Path(__file__).parent / "shaders"
+NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
+SCENES = ("lambert-sphere", "fig-8-9", "plastic-spheres")
+PICTURED = SCENES[-1]
+SIDE, SAMPLES = 192, 256
+
+
+def comparisons() -> dict[tuple[str, str], Comparison]:
+    """Compare each shader on each scene, by the names of both."""
+    return {(name, scene): _compared(name, scene) for name in NAMES for scene in SCENES}
+
+
+def table(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
+    """Yield the table of departures: the mean, its noise, and the mean after the best exposure."""
+    rows = [(_link(name), *(_cell(found[name, scene]) for scene in SCENES)) for name in NAMES]
+    yield from markdown([("Shader", *SCENES), *rows], right=1)
+
+
+def pictures(found: dict[tuple[str, str], Comparison]) -> dict[str, np.ndarray]:
+    """Return the images of one scene, by what shaded it."""
+    shown = {name: found[name, PICTURED].images.heuristic for name in NAMES}
+    return shown | {"reference": found[NAMES[0], PICTURED].images.reference}
+
+
+def _compared(name: str, scene: str) -> Comparison:
+    asked = Request(heuristic=str(SHADERS / f"{name}.py"), resolution=(SIDE, SIDE), spp=SAMPLES)
+    case = open_case(scene, asked)
+    return compare(case.source, case.options)
+
+
+def _link(name: str) -> str:
+    return f"[{name.replace('_', ' ')}](shaders/{name}.py)"
+
+
+def _cell(comparison: Comparison) -> str:
+    metric = comparison.record.metrics[LEADING.name]
+    return f"{metric.mean:.2f} ({metric.after_exposure.mean:.2f})"

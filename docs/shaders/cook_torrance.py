@@ -1,0 +1,29 @@
+"""Microfacets as engines write them: GGX, Smith's masking after Schlick, Schlick's Fresnel."""
+
+import drjit as dr
+
+
+def shade(point):
+    """A diffuse base below an interface; metals have the interface alone.
+
+    A light of intensity `I` gives a white diffuse surface the value `I`, so that a BRDF `f` has the
+    value `pi f I (N.L)`.
+    """
+    material, normal, view = point.material, point.normal, point.view
+    square = material.alpha * material.alpha
+    k = material.alpha / 2
+    dielectric = dr.square((material.ior - 1) / (material.ior + 1))
+    f0 = dr.lerp(dielectric, material.base_color, material.metallic)
+    facing = dr.maximum(dr.dot(normal, view), 1e-3)
+    value = point.ambient * material.base_color
+    for light in point.lights:
+        half = dr.normalize(light.toward + view)
+        cosine = dr.maximum(dr.dot(normal, light.toward), 0)
+        top = dr.maximum(dr.dot(normal, half), 0)
+        distribution = square / dr.square(top * top * (square - 1) + 1)  # times pi
+        masking = 1 / (4 * (facing * (1 - k) + k) * (cosine * (1 - k) + k))
+        grazing = (1 - dr.clip(dr.dot(half, view), 0, 1)) ** 5
+        fresnel = f0 + (1 - f0) * grazing
+        diffuse = (1 - fresnel) * (1 - material.metallic) * material.base_color
+        value += light.intensity * cosine * (diffuse + distribution * masking * fresnel)
+    return value

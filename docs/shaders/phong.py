@@ -1,0 +1,16 @@
+"""The chapters' model (8.10): what the built-in heuristic `phong` computes."""
+
+import drjit as dr
+
+
+def shade(point):
+    """Ambient, diffuse and specular light."""
+    material = point.material
+    value = material.k_i + point.ambient * material.k_a
+    for light in point.lights:
+        cosine = dr.dot(point.normal, light.toward)
+        mirrored = 2 * cosine * point.normal - light.toward
+        lobe = dr.maximum(dr.dot(mirrored, point.view), 0) ** material.n
+        reflected = material.k_d * cosine + material.k_s * lobe
+        value += dr.select(cosine > 0, light.intensity * reflected, 0)
+    return value

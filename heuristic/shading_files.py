@@ -1,0 +1,98 @@
+"""Heuristics in files of a user's, which a command names as ``FILE.py`` or ``FILE.py:function``.
+
+A heuristic there is a function of a :class:`heuristic.points.Point`, called ``shade`` where the
+command names no other, or an object :class:`heuristic.heuristics.Heuristic`. Any process finds the
+same by the same words, and a file that changed is read again.
+"""
+
+import runpy
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+
+from heuristic.errors import InputError, suggestion
+from heuristic.functions import heuristic_of
+from heuristic.heuristics import Heuristic, in_file
+from heuristic.user_code import contained, told
+
+FUNCTION = "shade"
+"""What the function is called where no other name is given."""
+
+MODULE = "_shading_of_a_user"
+"""What a file's functions have as their module: a name that hides nobody else's."""
+
+_opened: dict[tuple[str, Path, str | None], tuple[Heuristic, frozenset[Path]]] = {}
+
+
+def opened(word: str) -> Heuristic:
+    """Return the heuristic that a word names, for the current variant of Mitsuba.
+
+    Raises
+    ------
+    InputError
+        When there is no such file or function, or its code fails: by its line.
+    """
+    file, function = in_file(word)
+    path, function = Path(file), function or FUNCTION
+    key = word, path.resolve(), mi.variant()
+    if key in _opened:
+        known, files = _opened[key]
+        if known.code == _digest(files):
+            return known
+    _opened[key] = _read(word, path, function)
+    return _opened[key][0]
+
+
+def _read(word: str, path: Path, function: str) -> tuple[Heuristic, frozenset[Path]]:
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such file. Give a Python file with a function `{FUNCTION}(point)`"
+            " that returns a colour, as FILE.py, or FILE.py:FUNCTION for another name."
+        )
+    with contained(path) as read:
+        given = _named(_run(path), function, path)
+        found = heuristic_of(given, word, _label(path, function))
+    files = frozenset(read | {path.resolve()})
+    return replace(found, code=_digest(files)), files
+
+
+def _run(path: Path) -> dict[str, Any]:
+    """Return what a file defines, by name."""
+    try:
+        return runpy.run_path(str(path.resolve()), run_name=MODULE)
+    except (Exception, SystemExit) as error:  # whatever a user's own code raises
+        raise InputError(
+            f"{told(error)}. {path} was to give a heuristic, and cannot be run."
+        ) from error
+
+
+def _named(names: dict[str, Any], function: str, path: Path) -> Any:
+    """Return what a file calls by a name."""
+    if function in names:
+        return names[function]
+    own = [
+        name
+        for name, value in names.items()
+        if getattr(value, "__module__", None) == MODULE and callable(value)
+    ]
+    has = f"It has {', '.join(own)}: give {path}:{own[0]}." if own else "It has none."
+    raise InputError(
+        f"{path}: there is no function `{function}`{suggestion(function, own)}. {has}"
+        f" A heuristic is a function `{FUNCTION}(point)` that returns a colour."
+    )
+
+
+def _label(path: Path, function: str) -> str:
+    return path.stem if function == FUNCTION else function
+
+
+def _digest(files: frozenset[Path]) -> str:
+    """Return a digest of the content of files; one that is gone counts, too."""
+    found = sha256()
+    for file in sorted(files):
+        content = file.read_bytes() if file.is_file() else b"gone"
+        found.update(f"{len(content)} ".encode() + content)
+    return found.hexdigest()

@@ -1,0 +1,43 @@
+"""``fotismos export``: a scene for another program."""
+
+import click
+
+from comparisons.processes.worker import Task
+from reports import jobs
+from reports.run import tasks
+from reports.terminal import verbosity
+
+
+@click.command()
+@jobs.scene_argument
+@jobs.output_option("out")
+@jobs.timeout_option
+@jobs.rendering_options
+@jobs.scene_options
+@verbosity.quiet_option
+@verbosity.verbose_option
+def export(scene, output, timeout, **rendering):
+    """Write what another program needs to render the same scene, for `compare --image`.
+
+    Writes to OUTPUT/export/SCENE: the camera as matrices of Mitsuba and OpenGL, geometry as glTF
+    and OBJ, lights and materials as paired, what each pixel sees as EXR, and a README of
+    conventions.
+
+    \b
+    Examples:
+      fotismos export cornell-box
+      fotismos export my_scene.xml --resolution 640x480 -o for_my_engine
+    """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.require_known([scene])
+    with jobs.pool(timeout) as pool:
+        pool.start()
+        from reports.run.output import below, held, require_free_folders
+        from reports.run.places import places
+
+        with held(output, jobs.command_line()) as held_folder:
+            folder = below(held_folder, "export")
+            (place,) = places(folder, [scene])
+            require_free_folders(folder, place)
+            words = (scene, jobs.request(rendering), folder / place)
+            pool.do(Task(place, tasks.exported, words))
+    verbosity.tell_where(folder / place)

@@ -1,0 +1,595 @@
+"""Heuristics in files of a user's: the same anywhere, and every mistake in words."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import heuristic
+from comparisons.case import Request, open_case
+from comparisons.compare import prepare
+from comparisons.options import Options
+from heuristic import Range, trial
+from heuristic.errors import FotismosError, InputError
+from heuristic.functions import heuristic_of
+from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
+from reference.pairing import halves
+from reference.scene.source import Source
+from reports.run.kept import key_of
+from tests import checks, oracle
+
+SHADERS = Path(__file__).parents[1] / "docs/shaders"
+SMALL = {"resolution": (24, 24), "spp": 8}
+
+
+@pytest.fixture
+def undeclared(monkeypatch):
+    """What a test declares is forgotten after it."""
+    monkeypatch.setattr(HEURISTICS, "_others", {})
+
+
+def image(scene, name, **more):
+    case = open_case(scene, Request(heuristic=name, **{**SMALL, **more}))
+    return np.array(prepare(case.source, case.options).heuristic.render(3))
+
+
+GREY = "def shade(point):\n    return point.ambient * 0 + 0.25\n"
+
+
+# --- The same as what is built in ----------------------------------------------------------------
+
+
+@pytest.mark.guarantee(
+    "kernel",
+    "Phong's model, written as a user's function in a file, gives the kernel's image to 1e-5.",
+)
+@pytest.mark.parametrize("interpolation", ["phong", "gouraud", "flat"])
+@pytest.mark.parametrize("scene", ["fig-8-9", "fig-8-11-n3", "fig-6-5-m40", "fig-6-14"])
+def test_phong_in_a_file_is_phong(scene, interpolation):
+    own, theirs = (
+        image(scene, name, interpolation=interpolation)
+        for name in ("phong", str(SHADERS / "phong.py"))
+    )
+    assert own.max() > 0.1
+    np.testing.assert_allclose(theirs, own, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "more"),
+    [("plastic-spheres", {}), ("cornell-box", {}), ("narrow-band-lamp", {}),
+     ("fig-8-9", {"everything": True}), ("fig-8-9", {"pairing": "literal"})],
+)  # fmt: skip
+def test_phong_in_a_file_is_phong_in_rooms_and_spectra(scene, more):
+    own, theirs = (image(scene, name, **more) for name in ("phong", str(SHADERS / "phong.py")))
+    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
+
+
+def test_a_wrong_shader_is_told_from_phong(written):
+    text = (SHADERS / "phong.py").read_text(encoding="utf-8")
+    name = written(text.replace("2 * cosine", "2.02 * cosine"))
+    assert abs(image("fig-8-9", name) - image("fig-8-9", "phong")).max() > 1e-3
+
+
+# --- The shaders of the documentation, against their formulas ------------------------------------
+
+LIGHTS = {
+    "light1": {
+        "type": "heuristic_point", "position": [-4, -2, 3],
+        "intensity": {"type": "rgb", "value": [1, 0.5, 0.25]},
+    },
+    "light2": {
+        "type": "heuristic_directional", "direction": [-1, 2, -1],
+        "intensity": {"type": "rgb", "value": [0.2, 0.4, 0.6]},
+    },
+}  # fmt: skip
+
+
+def sphere(shader, **parameters):
+    """A sphere of a glossy metallic paint under two coloured lights, and its parameters."""
+    from comparisons.gallery.builtin import SCENES
+
+    builtin = SCENES["fig-8-9"].make()
+    paint = {
+        "type": "phong", "k_a": 0.2, "k_d": 0.5, "k_s": 0.4, "n": 9.0,
+        "base_color": {"type": "rgb", "value": [0.6, 0.3, 0.1]},
+        "alpha": 0.35, "ior": 1.6, "metallic": 0.25,
+    }  # fmt: skip
+    integrator = {"type": "heuristic", "model": str(shader), "ambient": 0.1, **parameters}
+    scene = {name: builtin[name] for name in ("type", "sensor")} | LIGHTS
+    return scene | {"sphere": builtin["sphere"] | {"bsdf": paint}, "integrator": integrator}
+
+
+def angles(n, v, light):
+    """Return the cosines of incidence and view, and the azimuth between light and view."""
+    i, r = (np.sum(n * each, axis=1) for each in (light, v))
+    flat = [oracle.unit(each - c[:, None] * n) for each, c in ((light, i), (v, r))]
+    return i, r, np.sum(flat[0] * flat[1], axis=1)
+
+
+def wrapped(n, v, light, wrap=0.5):
+    return np.maximum((np.sum(n * light, axis=1) + wrap) / (1 + wrap), 0)[:, None]
+
+
+def oren_nayar(n, v, light, sigma=0.5):
+    """The published form, by angles."""
+    i, r, cos_phi = angles(n, v, light)
+    theta_i, theta_r = np.arccos(np.clip(i, -1, 1)), np.arccos(np.clip(r, -1, 1))
+    alpha, beta = np.maximum(theta_i, theta_r), np.minimum(theta_i, theta_r)
+    a = 1 - 0.5 * sigma**2 / (sigma**2 + 0.33)
+    b = 0.45 * sigma**2 / (sigma**2 + 0.09)
+    bright = np.maximum(cos_phi, 0) * np.sin(alpha) * np.tan(beta)
+    return (np.maximum(i, 0) * (a + b * np.where(i > 0, bright, 0)))[:, None]
+
+
+def ggx(n, v, light, a=0.35, ior=1.6, metallic=0.25):
+    """Walter's distribution by the slope of the half vector, over the base colour."""
+    base = np.array([0.6, 0.3, 0.1])
+    h = oracle.unit(light + v)
+    i, r, top, side = (np.sum(x * y, axis=1) for x, y in ((n, light), (n, v), (n, h), (h, v)))
+    slope = 1 / top**2 - 1
+    distribution = a**2 / (np.pi * top**4 * (a**2 + slope) ** 2)
+    masking = [c / (c * (1 - a / 2) + a / 2) for c in (i, r)]
+    f0 = (1 - metallic) * ((ior - 1) / (ior + 1)) ** 2 + metallic * base
+    fresnel = f0 + (1 - f0) * ((1 - side) ** 5)[:, None]
+    specular = (distribution * masking[0] * masking[1] / (4 * i * r))[:, None] * fresnel
+    brdf = (1 - fresnel) * (1 - metallic) * base / np.pi + specular
+    return np.where(i[:, None] > 0, np.pi * brdf * i[:, None], 0) / base
+
+
+FORMULAS = {
+    "wrapped": (wrapped, {"wrap": 0.8}),
+    "oren_nayar": (oren_nayar, {"sigma": 0.9}),
+    "cook_torrance": (ggx, {}),
+}
+
+
+def require_formula(name, shader, **parameters):
+    given = checks.with_film(sphere(shader, **parameters), 48, 1)
+    aovs = {"type": "aov", "aovs": "P:position,N:sh_normal", "image": given["integrator"]}
+    channels = checks.render(given, 1, 5, aovs).reshape(-1, 9).astype(float)
+    colour, p, n = np.split(channels, 3, axis=1)
+    hit = np.any(n != 0, axis=1)
+    colour, p, n = colour[hit], p[hit], oracle.unit(n[hit])
+    _, lights, ambient, viewer = checks.described(given)
+    v = oracle.unit(viewer - p)
+    base = np.array([0.6, 0.3, 0.1])
+    expected = np.zeros_like(colour) + ambient * base
+    for light in lights:
+        toward, factor, _ = light.arriving(p)
+        shaded = FORMULAS[name][0](n, v, toward, **parameters)
+        expected += base * light.intensity * factor[:, None] * shaded
+    edge = np.sum(n * v, axis=1) < 0.02  # where the shaders bound their divisors
+    assert edge.mean() < 0.05
+    assert expected.std() > 0.03
+    oracle.require_close(colour, expected, absolute=2e-5, where=~edge)
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_a_shader_of_the_documentation_is_its_formula(rgb, name):
+    require_formula(name, SHADERS / f"{name}.py")
+    if FORMULAS[name][1]:
+        require_formula(name, SHADERS / f"{name}.py", **FORMULAS[name][1])
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong"),
+    [("oren_nayar", "0.45 *", "0.46 *"), ("cook_torrance", "alpha / 2", "alpha / 2.1"),
+     ("wrapped", "(1 + wrap)", "(1 + wrap * wrap)")],
+)  # fmt: skip
+def test_a_mutated_shader_is_not(rgb, written, name, right, wrong):
+    text = (SHADERS / f"{name}.py").read_text(encoding="utf-8")
+    assert right in text
+    with pytest.raises(AssertionError, match="values are off"):
+        require_formula(name, written(text.replace(right, wrong)))
+
+
+def test_a_toon_ramp_has_as_many_levels_as_steps(written):
+    name = written((SHADERS / "toon.py").read_text(encoding="utf-8"))
+    shown = image("lambert-sphere", name, spp=2, resolution=(8, 8))
+    assert shown.max() > 0.1
+    parameters = {p.name: (p.default, p.low, p.high) for p in named(name).parameters}
+    assert parameters == {"steps": (3, 1, 8), "outline": (0.2, 0, 1)}
+
+
+# --- What is read of the physical half -----------------------------------------------------------
+
+PARTNERS = {
+    "diffuse": ({"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.3]}},
+                (0.1, 0.2, 0.3), 1, 1, 0),
+    "roughplastic": ({"type": "roughplastic", "alpha": 0.3, "int_ior": 1.8, "ext_ior": 1.2,
+                      "diffuse_reflectance": 0.4}, 0.4, 0.3, 1.5, 0),
+    "plastic": ({"type": "plastic", "int_ior": 1.7, "ext_ior": 1.0}, 0.5, 1e-4, 1.7, 0),
+    "principled": ({"type": "principled", "base_color": {"type": "rgb", "value": [0.7, 0.5, 0.2]},
+                    "roughness": 0.6, "metallic": 0.25, "eta": 1.4},
+                   (0.7, 0.5, 0.2), 0.36, 1.4, 0.25),
+    "mirror": ({"type": "conductor", "material": "none"}, 1, 1e-4, 1, 1),
+    "rough mirror": ({"type": "roughconductor", "material": "none", "alpha": 0.2,
+                      "specular_reflectance": 0.5}, None, 0.2, 1, 1),
+    "twosided": ({"type": "twosided", "bsdf": {"type": "roughplastic", "alpha": 0.25,
+                  "int_ior": 1.5, "ext_ior": 1.0}}, 0.5, 0.25, 1.5, 0),
+    "blend": ({"type": "blendbsdf", "weight": 0.25,
+               "a": {"type": "diffuse", "reflectance": 0.2},
+               "b": {"type": "principled", "base_color": 0.6, "metallic": 1.0, "eta": 1.5}},
+              0.3, 0.75 + 0.25 * 0.25, 0.75 + 0.25 * 1.5, 0.25),
+    "matte phong": ({"type": "phong", "k_d": 0.6}, 0.6, 1, 1, 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARTNERS)
+def test_the_partners_parameters_are_the_physical_ones(rgb, written, name):
+    given, *expected = PARTNERS[name]
+    written("import mitsuba as mi\n" + "".join(
+        f"def {one}(point): return mi.Spectrum(point.material.{one})\n"
+        for one in ("base_color", "alpha", "ior", "metallic")
+    ))  # fmt: skip
+    scene = {
+        "type": "scene",
+        "floor": {"type": "rectangle", "bsdf": given},
+        "light": {"type": "point", "position": [0, 0, 3]},
+        "sensor": {
+            "type": "orthographic",
+            "to_world": mi.ScalarTransform4f().look_at([0, 0, 2], [0, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
+        },
+    }
+    for one, value in zip(("base_color", "alpha", "ior", "metallic"), expected, strict=True):
+        if value is not None:
+            half = halves.pair(Source("floor", scene), heuristic=f"mine.py:{one}").heuristic
+            shown = np.array(mi.render(half.instantiate(), spp=1))
+            oracle.require_close(shown.reshape(-1, 3), np.broadcast_to(value, (16, 3)), 2e-3)
+
+
+def test_a_textbook_material_has_the_plastic_that_it_is_paired_with(rgb, written):
+    written("import mitsuba as mi\ndef shade(point): return mi.Spectrum(point.material.alpha)")
+    case = open_case("fig-8-9", Request(heuristic="mine.py", **SMALL))
+    (record,) = [each for each in case.options.pair(case.source).bsdfs if each.given == "phong"]
+    assert image("fig-8-9", "mine.py").max() == pytest.approx(record.parameters["alpha"], rel=1e-5)
+
+
+def test_built_in_heuristics_carry_no_partner(rgb):
+    for name, count in (("phong", 0), (str(SHADERS / "phong.py"), 1)):
+        graph = halves.pair(open_case("fig-8-9").source, heuristic=name).heuristic
+        phongs = [i for i in graph.nodes(halves.BSDF) if "base_color" in graph.props(i)]
+        assert len(phongs) == count
+
+
+# --- Mistakes ------------------------------------------------------------------------------------
+
+MISTAKES = {
+    "branch": (
+        "import drjit as dr\n"
+        "def shade(point):\n"
+        "    cosine = dr.dot(point.normal, point.lights[0].toward)\n"
+        "    if cosine > 0:\n        return cosine\n    return 0\n",
+        r"^mine.py, line 4: RuntimeError.*All points are shaded at once.*drjit.select",
+    ),
+    "maximum": (
+        "import drjit as dr\n"
+        "def shade(point): return max(0, dr.dot(point.normal, point.view))\n",
+        r"^mine.py, line 2: .*in place of max\(\) drjit.maximum\(\)",
+    ),
+    "not finite": (
+        "def shade(point): return point.ambient / 0\n",
+        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*expected are .* finite",
+    ),
+    "root of what is negative": (
+        "import drjit as dr\n\n"
+        "def shade(point): return dr.sqrt(dr.dot(point.normal, point.lights[1].toward))\n",
+        r"^mine.py, line 3: .* returned \(nan, nan, nan\).*N.L = -",
+    ),
+    "negative": (
+        "import drjit as dr\n"
+        "def shade(point): return dr.dot(point.normal, point.lights[1].toward)\n",
+        r"^mine.py, line 2: .* expected are components that are 0 or more.*drjit.maximum\(cosine",
+    ),
+    "shape": (
+        "def shade(point): return (1, 2, 3)\n",
+        r"^mine.py, line 1: .* returned a tuple of 3; expected is one colour for each point",
+    ),
+    "two components": (
+        "import mitsuba as mi\ndef shade(point): return mi.Point2f(point.uv)\n",
+        r"^mine.py, line 2: .*Point2f; expected is .* of 3 components",
+    ),
+    "a mask": ("def shade(point): return point.ambient > 0\n", r"line 1: .* returned a .*Array3b"),
+    "NumPy": (
+        "import numpy as np\ndef shade(point): return np.ones((4, 3))\n",
+        r"^mine.py, line 2: .*numpy.ndarray of shape \(4, 3\)",
+    ),
+    "nothing": ("def shade(point): pass\n", r"^mine.py, line 1: .* returned None"),
+    "too few points": (
+        "import mitsuba as mi\ndef shade(point): return mi.Float([1, 2, 3])\n",
+        r"^mine.py, line 2: .* returned 3 values for 256 points",
+    ),
+    "an attribute": (
+        "def shade(point):\n    return point.normals.x\n",
+        r"^mine.py, line 2: AttributeError: 'Point' .*'normals' \(did you mean normal\?\)",
+    ),
+    "raises": (
+        "def shade(point):\n    return helper(point)\n\n\n"
+        "def helper(point):\n    raise ValueError('no idea')\n",
+        r"^mine.py, line 6: ValueError: no idea",
+    ),
+    "syntax": ("def shade(point)\n    return 1\n", r"^mine.py, line 1: SyntaxError: expected ':'"),
+    "import": ("\nimport nowhere\n", r"^mine.py, line 2: ModuleNotFoundError"),
+    "exit": ("import sys\nsys.exit(3)\n", r"^mine.py, line 2: SystemExit: 3"),
+    "no function": (
+        "def shadow(point): return 1\n",
+        r"no function `shade` \(did you mean shadow\?\)\. It has shadow: give mine.py:shadow",
+    ),
+    "nothing in it": ("", r"no function `shade`. It has none"),
+    "a number": ("shade = 3\n", r"mine.py is of type int: give a function of a point"),
+    "no point": ("def shade(): return 1\n", r"^mine.py, line 1: it does not take a point"),
+    "no default": (
+        "def shade(point, gloss): return gloss\n",
+        r"^mine.py, line 1: 'gloss' has no number as its default.*gloss: Range\(0, 1\) = 0.5",
+    ),
+    "bounds": (
+        "from heuristic import Range\n"
+        "def shade(point, gloss: Range(0, 1) = 2): return gloss\n",
+        r"^mine.py, line 2: gloss = 2.0 is not allowed: give one from 0 to 1",
+    ),
+    "a reserved name": (
+        "def shade(point, ambient=1.0): return ambient\n",
+        r"^mine.py, line 1: parameter 'ambient' is not allowed",
+    ),
+    "infinite default": (
+        "def shade(point, gloss=float('inf')): return 1\n",
+        r"^mine.py, line 1: 'gloss' has no number as its default",
+    ),
+    "exit while shading": (
+        "def shade(point):\n    raise SystemExit(4)\n",
+        r"^mine.py, line 2: SystemExit: 4",
+    ),
+    "writes to the material": (
+        "def shade(point):\n    point.material.k_d = 3\n    return 1\n",
+        r"^mine.py, line 2: FrozenInstanceError: cannot assign to field 'k_d'",
+    ),
+    "a coroutine": (
+        "def shade(point):\n    yield point.ambient\n",
+        r"^mine.py, line 1: .* returned a generator",
+    ),
+    "undeclared": (
+        "from heuristic import Heuristic\n"
+        "shade = Heuristic('x', lambda point: point.uv.x, needs={'normal'})\n",
+        r"^mine.py, line 2: 'uv' is read, but not declared",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.guarantee(
+    "runs",
+    "A mistake in a user's heuristic is one message, with the file, the line and the remedy.",
+)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_with_file_and_line(rgb, written, mistake):
+    text, message = MISTAKES[mistake]
+    with pytest.raises(InputError, match=f"(?s){message}"):
+        named(written(text))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "mi.Float(np.array(point.ambient.x))",  # which Dr.Jit cannot record
+        "dr.float64_array_t(mi.Float)(point.ambient.x)",
+        "np.float32(1)",
+        "point.ambient",
+    ],
+)
+def test_a_colour_may_come_in_any_kind_of_array(written, value):
+    name = written(
+        "import drjit as dr\nimport mitsuba as mi\nimport numpy as np\n"
+        f"def shade(point):\n    return {value} * 0 + 0.25\n"
+    )
+    for interpolation in ("phong", "gouraud"):
+        shown = image("fig-6-10", name, interpolation=interpolation)
+        assert shown.max() == pytest.approx(0.25)
+
+
+def test_a_missing_file_says_what_is_wanted(rgb, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"^none.py: there is no such file. Give a Python file"):
+        named("none.py")
+
+
+def test_a_mistake_that_only_a_scene_shows_is_told_likewise(rgb, written):
+    name = written(
+        "import drjit as dr\n\n\ndef shade(point):\n"
+        "    return dr.maximum(dr.dot(point.normal, point.lights[1].toward), 0)\n"
+    )
+    with pytest.raises(InputError, match=r"^mine.py, line 5: IndexError"):
+        image("fig-8-9", name)
+
+
+@pytest.mark.parametrize(("value", "kind"), [("-1", "negative"), ("dr.nan", "NaN or infinite")])
+def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written, value, kind):
+    name = written(
+        "import drjit as dr\ndef shade(point):\n"
+        f"    return dr.select(dr.abs(point.position.x) > 6, {value}, point.ambient)\n"
+    )
+    up = mi.ScalarTransform4f()
+    scene = {
+        "type": "scene",
+        "floor": {"type": "rectangle", "to_world": up.scale(40), "bsdf": {"type": "diffuse"}},
+        "light": {"type": "constant"},
+        "sensor": {"type": "perspective", "to_world": up.look_at([0, 0, 30], [0, 0, 0], [0, 1, 0])},
+    }
+    with pytest.raises(FotismosError, match=rf"\(mine.py\).* pixels are {kind}, the first at"):
+        image(scene, name)
+
+
+def test_a_function_that_never_ends_is_ended(run, apart, written):
+    name = written("def shade(point):\n    while True:\n        pass\n")
+    words = ("compare", "fig-8-9", "--heuristic", name, "--resolution", "8x8", "--timeout", 15)
+    code, _, said = run(*words)
+    assert code == 1
+    assert "it took 15 s without any progress" in " ".join(said.split())
+
+
+# --- The same everywhere --------------------------------------------------------------------------
+
+
+def record_of(folder):
+    (path,) = folder.glob("*/comparison.json")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.guarantee(
+    "runs", "A result is not found again when a file changed that its heuristic is made of."
+)
+def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, written, tmp_path):
+    """Finished results are found again as long as no file changes that the heuristic is made of."""
+    written("LEVEL = 0.25\n", "level.py")
+    name = written("import level\ndef shade(point): return point.ambient * 0 + level.LEVEL\n")
+    words = ("compare", "fig-8-9", "--heuristic", name, "--resolution", "8x8", "--spp", 4)
+    means, stamps = [], []
+    for text in ("LEVEL = 0.25\n", "LEVEL = 0.25\n", "LEVEL = 0.75\n"):
+        written(text, "level.py")
+        code, said, messages = run(*words, "-o", "out")
+        assert (code, messages) == (0, "")
+        assert f"heuristic {name}" in said
+        means.append(record_of(tmp_path / "out")["metrics"]["rmse"]["mean"])
+        (path,) = (tmp_path / "out").glob("*/comparison.json")
+        stamps.append(path.stat().st_mtime_ns)
+    assert means[0] == means[1] != means[2]
+    assert stamps[0] == stamps[1] != stamps[2]
+
+
+def test_the_file_counts_in_the_key_and_a_function_of_it(rgb, written):
+    both = "def one(point): return 0.5\ndef two(point): return 0.5\n"
+    source = open_case("fig-8-9").source
+
+    def key(name):
+        return key_of(source, Options(heuristic=name), "v", {})
+
+    written(both)
+    keys = [key("mine.py:one"), key("mine.py:one"), key("mine.py:two")]
+    written(both + "# more\n")
+    keys.append(key("mine.py:one"))
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 3
+
+
+def test_a_file_is_seen_from_the_current_folder(rgb, written, tmp_path, monkeypatch):
+    written(GREY)
+    first = image("fig-8-9", "mine.py")
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    written(GREY.replace("0.25", "0.5"), "other/mine.py")
+    assert first.max() == pytest.approx(0.25)
+    assert image("fig-8-9", "mine.py").max() == pytest.approx(0.5)
+
+
+def test_what_a_file_does_to_its_process_is_undone(rgb, written, tmp_path):
+    import os
+    import sys
+
+    before = os.getcwd(), list(sys.path), dict(os.environ), set(sys.modules)
+    written("X = 1\n", "beside_it.py")
+    named(written(
+        "import os, sys, beside_it\nos.chdir('/')\nsys.path.clear()\nos.environ['X'] = 'x'\n" + GREY
+    ))  # fmt: skip
+    assert (os.getcwd(), list(sys.path), dict(os.environ)) == before[:3]
+    assert "beside_it" not in sys.modules
+
+
+def test_a_file_called_like_a_module_hides_nobodys(rgb, written):
+    import numpy
+
+    assert named(written(GREY, "numpy.py")).label == "numpy"
+    import numpy as again
+
+    assert again is numpy
+
+
+def test_an_object_in_a_file_keeps_its_declaration(rgb, written):
+    name = written(
+        "from heuristic import Heuristic, Parameter\n"
+        "def glow(point): return point.parameters.level\n"
+        "mine = Heuristic('x', glow, 'A glow', {'uv'}, (Parameter('level', 0.5, 0, 1),))\n"
+    )
+    found = named(f"{name}:mine")
+    assert (found.name, found.label, found.needs) == (f"{name}:mine", "A glow", {"uv"})
+    assert image("fig-8-9", f"{name}:mine").max() == pytest.approx(0.5)
+
+
+def test_only_what_is_read_is_needed(rgb, written):
+    written(
+        "import drjit as dr\n"
+        "def lit(point):\n"
+        "    seen = [dr.select(each.visible(), each.intensity, 0) for each in point.lights]\n"
+        "    return sum(seen) * point.material.k_d\n"
+        "def still(point): return point.uv.x * point.material.base_color\n"
+    )
+    lit, still = named("mine.py:lit"), named("mine.py:still")
+    assert lit.needs == {"lights", "material", "visible"}
+    assert still.inputs == ("material", "material.base_color", "uv")
+    graphs = [halves.pair(open_case("fig-8-9").source, heuristic=h.name) for h in (lit, still)]
+    casts = [
+        g.heuristic.props(g.heuristic.nodes(halves.INTEGRATOR)[0])["occlusion"] for g in graphs
+    ]
+    assert casts == [True, False]
+
+
+def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
+    name = written("def shade(point): return point.material.k_d * point.ambient\n")
+    words = ("fig-8-9", "--heuristic", name, "--resolution", "8x8")
+    code, said, _ = run("plan", *words)
+    assert code == 0
+    assert f"{name}, which reads ambient, material, material.k_d" in said
+    assert run("compare", *words, "--spp", 4, "-o", "out")[0] == 0
+    record = record_of(tmp_path / "out")
+    assert record["heuristic"] == name
+    assert record["plan"]["heuristic_reads"] == ["ambient", "material", "material.k_d"]
+    code, said, _ = run("plan", "fig-8-9")
+    assert "phong, which reads ambient, lights, material, normal, position, view" in said
+
+
+def test_cost_puts_it_on_the_chart(run, written, tmp_path):
+    name = written((SHADERS / "wrapped.py").read_text(encoding="utf-8"))
+    words = ("cost", "lambert-sphere", "--heuristic", name, "--resolution", "12x12")
+    assert run(*words, "-o", "out", "--rounds", 2)[0] == 0
+    (path,) = (tmp_path / "out/cost").glob("*/cost.json")
+    names = [rung["name"] for rung in json.loads(path.read_text(encoding="utf-8"))["rungs"]]
+    assert any(each.endswith(": mine") for each in names), names
+
+
+# --- Functions and objects of a program ----------------------------------------------------------
+
+
+def test_a_program_gives_a_function_or_an_object(undeclared):
+    from reports.notebook import compare
+
+    def half_lambert(point, gain: Range(0, 2) = 1):
+        """A wrapped cosine, squared."""
+        import drjit as dr
+
+        cosines = [dr.dot(point.normal, light.toward) / 2 + 0.5 for light in point.lights]
+        return sum(c * c for c in cosines) * gain * point.material.base_color
+
+    shown = compare("fig-8-9", heuristic=half_lambert, **SMALL).comparison
+    assert shown.record.heuristic == "half-lambert"
+    assert shown.images.heuristic.max() > 0.1
+    flat = Heuristic("flat-grey", lambda point: 0.5, parameters=(Parameter("x", 0, 0, 1),))
+    assert compare("fig-8-9", heuristic=flat, **SMALL).comparison.images.heuristic.max() == 0.5
+    assert known_as("blinn") == "blinn"
+
+
+def test_a_function_without_file_is_refused_by_its_place(undeclared, rgb):
+    def broken(point):
+        return point.nothing
+
+    with pytest.raises(InputError, match=r"test_user_heuristics.py, line \d+: AttributeError"):
+        known_as(broken)
+    with pytest.raises(InputError, match="is of type int"):
+        heuristic_of(3, "three")
+
+
+def test_a_trial_reads_as_it_is_declared(rgb):
+    seen = Heuristic("seen", lambda point: point.ambient, needs={"ambient"})
+    assert trial.examine(seen) == ("ambient",)
+    assert isinstance(heuristic.Range(0, 1), Range)
+    assert SimpleNamespace(**{p.name: p.default for p in seen.parameters}) == SimpleNamespace()
