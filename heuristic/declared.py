@@ -58,6 +58,10 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         self._others[declaration.name] = declaration
         return declaration
 
+    def is_own(self, declaration: Declaration) -> bool:
+        """Tell whether a declaration is the package's own, as far as those were loaded."""
+        return self._own.get(declaration.name) is declaration
+
     @property
     def built_in(self) -> tuple[str, ...]:
         """The names of the package's own."""

@@ -200,7 +200,7 @@ class Heuristic:
     @property
     def is_own(self) -> bool:
         """Whether it is the package's own."""
-        return self.name in HEURISTICS.built_in
+        return HEURISTICS.is_own(self)
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
