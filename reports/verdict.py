@@ -29,6 +29,9 @@ USUAL = 2.0
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
 
+WITH_CAUSES = "--cost"
+"""The option of ``compare`` that finds causes and remedies."""
+
 NAMED = 3
 """Effects that the sentence names."""
 
@@ -138,6 +141,8 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
 
 def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
     """Return a line for each scene that does not look right: what it lacks, and what would do."""
+    if not any(found.remedies for found in findings):
+        return [f"What it lacks, and what would mend it: the same command with {WITH_CAUSES}."]
     lines = []
     for found in findings:
         if found.is_right(tolerance) or not found.remedies:

@@ -25,5 +25,6 @@ def context(scenes: Sequence[Any]) -> dict[str, Any]:
         "share": verdict.SHARE,
         "top": ROOM * max((f.mean for f in found), default=1.0) or 1.0,
         "effects": {name: EFFECT_COLOURS[name] for name in names},
+        "with_causes": verdict.WITH_CAUSES,
         "has_remedies": any(f.remedies for f in found),
     }

@@ -1,0 +1,90 @@
+"""The verdict on a run: what is counted as right, which causes are named, what would do."""
+
+import pytest
+from msgspec import structs
+
+from comparisons.departure.metrics import LEADING
+from reports import verdict
+from tests import cost_records, records
+
+
+def found(scene="a", mean=4.0, beyond=0.5, parts=(), remedies=None):
+    parts = tuple(verdict.Part(effect, "#000000", size) for effect, size in parts)
+    shares = dict.fromkeys(verdict.TOLERANCES, beyond)
+    return verdict.Finding(scene, mean, shares, parts, remedies or {}, mean <= verdict.EXACT)
+
+
+def of_record(mean, cost=None, **changes):
+    record = records.record()
+    metric = structs.replace(records.summary(mean), **changes)
+    record = structs.replace(record, metrics=record.metrics | {LEADING.name: metric})
+    return verdict.finding(record, cost)
+
+
+@pytest.mark.parametrize(("share", "is_right"), [(0.0, True), (0.05, True), (0.0501, False)])
+def test_a_scene_is_right_if_at_most_a_twentieth_of_its_pixels_departs(share, is_right):
+    visible = {"1": 1.0, "2": share, "5": 0.0}
+    finding = of_record(3.0, visible=visible)
+    assert finding.is_right(2.0) is is_right
+    assert not finding.is_right(1.0)
+    assert finding.is_right(5.0)
+
+
+def test_parts_are_the_sure_prices_and_fill_the_bar():
+    finding = of_record(10.0, cost_records.record())
+    assert [part.effect for part in finding.parts] == ["interreflection", "occlusion"]
+    assert sum(part.size for part in finding.parts) == pytest.approx(10.0)
+    assert finding.parts[0].size / finding.parts[1].size == pytest.approx(5.895 / 3.141)
+
+
+def test_the_remedy_is_the_fastest_method_that_reaches_the_tolerance():
+    remedies = of_record(10.0, cost_records.record()).remedies
+    assert (remedies[2.0].method, remedies[2.0].seconds) == ("full plan", 0.0321)
+    assert remedies[5.0].seconds == 0.0235
+    assert remedies[1.0] is None
+
+
+def test_what_cannot_be_seen_is_exact():
+    assert of_record(0.0).is_exact
+    assert of_record(0.009, high=0.009).is_exact
+    assert not of_record(0.009, high=0.02).is_exact
+
+
+def test_the_sentences_count_scenes_and_name_what_those_that_fail_lack():
+    several = [
+        found("a", parts=[("occlusion", 3.0), ("spectral", 1.0)]),
+        found("b", parts=[("interreflection", 3.5)]),
+        found("c", beyond=0.01, parts=[("environment", 9.0)]),
+    ]
+    assert verdict.sentences(several) == [
+        "Textbook shading looks right in 1 of 3 scenes.",
+        "What it lacks most is interreflection, then occlusion and spectral.",
+    ]
+    assert verdict.sentences([found("a", beyond=0.42)]) == [
+        "Textbook shading is visibly wrong in 42% of a."
+    ]
+    assert verdict.sentences([found("a", beyond=0.0)]) == ["Textbook shading looks right in a."]
+
+
+def test_advice_names_cause_and_remedy_of_each_scene_that_fails():
+    remedy = dict.fromkeys(verdict.TOLERANCES, verdict.Remedy("path 3", 0.041))
+    none = dict.fromkeys(verdict.TOLERANCES)
+    lines = verdict.advice(
+        [
+            found("a", parts=[("occlusion", 4.0)], remedies=remedy),
+            found("b", remedies=none),
+            found("c", beyond=0.0, remedies=none),
+        ]
+    )
+    assert lines == [
+        "a: mostly occlusion; within ΔE2000 2: path 3 in 41.0 ms",
+        "b: no cause is known; within ΔE2000 2: no method that was tried",
+    ]
+    (line,) = verdict.advice([found("a")])
+    assert verdict.WITH_CAUSES in line
+
+
+def test_a_run_ends_with_its_verdict(run, scene_file, tmp_path):
+    code, printed, _ = run("compare", scene_file, "-o", tmp_path / "out", "--spp", 4)
+    assert code == 0
+    assert "Textbook shading " in printed
