@@ -29,8 +29,8 @@ USUAL = 2.0
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
 
-WITH_CAUSES = "--cost"
-"""The option of ``compare`` that finds causes and remedies."""
+WITH_CAUSES = "--why"
+"""The option of ``compare`` that finds causes and remedies, which it does by default."""
 
 NAMED = 3
 """Effects that the sentence names."""

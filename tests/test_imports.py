@@ -19,7 +19,8 @@ COMPARE = """
 import sys
 from reports import cli, jobs
 jobs.IN_PROCESSES = False
-sys.argv = ["fotismos", "compare", "fig-8-9", "--resolution", "16x16", "-o", sys.argv[1], "-q"]
+words = "compare fig-8-9 --no-why --resolution 16x16 -q -o".split()
+sys.argv = ["fotismos", *words, sys.argv[1]]
 cli.main()
 print(*sorted(sys.modules))
 """

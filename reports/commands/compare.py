@@ -40,10 +40,24 @@ from reports.terminal import verbosity
 )
 @jobs.scene_options
 @click.option(
-    "--cost", "with_cost", is_flag=True, help="Study what accuracy costs as well, in a small size."
+    "--why/--no-why",
+    "with_cost",
+    default=None,
+    help="Find causes and remedies, in a small size; not of a picture. [default: why]",
 )
+@click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
 def compare(
-    scenes, output, figures, fresh, with_cost, scripts, timeout, workers, scheduler, **rendering
+    scenes,
+    output,
+    figures,
+    fresh,
+    with_cost,
+    cost,
+    scripts,
+    timeout,
+    workers,
+    scheduler,
+    **rendering,
 ):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
 
@@ -62,13 +76,15 @@ def compare(
       fotismos compare cornell-box --noise 0.5 --spp 2048
       fotismos compare fig-8-8a fig-8-9 --figures -q
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
-      fotismos compare plastic-spheres --cost
+      fotismos compare plastic-spheres --no-why
       fotismos compare my_scenes/
       fotismos compare my_scene.xml --heuristic my_shader.py
       fotismos compare my_scene.xml --image theirs.exr
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
-    if rendering["image"] and (len(scenes) > 1 or with_cost):
-        raise click.UsageError("--image goes with one scene, and without --cost.")
+    has_image, is_asked = bool(rendering["image"]), with_cost or cost
+    if has_image and (len(scenes) > 1 or is_asked):
+        raise click.UsageError("--image goes with one scene, and without --why.")
+    with_cost = is_asked or (with_cost is None and not has_image)
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
     batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler))

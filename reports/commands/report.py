@@ -26,7 +26,7 @@ VERIFIED_AT = (96, 96)
 def report(output, figures, fresh, timeout, workers, scheduler, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
 
-    Writes what `compare --cost` does, and in the page the plans verified, the hard cases and the
+    Writes what `compare` does, and in the page the plans verified, the hard cases and the
     index of equations.
 
     \b

@@ -65,7 +65,7 @@ def compare(
     study = None
     if wanted.with_cost:
         with spent.timing("cost"):
-            result, study = _priced(case, progress, result)
+            result, study = _explained(case, progress, result)
     with spent.timing("files"):
         if wanted.figures:  # first, since a scene with its folder is finished
             from reports.charts import figures
@@ -76,12 +76,24 @@ def compare(
     return view, spent
 
 
+def _explained(case, progress, comparison):
+    """Return a comparison and what accuracy costs; without it where that cannot be studied."""
+    from heuristic.errors import FotismosError
+
+    try:
+        return _priced(case, progress, comparison)
+    except FotismosError as error:
+        warnings = (*comparison.record.warnings, f"Causes are not known: {error}")
+        record = structs.replace(comparison.record, warnings=warnings)
+        return replace(comparison, record=record), None
+
+
 def _priced(case, progress, comparison):
     """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
     from comparisons.cost.cost import quick
     from comparisons.effects.dominance import in_region
 
-    study = quick(case.source, case.options, progress, case.command() + " --cost")
+    study = quick(case.source, case.options, progress, case.command() + " --why")
     record = comparison.record
     regions = tuple(
         structs.replace(region, effect=in_region(region, record.resolution, study.effects))
