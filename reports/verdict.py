@@ -139,6 +139,26 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
     return said
 
 
+def about(found: Finding, tolerance: float = USUAL) -> str:
+    """Return what was found of one scene: how much is wrong, mostly why, and what would do."""
+    if found.is_exact:
+        return "Textbook shading is exact here, as far as can be seen."
+    share = found.beyond[tolerance]
+    wrong = f"is visibly wrong in {share:.0%} of the pixels"
+    said = [
+        "Textbook shading " + ("looks right here." if found.is_right(tolerance) else f"{wrong}.")
+    ]
+    if found.cause:
+        said.append(f"It lacks mostly {found.cause}.")
+    remedy = found.remedies.get(tolerance)
+    if remedy and not found.is_right(tolerance):
+        said.append(
+            f"The cheapest method that was tried within a mean of {LEADING.label} {tolerance:g}:"
+            f" {remedy.method}, {seconds(remedy.seconds)} at the small size of the study."
+        )
+    return " ".join(said)
+
+
 def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
     """Return a line for each scene that does not look right: what it lacks, and what would do."""
     if not any(found.remedies for found in findings):

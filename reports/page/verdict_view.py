@@ -20,6 +20,7 @@ def context(scenes: Sequence[Any]) -> dict[str, Any]:
     return {
         "sentences": verdict.sentences(found),
         "rows": rows,
+        "about": {s.id: verdict.about(f) for s, f in zip(scenes, found, strict=True)},
         "tolerances": verdict.TOLERANCES,
         "usual": verdict.USUAL,
         "share": verdict.SHARE,
