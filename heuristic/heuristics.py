@@ -112,6 +112,11 @@ class Heuristic:
         What it was seen to read (:func:`heuristic.trial.examine`), such as ``material.k_d``.
     code
         Digest of the files that it is made of, where they are known.
+    traced
+        Whether Dr.Jit can record ``shade``. One that evaluates its arrays is called in loops that
+        are evaluated, too, and has no derivatives.
+    remarks
+        What every record of it says among its warnings.
 
     Raises
     ------
@@ -129,6 +134,8 @@ class Heuristic:
     refuse: Callable[[Any], str] | None = None
     reads: tuple[str, ...] = ()
     code: str = ""
+    traced: bool = True
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
@@ -218,6 +225,10 @@ def named(name: str) -> Heuristic:
     InputError
         When none has the name, an entry point cannot be loaded, or a file cannot be used.
     """
+    if name.endswith(GLSL):
+        from heuristic.glsl import shader_files
+
+        return shader_files.opened(name)
     if in_file(name):
         from heuristic import shading_files
 
@@ -225,7 +236,7 @@ def named(name: str) -> Heuristic:
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
-            " give a file with a function `shade(point)`, as FILE.py or FILE.py:FUNCTION. A"
+            " give a file with a function `shade(point)`, as FILE.py, FILE.py:FUNCTION or FILE.glsl. A"
             f" package declares its own by an entry point of the group {GROUP}, a program by"
             " heuristic.heuristics.declare."
         )
@@ -247,16 +258,19 @@ def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
     return declare(given).name
 
 
-_WORDS = re.compile(r"(.+\.py)(?::(\w+))?", re.DOTALL)
+GLSL = ".glsl"
+"""How the names of heuristics in GLSL end."""
+
+_WORDS = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
 
 
 def in_file(name: str) -> tuple[str, str] | None:
     """Return the file and the function that a name ``FILE.py:function`` has, None for others.
 
-    The function is empty where the name has none.
+    The function is empty where the name has none, as that of a ``FILE.glsl``.
     """
     found = _WORDS.fullmatch(name)
-    return found and (found[1], found[2] or "")
+    return found and (found[1] or found[3], found[2] or "")
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}

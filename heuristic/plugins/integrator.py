@@ -90,7 +90,9 @@ def define():
         def sample(self, scene, sampler, ray, medium=None, active=True):
             materials = self.known(scene).materials  # which a symbolic loop could not make
             if any(bsdf.is_clear for bsdf in materials.bsdfs):
-                colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
+                recorded = self.model.traced and dr.flag(dr.JitFlag.SymbolicLoops)
+                with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, recorded):
+                    colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
             else:
                 colour, hit, _ = self.layer(scene, ray, active)
             sees_all = scene.environment() is not None and not self.hide_emitters

@@ -1,0 +1,218 @@
+"""Heuristics in GLSL files, which a command names as ``FILE.glsl``."""
+
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic import trial
+from heuristic.errors import InputError
+from heuristic.glsl import gpu, shader_text
+from heuristic.heuristics import Heuristic
+from heuristic.points import INPUTS, LightAtPoint, Point
+
+SIGNATURE = "vec3 shade(Point point)"
+
+LARGEST = 1 << 20
+"""Bytes of a file: a shader is far shorter, and what is longer is something else."""
+
+LIGHTS = 64
+"""Lights at most: the record of a point holds them all."""
+
+FLOATS = 1 << 24
+"""Floats sent at once, half of what OpenGL allows in a buffer at least (128 MiB with Mesa)."""
+
+POINTS = 1 << 20
+"""Points shaded at once at most; OpenGL allows 65,535 work groups."""
+
+_opened: dict[tuple[str, Path, str], Heuristic] = {}
+
+
+def opened(word: str) -> Heuristic:
+    """Return the heuristic in a GLSL file, after a trial; a file that changed is read again.
+
+    Raises
+    ------
+    InputError
+        When there is no such file or function, it does not compile, or it fails on trial.
+    InstallationError
+        When there is no OpenGL to run it.
+    """
+    path = Path(word)
+    content = _content(path)
+    code = sha256(content).hexdigest()
+    key = word, path.resolve(), mi.variant()
+    if key not in _opened or _opened[key].code != code:
+        _opened[key] = _read(word, content, code)
+    return _opened[key]
+
+
+class Shader:
+    """A user's GLSL as a function of a :class:`heuristic.points.Point`.
+
+    It evaluates the point's arrays and sends those that its words may read. So it cannot be traced
+    in a loop, and has no derivatives.
+    """
+
+    def __init__(self, file: str, text: str) -> None:
+        self.file, self.text = file, text
+        self.words = shader_text.words(text)
+        self.line = shader_text.line_of_shade(text)
+        self.__qualname__ = f"{file}, line {self.line}"  # what messages call it by
+        self._programs: dict[int, tuple[gpu.Device, Any]] = {}
+
+    def __call__(self, point: Point) -> Any:
+        """Return the colours (3, points) as a Dr.Jit colour; see the module for what is raised."""
+        if dr.flag(dr.JitFlag.SymbolicScope):
+            raise InputError(
+                f"{self.file}: a shader in GLSL cannot be recorded by Dr.Jit, and is asked for in a"
+                " symbolic loop. Evaluate that loop, or write the heuristic in Python."
+            )
+        floats = self._floats(point)
+        count = max(map(len, floats))
+        program, device = self._program(max(len(point.lights), 1))
+        colours = np.empty((count, 3), np.float32)
+        step = max(min(POINTS, FLOATS // len(floats)), 1)
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count))
+            chunk = [each if len(each) == 1 else each[part] for each in floats]
+            colours[part] = _run(device.context, program, chunk, part.stop - start)
+        return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
+
+    def compile(self, lights: int = 2) -> None:
+        """Compile it for a number of lights; raise InputError with the lines that are wrong."""
+        self._program(lights)
+
+    def _program(self, lights: int) -> tuple[Any, gpu.Device]:
+        device = gpu.device()
+        known, made = self._programs.get(lights, (None, None))
+        if known is device:
+            return made, device
+        if lights > LIGHTS:
+            raise InputError(
+                f"{self.file}: the scene has {lights} lights, and a shader in GLSL gets {LIGHTS} at"
+                " most. Write it in Python, or take lights out of the scene."
+            )
+        import moderngl
+
+        try:
+            made = device.context.compute_shader(shader_text.program(self.text, lights))
+        except moderngl.Error as error:
+            told = shader_text.explained(str(error), self.file)
+            raise InputError(f"{told}. {self.file} does not compile as GLSL 4.30.") from error
+        self._programs[lights] = device, made
+        return made, device
+
+    def _floats(self, point: Point) -> list[np.ndarray]:
+        """Return the arrays of a point, float by float; of length 1 where all points agree."""
+        lights = point.lights
+        wanted = [
+            self._value(point, lights, each) for each in shader_text.values(max(len(lights), 1))
+        ]
+        dr.eval([each for each in wanted if each is not None])
+        floats = []
+        for value, one in zip(shader_text.values(max(len(lights), 1)), wanted, strict=True):
+            floats += _columns(one, value.size)
+        # One that all points agree on still has as many points as there are positions.
+        count = dr.width(point.given.position)
+        if max(map(len, floats)) < count:
+            floats[0] = np.broadcast_to(floats[0], count)
+        return floats
+
+    def _value(
+        self, point: Point, lights: tuple[LightAtPoint, ...], value: shader_text.Value
+    ) -> Any:
+        """Return a field of the record as Dr.Jit has it; None for what the shader does not read."""
+        owner, _, field = value.name.rpartition(".")
+        if field not in self.words:
+            return None
+        if not owner:
+            return getattr(point, field)
+        if owner == "material":
+            return getattr(point.material, field)
+        number = int(owner[len("lights[") : -1])
+        if number >= len(lights):
+            return None  # a scene without lights has one that is dark
+        found = getattr(lights[number], field)
+        return dr.select(found(), mi.Float(1), 0) if field == "visible" else found
+
+
+def _content(path: Path) -> bytes:
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such file. Give a GLSL file with a function `{SIGNATURE}`."
+        )
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise InputError(f"{path}: {size} bytes are too many for a shader: {LARGEST} are allowed.")
+    return path.read_bytes()
+
+
+def _read(word: str, content: bytes, code: str) -> Heuristic:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{word}: this is not text in UTF-8: {error}.") from error
+    if shader_text.line_of_shade(text) is None:
+        raise InputError(
+            f"{word}: there is no function `{SIGNATURE}`. A heuristic in GLSL is that function,"
+            " which returns a display-linear colour."
+        )
+    if mi.variant() is None:
+        mi.set_variant(trial.DEFAULT_VARIANT)
+    if not mi.is_rgb:
+        raise InputError(
+            f"{word}: a shader in GLSL has RGB colours, and {mi.variant()} has others. Give"
+            " --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb for its half alone."
+        )
+    shader = Shader(word, text)
+    shader.compile()
+    needs = frozenset(name for name in INPUTS if name in shader.words)
+    found = Heuristic(
+        word, shader, Path(word).stem, needs, code=code, traced=False, remarks=_remarks(word)
+    )
+    return replace(found, reads=trial.examine(found))
+
+
+def _remarks(word: str) -> tuple[str, ...]:
+    device = gpu.device()
+    if not device.is_software:
+        return ()
+    return (
+        f"{word} ran on {device.renderer}, a software GPU: its times are not those of a graphics"
+        " card.",
+    )
+
+
+def _columns(value: Any, size: int) -> list[np.ndarray]:
+    """Return a value as arrays of floats, one a component; zeros for None."""
+    if value is None:
+        return [np.zeros(1, np.float32)] * size
+    value = dr.detach(value)
+    is_vector = dr.is_array_v(value) and dr.depth_v(value) == 2
+    parts = list(value) if is_vector else [value] * size
+    return [np.array(part, np.float32).reshape(-1) for part in parts]
+
+
+def _run(context: Any, program: Any, floats: list[np.ndarray], count: int) -> np.ndarray:
+    """Return the colours (points, 3) of a chunk of points."""
+    lengths = np.array([len(each) for each in floats])
+    offsets = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    places = np.stack([offsets, lengths > 1], axis=1).astype(np.int32)
+    sent = [np.concatenate(floats), places]
+    buffers = [context.buffer(np.ascontiguousarray(each).tobytes()) for each in sent]
+    buffers.append(context.buffer(reserve=12 * count))
+    try:
+        for number, buffer in enumerate(buffers):
+            buffer.bind_to_storage_buffer(number)
+        program["fotismos_count"] = count
+        program.run(group_x=-(-count // shader_text.GROUP))
+        context.memory_barrier()
+        return np.frombuffer(buffers[-1].read(), np.float32).reshape(count, 3)
+    finally:
+        for buffer in buffers:
+            buffer.release()

@@ -1,0 +1,123 @@
+"""The text of a compute shader around a user's function, and the compiler's messages about it."""
+
+import re
+from dataclasses import dataclass
+
+GROUP = 64
+"""Points that one work group shades."""
+
+POINT = {"position": 3, "normal": 3, "view": 3, "uv": 2, "ambient": 3}
+MATERIAL = {
+    "k_i": 3, "k_a": 3, "k_d": 3, "k_s": 3, "n": 1, "base_color": 3,
+    "alpha": 1, "ior": 1, "metallic": 1,
+}  # fmt: skip
+LIGHT = {"toward": 3, "distance": 1, "intensity": 3, "visible": 1}
+"""Fields of the structures, and how many floats each is."""
+
+_TYPES = {1: "float", 2: "vec2", 3: "vec3"}
+_USERS, _OURS = 1, 2
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
+_PLACE = re.compile(r"(?<![\w.])(\d+)(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A field of the record that a shader reads, such as ``lights[0].toward``, and its floats."""
+
+    name: str
+    size: int
+
+
+def bare(text: str) -> str:
+    """Return GLSL without its comments, line by line as it was."""
+    return _COMMENT.sub(lambda found: "\n" * found[0].count("\n") or " ", text)
+
+
+def line_of_shade(text: str) -> int | None:
+    """Return the line on which ``vec3 shade(Point point)`` begins, None where it is missing."""
+    code = bare(text)
+    found = _SHADE.search(code)
+    return code.count("\n", 0, found.start()) + 1 if found else None
+
+
+def words(text: str) -> frozenset[str]:
+    """Return the words of the code: what is not among them is not read."""
+    return frozenset(re.findall(r"\b[A-Za-z_]\w*", bare(text)))
+
+
+def values(lights: int) -> tuple[Value, ...]:
+    """Return the fields of a point under some lights, in the order in which they are handed over."""
+    found = [Value(name, size) for name, size in POINT.items()]
+    found += [Value(f"material.{name}", size) for name, size in MATERIAL.items()]
+    for number in range(lights):
+        found += [Value(f"lights[{number}].{name}", size) for name, size in LIGHT.items()]
+    return tuple(found)
+
+
+def program(text: str, lights: int) -> str:
+    """Return the compute shader that calls a user's ``shade`` for all points.
+
+    Each float has a place ``(offset, stride)`` in one buffer: the stride is 0 where all points have
+    the same value, else 1.
+    """
+    version = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
+    return f"""#version 430
+layout(local_size_x = {GROUP}) in;
+layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values[]; }};
+layout(std430, binding = 1) readonly buffer fotismos_At {{ ivec2 fotismos_places[]; }};
+layout(std430, binding = 2) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
+uniform int fotismos_count;
+{_structure("Material", MATERIAL)}
+{_structure("Light", LIGHT).replace("float visible", "bool visible")}
+{_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
+#line 1 {_USERS}
+{version}
+#line 1 {_OURS}
+float fotismos_read(int number, int point) {{
+    ivec2 place = fotismos_places[number];
+    return fotismos_values[place.x + place.y * point];
+}}
+void main() {{
+    int index = int(gl_GlobalInvocationID.x);
+    if (index >= fotismos_count) return;
+    Point point;
+{_readings(lights)}
+    vec3 colour = shade(point);
+    for (int part = 0; part < 3; ++part) fotismos_colours[3 * index + part] = colour[part];
+}}
+"""
+
+
+def explained(log: str, file: str) -> str:
+    """Return the compiler's first messages, with places of a user's as ``FILE, line N``.
+
+    Compilers write a place as ``1:3(7)``, ``1(3)`` or ``1:3``: source, line, column.
+    """
+    lines = [line.strip() for line in log.splitlines()]
+    told = [_placed(line, file) for line in lines if _PLACE.search(line)]
+    return "; ".join(told[:3]) or " ".join(filter(None, lines))
+
+
+def _placed(line: str, file: str) -> str:
+    found = _PLACE.search(line)
+    number = next(part for part in found.groups()[1:] if part)
+    message = line[found.end() :].strip()
+    return f"{file}, line {number}: {message}" if int(found[1]) == _USERS else message
+
+
+def _structure(name: str, fields: dict[str, int], more: str = "") -> str:
+    declared = " ".join(f"{_TYPES[size]} {field};" for field, size in fields.items())
+    return f"struct {name} {{ {declared} {more} }};"
+
+
+def _readings(lights: int) -> str:
+    """Return the statements that fill a point."""
+    lines, number = [], 0
+    for value in values(lights):
+        parts = [f"fotismos_read({number + part}, index)" for part in range(value.size)]
+        whole = f"{_TYPES[value.size]}({', '.join(parts)})"
+        is_mask = value.name.endswith(".visible")
+        lines.append(f"    point.{value.name} = {whole}{' > 0.5' if is_mask else ''};")
+        number += value.size
+    return "\n".join(lines)
