@@ -236,9 +236,9 @@ def named(name: str) -> Heuristic:
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
-            " give a file with a function `shade(point)`, as FILE.py, FILE.py:FUNCTION or FILE.glsl. A"
-            f" package declares its own by an entry point of the group {GROUP}, a program by"
-            " heuristic.heuristics.declare."
+            " give a file with a function `shade(point)`, as FILE.py, FILE.py:FUNCTION or"
+            " FILE.glsl. A package declares its own by an entry point of the group"
+            f" {GROUP}, a program by heuristic.heuristics.declare."
         )
     return HEURISTICS[name]
 

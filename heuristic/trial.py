@@ -179,14 +179,15 @@ def _require(
     raise InputError(
         f"{defined(heuristic.shade)}: heuristic {heuristic.name} returned ({shown}) on trial, and"
         f" wrong values at {wrong.size} of {POINTS} points; expected are components that are"
-        f" {expected}. One of the points: {described(wrong[0])}. {_CURES[expected]}"
+        f" {expected}. One of the points: {described(wrong[0])}. {_cure(heuristic, expected)}"
     )
 
 
-_CURES = {
-    "finite": "Keep divisors, roots and logarithms above 0, as by drjit.maximum(x, 1e-6).",
-    "0 or more": "Clamp what can be negative, such as a cosine: drjit.maximum(cosine, 0).",
-}
+def _cure(heuristic: "Heuristic", expected: str) -> str:
+    maximum = "max" if heuristic.name.endswith(".glsl") else "drjit.maximum"
+    if expected == "finite":
+        return f"Keep divisors, roots and logarithms above 0, as by {maximum}(x, 1e-6)."
+    return f"Clamp what can be negative, such as a cosine: {maximum}(cosine, 0)."
 
 
 def _require_colour(heuristic: "Heuristic", value: Any, point: Point) -> None:

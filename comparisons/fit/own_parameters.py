@@ -152,8 +152,13 @@ def attempt(ready, heuristic: Heuristic, rendered, loss, options) -> OwnAttempt:
     Raises
     ------
     InputError
-        When it declares none.
+        When it declares none, or has no derivatives.
     """
+    if not heuristic.traced:
+        raise InputError(
+            f"heuristic {heuristic.name} has no derivatives, which a fit needs. Write it in Python:"
+            " a function `shade(point, gloss: Range(0, 1) = 0.5)` has parameters to fit."
+        )
     if not heuristic.parameters:
         raise InputError(
             f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds, as"

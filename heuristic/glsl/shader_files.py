@@ -29,7 +29,7 @@ FLOATS = 1 << 24
 POINTS = 1 << 20
 """Points shaded at once at most; OpenGL allows 65,535 work groups."""
 
-_opened: dict[tuple[str, Path, str], Heuristic] = {}
+_opened: dict[tuple[str, Path], Heuristic] = {}
 
 
 def opened(word: str) -> Heuristic:
@@ -45,7 +45,7 @@ def opened(word: str) -> Heuristic:
     path = Path(word)
     content = _content(path)
     code = sha256(content).hexdigest()
-    key = word, path.resolve(), mi.variant()
+    key = word, path.resolve()
     if key not in _opened or _opened[key].code != code:
         _opened[key] = _read(word, content, code)
     return _opened[key]
@@ -72,9 +72,15 @@ class Shader:
                 f"{self.file}: a shader in GLSL cannot be recorded by Dr.Jit, and is asked for in a"
                 " symbolic loop. Evaluate that loop, or write the heuristic in Python."
             )
-        floats = self._floats(point)
-        count = max(map(len, floats))
-        program, device = self._program(max(len(point.lights), 1))
+        if not mi.is_rgb:
+            raise InputError(
+                f"{self.file}: a shader in GLSL has RGB colours, and {mi.variant()} has others."
+                " Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb for its half."
+            )
+        lights = point.lights if "lights" in self.words else ()
+        floats = self._floats(point, lights)
+        count = dr.width(point.given.position)
+        program, device = self._program(max(len(lights), 1))
         colours = np.empty((count, 3), np.float32)
         step = max(min(POINTS, FLOATS // len(floats)), 1)
         for start in range(0, count, step):
@@ -102,26 +108,18 @@ class Shader:
         try:
             made = device.context.compute_shader(shader_text.program(self.text, lights))
         except moderngl.Error as error:
-            told = shader_text.explained(str(error), self.file)
-            raise InputError(f"{told}. {self.file} does not compile as GLSL 4.30.") from error
+            told = shader_text.explained(str(error), self.file, self.text)
+            raise InputError(f"{told}. It does not compile as GLSL 4.30.") from error
         self._programs[lights] = device, made
         return made, device
 
-    def _floats(self, point: Point) -> list[np.ndarray]:
+    def _floats(self, point: Point, lights: tuple[LightAtPoint, ...]) -> list[np.ndarray]:
         """Return the arrays of a point, float by float; of length 1 where all points agree."""
-        lights = point.lights
-        wanted = [
-            self._value(point, lights, each) for each in shader_text.values(max(len(lights), 1))
-        ]
-        dr.eval([each for each in wanted if each is not None])
-        floats = []
-        for value, one in zip(shader_text.values(max(len(lights), 1)), wanted, strict=True):
-            floats += _columns(one, value.size)
-        # One that all points agree on still has as many points as there are positions.
-        count = dr.width(point.given.position)
-        if max(map(len, floats)) < count:
-            floats[0] = np.broadcast_to(floats[0], count)
-        return floats
+        fields = shader_text.values(max(len(lights), 1))
+        found = [self._value(point, lights, each) for each in fields]
+        dr.eval([each for each in found if each is not None])
+        columns = [_columns(one, each.size) for one, each in zip(found, fields, strict=True)]
+        return [column for several in columns for column in several]
 
     def _value(
         self, point: Point, lights: tuple[LightAtPoint, ...], value: shader_text.Value
@@ -162,20 +160,16 @@ def _read(word: str, content: bytes, code: str) -> Heuristic:
             f"{word}: there is no function `{SIGNATURE}`. A heuristic in GLSL is that function,"
             " which returns a display-linear colour."
         )
-    if mi.variant() is None:
-        mi.set_variant(trial.DEFAULT_VARIANT)
-    if not mi.is_rgb:
-        raise InputError(
-            f"{word}: a shader in GLSL has RGB colours, and {mi.variant()} has others. Give"
-            " --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb for its half alone."
-        )
+    if refused := shader_text.refusal(text):
+        raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
     shader = Shader(word, text)
     shader.compile()
     needs = frozenset(name for name in INPUTS if name in shader.words)
     found = Heuristic(
         word, shader, Path(word).stem, needs, code=code, traced=False, remarks=_remarks(word)
     )
-    return replace(found, reads=trial.examine(found))
+    with mi.scoped_set_variant(trial.DEFAULT_VARIANT):
+        return replace(found, reads=trial.examine(found))
 
 
 def _remarks(word: str) -> tuple[str, ...]:
@@ -212,7 +206,10 @@ def _run(context: Any, program: Any, floats: list[np.ndarray], count: int) -> np
         program["fotismos_count"] = count
         program.run(group_x=-(-count // shader_text.GROUP))
         context.memory_barrier()
-        return np.frombuffer(buffers[-1].read(), np.float32).reshape(count, 3)
+        colours = np.frombuffer(buffers[-1].read(), np.float32).reshape(count, 3)
+        if (said := context.error) != "GL_NO_ERROR":
+            raise InputError(f"the shader failed on the graphics card: {said}. Does it end?")
+        return colours
     finally:
         for buffer in buffers:
             buffer.release()

@@ -15,10 +15,22 @@ LIGHT = {"toward": 3, "distance": 1, "intensity": 3, "visible": 1}
 """Fields of the structures, and how many floats each is."""
 
 _TYPES = {1: "float", 2: "vec2", 3: "vec3"}
-_USERS, _OURS = 1, 2
+_OURS = 1_000_001
+"""Lines of our own after the user's have numbers from here on, by which messages tell them apart.
+
+Mesa 22 has the number of the source string right in some of its messages alone.
+"""
+
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
-_PLACE = re.compile(r"(?<![\w.])(\d+)(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+_PLACE = re.compile(r"(?<![\w.])\d+(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+_REFUSED = {
+    re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader here is one file: put what is included in"
+    " its place",
+    re.compile(r"\bvoid\s+main\s*\("): "`main` is not the shader's: leave it out, and fotismos"
+    " calls `shade` for each point",
+    re.compile(r"\b\w*fotismos_\w*"): "names with `fotismos_` are taken: choose another one",
+}
 
 
 @dataclass(frozen=True)
@@ -48,11 +60,11 @@ def words(text: str) -> frozenset[str]:
 
 def values(lights: int) -> tuple[Value, ...]:
     """Return the fields of a point under some lights, in the order in which they are handed over."""
-    found = [Value(name, size) for name, size in POINT.items()]
-    found += [Value(f"material.{name}", size) for name, size in MATERIAL.items()]
-    for number in range(lights):
-        found += [Value(f"lights[{number}].{name}", size) for name, size in LIGHT.items()]
-    return tuple(found)
+    owners = [("", POINT), ("material.", MATERIAL)]
+    owners += [(f"lights[{number}].", LIGHT) for number in range(lights)]
+    return tuple(
+        Value(owner + name, size) for owner, fields in owners for name, size in fields.items()
+    )
 
 
 def program(text: str, lights: int) -> str:
@@ -61,7 +73,7 @@ def program(text: str, lights: int) -> str:
     Each float has a place ``(offset, stride)`` in one buffer: the stride is 0 where all points have
     the same value, else 1.
     """
-    version = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
+    whole = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
     return f"""#version 430
 layout(local_size_x = {GROUP}) in;
 layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values[]; }};
@@ -71,9 +83,10 @@ uniform int fotismos_count;
 {_structure("Material", MATERIAL)}
 {_structure("Light", LIGHT).replace("float visible", "bool visible")}
 {_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
-#line 1 {_USERS}
-{version}
-#line 1 {_OURS}
+#line 1
+{whole}
+
+#line {_OURS}
 float fotismos_read(int number, int point) {{
     ivec2 place = fotismos_places[number];
     return fotismos_values[place.x + place.y * point];
@@ -89,21 +102,32 @@ void main() {{
 """
 
 
-def explained(log: str, file: str) -> str:
-    """Return the compiler's first messages, with places of a user's as ``FILE, line N``.
+def refusal(text: str) -> tuple[int, str] | None:
+    """Return the line of what no shader here may have, and what to do; None where all is well."""
+    code = bare(text)
+    for pattern, advice in _REFUSED.items():
+        if found := pattern.search(code):
+            return code.count("\n", 0, found.start()) + 1, advice
+    return None
 
-    Compilers write a place as ``1:3(7)``, ``1(3)`` or ``1:3``: source, line, column.
+
+def explained(log: str, file: str, text: str) -> str:
+    """Return the compiler's first errors, with places in a user's text as ``FILE, line N``.
+
+    Compilers write a place as ``0:3(7)``, ``0(3)`` or ``0:3``: source, line, column.
     """
-    lines = [line.strip() for line in log.splitlines()]
-    told = [_placed(line, file) for line in lines if _PLACE.search(line)]
-    return "; ".join(told[:3]) or " ".join(filter(None, lines))
+    lines = [line.strip() for line in log.splitlines() if "error" in line.lower()]
+    told = [_placed(line, file, text.count("\n") + 1) for line in lines]
+    return "; ".join(told[:3]) or f"{file}: {' '.join(log.split())}"
 
 
-def _placed(line: str, file: str) -> str:
+def _placed(line: str, file: str, length: int) -> str:
     found = _PLACE.search(line)
-    number = next(part for part in found.groups()[1:] if part)
-    message = line[found.end() :].strip()
-    return f"{file}, line {number}: {message}" if int(found[1]) == _USERS else message
+    message = re.sub(r"(?i)^error:\s*", "", line[found.end() :] if found else line).strip()
+    number = int(next(filter(None, found.groups()))) if found else 0
+    if number > length:
+        return f"{file}, at its end: {message}"
+    return f"{file}, line {number}: {message}" if number else f"{file}: {message}"
 
 
 def _structure(name: str, fields: dict[str, int], more: str = "") -> str:

@@ -177,7 +177,7 @@ def _paired(
         bsdfs=records,
         emitters=tuple(emitters),
         misses=tuple(miss for record in records for miss in record.misses),
-        warnings=tuple(_energy_warnings(half)),
+        warnings=(*_energy_warnings(half), *model.remarks),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
         media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
