@@ -47,7 +47,7 @@ def opened(word: str) -> Heuristic:
     code = sha256(content).hexdigest()
     key = word, path.resolve()
     if key not in _opened or _opened[key].code != code:
-        _opened[key] = _read(word, content, code)
+        _opened[key] = replace(tried(word, _text(word, content)), code=code)
     return _opened[key]
 
 
@@ -150,11 +150,8 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _read(word: str, content: bytes, code: str) -> Heuristic:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{word}: this is not text in UTF-8: {error}.") from error
+def tried(word: str, text: str) -> Heuristic:
+    """Return the heuristic that a text is, after a trial, or raise as :func:`opened`."""
     if shader_text.line_of_shade(text) is None:
         raise InputError(
             f"{word}: there is no function `{SIGNATURE}`. A heuristic in GLSL is that function,"
@@ -165,11 +162,16 @@ def _read(word: str, content: bytes, code: str) -> Heuristic:
     shader = Shader(word, text)
     shader.compile()
     needs = frozenset(name for name in INPUTS if name in shader.words)
-    found = Heuristic(
-        word, shader, Path(word).stem, needs, code=code, traced=False, remarks=_remarks(word)
-    )
+    found = Heuristic(word, shader, Path(word).stem, needs, traced=False, remarks=_remarks(word))
     with mi.scoped_set_variant(trial.DEFAULT_VARIANT):
         return replace(found, reads=trial.examine(found))
+
+
+def _text(word: str, content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{word}: this is not text in UTF-8: {error}.") from error
 
 
 def _remarks(word: str) -> tuple[str, ...]:

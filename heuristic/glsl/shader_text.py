@@ -59,7 +59,7 @@ def words(text: str) -> frozenset[str]:
 
 
 def values(lights: int) -> tuple[Value, ...]:
-    """Return the fields of a point under some lights, in the order in which they are handed over."""
+    """Return the fields of a point under some lights, in the order of the buffer."""
     owners = [("", POINT), ("material.", MATERIAL)]
     owners += [(f"lights[{number}].", LIGHT) for number in range(lights)]
     return tuple(

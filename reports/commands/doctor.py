@@ -19,7 +19,7 @@ TIMEOUT_S = 300
 
 @click.command()
 def doctor():
-    """Check the installation: versions, LLVM, a rendering in each variant, colour differences.
+    """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
 
     \b
     Examples:
@@ -30,7 +30,7 @@ def doctor():
 
 
 def examine(variants):
-    """Yield lines on versions, LLVM and a test rendering for each variant.
+    """Yield lines on versions, LLVM, a test rendering for each variant, OpenGL and metrics.
 
     Raises
     ------
@@ -51,6 +51,7 @@ def examine(variants):
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
+        yield f"GLSL            {pool.do(Task('GLSL', shaded, ()))}"
         apart = pool.do(Task("colour differences", compared, ()))
         yield f"metrics         at most {apart:.0e} from those of colour-science"
 
@@ -65,6 +66,18 @@ def rendered(variant):
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
+
+
+def shaded():
+    """Compile and run a small shader, and say where; or what is to be installed, which may wait."""
+    from heuristic.glsl import gpu, shader_files
+
+    try:
+        device = gpu.device()
+    except InstallationError as error:
+        return f"cannot be run, which is needed for --heuristic FILE.glsl alone: {error}"
+    shader_files.tried("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
+    return f"runs on {device.renderer}{', a software GPU' if device.is_software else ''}"
 
 
 def compared():
