@@ -1,0 +1,357 @@
+"""Heuristics in GLSL: the same points as in Python, and every mistake in words."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.case import Request, open_case
+from comparisons.compare import compare, prepare
+from heuristic import trial
+from heuristic.errors import InputError, InstallationError
+from heuristic.glsl import gpu, shader_files, shader_text
+from heuristic.heuristics import Heuristic, in_file, named
+from heuristic.points import INPUTS
+from reports.ci.baselines import options_for
+from reports.commands import doctor
+
+SHADERS = Path(__file__).parents[1] / "docs/shaders"
+PHONG = str(SHADERS / "phong.glsl")
+SMALL = {"resolution": (24, 24), "spp": 8}
+
+
+def without_opengl():
+    """Return why no shader can be run here; empty where one can."""
+    try:
+        gpu.device()
+    except InstallationError as error:
+        return str(error)
+    return ""
+
+
+MISSING = without_opengl()
+opengl = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+
+
+def image(scene, name, **more):
+    case = open_case(scene, Request(heuristic=name, **{**SMALL, **more}))
+    return np.array(prepare(case.source, case.options).heuristic.render(3))
+
+
+def points(text, needs=INPUTS):
+    """Return a shader, and the points of a trial."""
+    shader = shader_files.Shader("mine.glsl", text)
+    return shader, trial._points(Heuristic("mine.glsl", shader, needs=frozenset(needs)), {})[0]
+
+
+def returning(expression):
+    return f"vec3 shade(Point point) {{ return vec3({expression}); }}"
+
+
+# --- The same as what is built in ----------------------------------------------------------------
+
+
+@opengl
+@pytest.mark.guarantee(
+    "kernel",
+    "Phong's model, written in GLSL and run by OpenGL, gives the kernel's image to 1e-5.",
+)
+@pytest.mark.parametrize("scene", ["fig-8-9", "fig-8-11-n3", "cornell-box", "plastic-spheres"])
+def test_phong_in_glsl_is_phong(scene):
+    own, theirs = (image(scene, name) for name in ("phong", PHONG))
+    assert own.max() > 0.1
+    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
+
+
+@opengl
+@pytest.mark.parametrize(
+    "more",
+    [{"interpolation": "gouraud"}, {"interpolation": "flat"}, {"everything": True},
+     {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}],
+    ids=str,
+)  # fmt: skip
+def test_phong_in_glsl_is_phong_by_other_ways(more):
+    own, theirs = (image("fig-8-9", name, **more) for name in ("phong", PHONG))
+    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
+
+
+@opengl
+def test_a_wrong_shader_is_told_from_phong(written):
+    text = Path(PHONG).read_text(encoding="utf-8")
+    name = written(text.replace("2.0 * cosine", "2.02 * cosine"), "mine.glsl")
+    assert abs(image("fig-8-9", name) - image("fig-8-9", "phong")).max() > 1e-3
+
+
+def room(lights, **bsdf):
+    """Return a sphere under a bright sky and some lights."""
+    return {
+        "type": "scene",
+        "ball": {"type": "sphere", "bsdf": bsdf or {"type": "diffuse"}},
+        "sky": {"type": "constant", "radiance": 0.4},
+        "sensor": {
+            "type": "perspective",
+            "to_world": mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}},
+        },
+        **{
+            f"light{number}": {
+                "type": "point", "intensity": 3 / lights,
+                "position": [3 * np.cos(number), 3 * np.sin(number), 3],
+            }
+            for number in range(lights)
+        },
+    }  # fmt: skip
+
+
+@opengl
+@pytest.mark.parametrize("lights", [0, 1, shader_files.LIGHTS])
+def test_any_number_of_lights(rgb, lights):
+    own, theirs = (image(room(lights), name) for name in ("phong", PHONG))
+    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
+
+
+@opengl
+def test_more_lights_than_the_record_holds_are_refused(rgb):
+    with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights, .* 64 at most"):
+        image(room(shader_files.LIGHTS + 1), PHONG)
+
+
+@opengl
+def test_layers_that_let_light_through(rgb):
+    """Their loop is symbolic for what Dr.Jit can record."""
+    clear = {"type": "mask", "opacity": 0.5, "bsdf": {"type": "twosided", "b": {"type": "diffuse"}}}
+    own, theirs, opaque = (
+        image(room(2, **bsdf), name)
+        for bsdf, name in ((clear, "phong"), (clear, PHONG), (clear["bsdf"], PHONG))
+    )
+    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
+    assert abs(opaque - theirs).max() > 0.02
+
+
+@opengl
+def test_shadows_are_those_of_a_heuristic_in_python(rgb, written):
+    written(
+        "import drjit as dr\n"
+        "def shade(point):\n"
+        "    return sum(dr.select(l.visible(), l.intensity, 0) for l in point.lights)\n",
+    )
+    text = """vec3 shade(Point point) {
+        vec3 sum = vec3(0.0);
+        for (int i = 0; i < point.lights.length(); ++i)
+            sum += point.lights[i].visible ? point.lights[i].intensity : vec3(0.0);
+        return sum;
+    }"""
+    written(text, "mine.glsl")
+    written(text.replace("point.lights[i].visible", "true"), "bright.glsl")
+    python, glsl, bright = (
+        image("cornell-box", name) for name in ("mine.py", "mine.glsl", "bright.glsl")
+    )
+    np.testing.assert_allclose(glsl, python, rtol=1e-5, atol=1e-5)
+    assert abs(bright - glsl).max() > 0.01
+
+
+# --- What a shader is given ----------------------------------------------------------------------
+
+
+def shown(colour):
+    """Return a Dr.Jit colour as an array (3, points of the trial)."""
+    return np.broadcast_to(np.array(colour, float).reshape(3, -1), (3, trial.POINTS))
+
+
+FIELDS = (
+    [(name, name) for name in ("position", "normal", "view", "ambient")]
+    + [(f"material.{name}", f"material.{name}") for name in shader_text.MATERIAL]
+    + [
+        (f"lights[{number}].{name}", f"lights[{number}].{name}")
+        for number in (0, 1)
+        for name in ("toward", "intensity")
+    ]
+    + [("lights[0].distance", "lights[0].distance"), ("uv, 0.25", "uv")]
+)
+
+
+@opengl
+@pytest.mark.parametrize(("glsl", "field"), FIELDS, ids=[field for _, field in FIELDS])
+def test_each_field_arrives_as_it_is(rgb, glsl, field):
+    shader, point = points(returning(f"point.{glsl}"))
+    expected = eval(f"point.{field}", {"point": point})
+    if field == "uv":
+        expected = mi.Spectrum(expected.x, expected.y, 0.25)
+    np.testing.assert_array_equal(shown(shader(point)), shown(mi.Spectrum(expected)))
+
+
+@opengl
+def test_parallel_light_is_infinitely_far(rgb):
+    shader, point = points(returning("isinf(point.lights[1].distance) ? 1.0 : 0.0"))
+    assert np.all(shown(shader(point)) == 1)
+
+
+@opengl
+def test_points_are_shaded_in_portions(rgb, monkeypatch):
+    shader, point = points(returning("point.position * point.material.n"))
+    whole = shown(shader(point))
+    monkeypatch.setattr(shader_files, "POINTS", 100)
+    np.testing.assert_array_equal(shown(shader(point)), whole)
+    assert len(np.unique(whole)) > trial.POINTS
+
+
+@opengl
+def test_only_what_is_read_is_needed(written):
+    found = named(written(
+        "// not ambient\nvec3 shade(Point point) { /* uv\n */ return point.material.k_d; }",
+        "mine.glsl",
+    ))  # fmt: skip
+    assert found.needs == {"material"}
+    assert found.reads == ("material", "material.k_d")
+
+
+@opengl
+def test_a_changed_file_is_read_again(written):
+    name = written(returning("0.25"), "mine.glsl")
+    first = named(name)
+    assert named(name) is first
+    written(returning("0.5"), "mine.glsl")
+    assert named(name).code != first.code
+    assert image("fig-8-9", name).max() == pytest.approx(0.5)
+
+
+def test_a_path_stays_with_its_baseline(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert in_file("shaders/mine.glsl") == ("shaders/mine.glsl", "")
+    placed = options_for({"heuristic": "shaders/mine.glsl"}, tmp_path / "baselines/one.json")
+    assert placed == {"heuristic": "../shaders/mine.glsl"}
+
+
+# --- Mistakes ------------------------------------------------------------------------------------
+
+MISTAKES = {
+    "syntax": (
+        "vec3 shade(Point point) {\n    vec3 value = vec3(0)\n    return value;\n}",
+        r"mine\.glsl, line 3: .*[Ss]yntax error",
+    ),
+    "field": (
+        "// a comment\nvec3 shade(Point point) {\n\n    return point.normle;\n}",
+        r"mine\.glsl, line 4: .*normle",
+    ),
+    "after a version": ("#version 330\n" + returning("oops"), r"mine\.glsl, line 2: .*oops"),
+    "no shade": ("vec3 colour(Point point) { return vec3(1); }", "no function `vec3 shade"),
+    "shade in a comment": ("// " + returning("1"), "no function `vec3 shade"),
+    "empty": ("", "no function `vec3 shade"),
+    "a declaration alone": ("vec3 shade(Point point);", r"mine\.glsl: .*shade"),
+    "open brace": ("vec3 shade(Point point) { return vec3(1);", r"mine\.glsl, at its end: "),
+    "open comment": ("vec3 shade(Point point) { /* ", r"mine\.glsl, at its end: "),
+    "a closed brace too many": ("\n} " + returning("1"), r"mine\.glsl, line 2: "),
+    "an error of its own": ("#error stop\n" + returning("1"), r"mine\.glsl, line 1: .*stop"),
+    "recursion": (
+        "vec3 f(vec3 a) { return f(a); }\nvec3 shade(Point point) { return f(point.normal); }",
+        r"mine\.glsl: .*recursion",
+    ),
+    "include": ('\n#include "x"\n' + returning("1"), r"mine\.glsl, line 2: .* one file"),
+    "main": (returning("1") + "\nvoid main() {}", r"mine\.glsl, line 2: `main` is not"),
+    "our names": (returning("fotismos_count"), r"mine\.glsl, line 1: .*are taken"),
+    "not a number": (returning("sqrt(-1.0 - point.uv.x)"), r"line 1: .* finite.* max\(x, 1e-6\)"),
+    "infinite": (returning("1.0 / (point.uv.x * 0.0)"), "line 1: .* finite"),
+    "negative": ("\n" + returning("point.normal"), r"line 2: .* 0 or more.* max\(cosine, 0\)"),
+}
+
+
+@opengl
+@pytest.mark.parametrize(("text", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_told_by_its_line(written, text, message):
+    with pytest.raises(InputError, match=rf"(?s){message}"):
+        named(written(text, "mine.glsl"))
+
+
+def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"gone\.glsl: there is no such file"):
+        named("gone.glsl")
+    Path("noise.glsl").write_bytes(b"\xff\xfe\x00vec3")
+    with pytest.raises(InputError, match=r"noise\.glsl: this is not text in UTF-8"):
+        named("noise.glsl")
+    Path("long.glsl").write_bytes(b" " * (shader_files.LARGEST + 1))
+    with pytest.raises(InputError, match=r"long\.glsl: 1048577 bytes are too many"):
+        named("long.glsl")
+
+
+@opengl
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"])
+def test_other_colours_than_rgb_are_refused(variant):
+    with pytest.raises(InputError, match=rf"has RGB colours, and {variant} has others"):
+        image("fig-8-9", PHONG, variant=variant)
+
+
+@opengl
+def test_a_symbolic_loop_is_refused(rgb):
+    shader, point = points(returning("point.normal + 1.0"))
+    with pytest.raises(RuntimeError) as caught:
+        dr.while_loop((mi.UInt32([0, 1]), mi.Spectrum(0)), lambda i, _: i < 2,
+                      lambda i, _: (i + 1, shader(point)), mode="symbolic")  # fmt: skip
+    assert "cannot be recorded by Dr.Jit" in str(caught.value.__cause__)
+
+
+LOGS = {
+    "Mesa": "compute_shader\n====\n0:2(9): error: oops\n0:9(1): error: end\n",
+    "NVIDIA": "0(2) : error C1503: oops\n0(9) : error C0000: end\n",
+    "AMD and Intel": "ERROR: 0:2: oops\nERROR: 0:9: end\nERROR: 2 compilation errors\n",
+}
+
+
+@pytest.mark.parametrize("log", LOGS.values(), ids=LOGS)
+def test_places_of_several_compilers_are_read(log):
+    told = shader_text.explained(log, "a.glsl", "one\ntwo")
+    assert "a.glsl, line 2: " in told
+    assert "oops" in told
+    assert "a.glsl, at its end: " in told
+
+
+def test_a_warning_is_no_error():
+    log = "0:1(2): warning: unused\n0:2(9): error: oops\n"
+    assert shader_text.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: oops"
+
+
+# --- Where it runs -------------------------------------------------------------------------------
+
+
+@opengl
+def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
+    device = gpu.device()
+    name = written(returning("0.5"), "mine.glsl")
+    for renderer, is_software in (("llvmpipe (LLVM 15)", True), ("NVIDIA L4", False)):
+        monkeypatch.setattr(
+            gpu._kept, "device", (gpu.os.getpid(), replace(device, renderer=renderer))
+        )
+        monkeypatch.setattr(shader_files, "_opened", {})
+        case = open_case("fig-8-9", Request(heuristic=name, **SMALL))
+        warnings = compare(case.source, case.options).record.warnings
+        assert ("a software GPU" in json.dumps(warnings)) == is_software
+
+
+def test_without_moderngl_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "moderngl", None)
+    monkeypatch.setattr(gpu, "_kept", gpu.threading.local())
+    with pytest.raises(InstallationError, match=r"pip install 'fotismos\[glsl\]'"):
+        gpu.device()
+    assert "pip install" in doctor.shaded()
+
+
+def test_without_a_driver_it_says_what_to_install(monkeypatch):
+    moderngl = pytest.importorskip("moderngl")
+
+    def fail(**_):
+        raise OSError("libEGL.so is not there")
+
+    monkeypatch.setattr(moderngl, "create_context", fail)
+    monkeypatch.setattr(gpu, "_kept", gpu.threading.local())
+    with pytest.raises(InstallationError, match="apt-get install libegl1 libgl1-mesa-dri"):
+        gpu.device()
+
+
+@opengl
+def test_the_doctor_names_the_renderer():
+    assert doctor.shaded().startswith(f"runs on {gpu.device().renderer}")
