@@ -37,8 +37,9 @@ class Request:
     Parameters
     ----------
     heuristic
-        A name, ``FILE.py:function``, a function of a point, or a :class:`heuristic.Heuristic`; the
-        latter two are declared in this process, and their name is kept.
+        A name, ``FILE.py:function``, ``FILE.glsl``, a function of a point, or a
+        :class:`heuristic.Heuristic`; the latter two are declared in this process, and their name is
+        kept.
     define
         Values for the placeholders of a scene file, by name.
     """

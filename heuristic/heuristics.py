@@ -2,10 +2,10 @@
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
 ``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A user's own is a function in a
-file (:mod:`heuristic.shading_files`); a program declares its own with :func:`declare`, a package by
-an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud
-shading are not heuristics: they interpolate whatever heuristic there is
-(:mod:`heuristic.interpolation`).
+file (:mod:`heuristic.shading_files`, :mod:`heuristic.glsl`); a program declares its own with
+:func:`declare`, a package by an entry point of the group :data:`GROUP` whose object is a
+:class:`Heuristic`. Flat and Gouraud shading are not heuristics: they interpolate whatever heuristic
+there is (:mod:`heuristic.interpolation`).
 """
 
 import re
@@ -87,7 +87,7 @@ class Heuristic:
     ----------
     name
         In commands, records and messages: lower case, digits and hyphens; or ``FILE.py:function``
-        of one in a file.
+        or ``FILE.glsl`` of one in a file.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for

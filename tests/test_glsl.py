@@ -328,6 +328,7 @@ def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
         )
         monkeypatch.setattr(shader_files, "_opened", {})
         case = open_case("fig-8-9", Request(heuristic=name, **SMALL))
+        assert ("software GPU" in named(name).label) == is_software
         warnings = compare(case.source, case.options).record.warnings
         assert ("a software GPU" in json.dumps(warnings)) == is_software
 

@@ -9,7 +9,7 @@
     scene = "lobe"                 # a study scene, a built-in scene, or a Mitsuba file
     design = "grid"                # or "random", or "sobol", with points = 256
     pairing = "matched"            # or "literal"
-    heuristic = "phong"            # or another by name, or "FILE.py:function"
+    heuristic = "phong"            # or another, "FILE.py:function" or "FILE.glsl"
 
     [part.parameters]
     alpha = { from = 0.05, to = 0.8, steps = 16, scale = "log" }
@@ -210,7 +210,9 @@ def _flat(given):
 
 def _check_heuristic(name, scene, where):
     if not isinstance(name, str):
-        raise InputError(f"{where}: heuristic = {name!r}: give a name, or FILE.py:FUNCTION.")
+        raise InputError(
+            f"{where}: heuristic = {name!r}: give a name, FILE.py:FUNCTION or FILE.glsl."
+        )
     if name != heuristics.PHONG.name and scene in SCENES and SCENES[scene].make is None:
         rendered = [each for each, one in SCENES.items() if one.make is not None]
         raise InputError(

@@ -161,8 +161,15 @@ def tried(word: str, text: str) -> Heuristic:
         raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
     shader = Shader(word, text)
     shader.compile()
-    needs = frozenset(name for name in INPUTS if name in shader.words)
-    found = Heuristic(word, shader, Path(word).stem, needs, traced=False, remarks=_remarks(word))
+    label, remarks = _told(word)
+    found = Heuristic(
+        word,
+        shader,
+        label,
+        frozenset(name for name in INPUTS if name in shader.words),
+        traced=False,
+        remarks=remarks,
+    )
     with mi.scoped_set_variant(trial.DEFAULT_VARIANT):
         return replace(found, reads=trial.examine(found))
 
@@ -174,14 +181,13 @@ def _text(word: str, content: bytes) -> str:
         raise InputError(f"{word}: this is not text in UTF-8: {error}.") from error
 
 
-def _remarks(word: str) -> tuple[str, ...]:
-    device = gpu.device()
+def _told(word: str) -> tuple[str, tuple[str, ...]]:
+    """Return the label, and the remarks of records: both say of a software GPU that it is one."""
+    device, label = gpu.device(), Path(word).stem
     if not device.is_software:
-        return ()
-    return (
-        f"{word} ran on {device.renderer}, a software GPU: its times are not those of a graphics"
-        " card.",
-    )
+        return label, ()
+    remark = f"{word} ran on {device.renderer}, a software GPU: its times are not those of a"
+    return f"{label} (software GPU)", (f"{remark} graphics card.",)
 
 
 def _columns(value: Any, size: int) -> list[np.ndarray]:
