@@ -187,7 +187,7 @@ def _told(word: str) -> tuple[str, tuple[str, ...]]:
     if not device.is_software:
         return label, ()
     remark = f"{word} ran on {device.renderer}, a software GPU: its times are not those of a"
-    return f"{label} (software GPU)", (f"{remark} graphics card.",)
+    return f"{label}, software GPU", (f"{remark} graphics card.",)
 
 
 def _columns(value: Any, size: int) -> list[np.ndarray]:
