@@ -12,6 +12,7 @@ import pytest
 
 from comparisons.case import Request, open_case
 from comparisons.compare import compare, prepare
+from comparisons.fit.fit import fit
 from heuristic import trial
 from heuristic.errors import InputError, InstallationError
 from heuristic.glsl import gpu, shader_files, shader_text
@@ -293,6 +294,13 @@ def test_a_symbolic_loop_is_refused(rgb):
         dr.while_loop((mi.UInt32([0, 1]), mi.Spectrum(0)), lambda i, _: i < 2,
                       lambda i, _: (i + 1, shader(point)), mode="symbolic")  # fmt: skip
     assert "cannot be recorded by Dr.Jit" in str(caught.value.__cause__)
+
+
+@opengl
+def test_a_fit_is_refused(rgb):
+    case = open_case("fig-8-9", Request(heuristic=PHONG, **SMALL))
+    with pytest.raises(InputError, match="has no derivatives, which a fit needs"):
+        fit(case.source, case.options)
 
 
 LOGS = {
