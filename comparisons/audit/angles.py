@@ -1,8 +1,8 @@
-"""Checks over directions: the white furnace, energy, reciprocity, and what happens at the horizon.
+"""Checks over directions: white furnace, energy, reciprocity, and what happens at the horizon.
 
-With ``s(l, v) = pi f cos(theta_l)``, what a viewer sees of a light of intensity 1, light of radiance
-1 from all directions shows ``1/pi int s(l, v) dl``, which is 1 for a white surface; and of light
-from ``l`` the share ``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv`` is returned.
+With ``s(l, v) = pi f cos(theta_l)``, what a viewer sees of a light of intensity 1, light of
+radiance 1 from all directions shows ``1/pi int s(l, v) dl``, which is 1 for a white surface; and of
+light from ``l`` the share ``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv`` is returned.
 """
 
 import numpy as np

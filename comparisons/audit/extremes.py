@@ -1,4 +1,4 @@
-"""Check of values: in hard cases, and wherever else a check looked, light is finite and not negative."""
+"""Check of values: in hard cases, and wherever a check looked, finite and not negative."""
 
 from comparisons.audit.angles import checked
 from comparisons.audit.audit_record import Checked
