@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from comparisons import record
 from comparisons.audit import angles, scattering, shaded
-from comparisons.audit.audit_record import Audit, Checked
+from comparisons.audit.audit_record import Audit, Checked, Curve
 from comparisons.audit.extremes import values
 from comparisons.audit.gradients import gradients
 from comparisons.audit.subject import Subject
@@ -35,7 +35,22 @@ def audit(kind: Kind, name: str, given: Mapping[str, Any], command: str = "") ->
     opened = shaded.opened if kind == "heuristic" else scattering.Scattering
     subject = opened(name, given)
     curves = tuple(angles.curve(subject, material) for material in subject.materials)
-    checks = (
+    return Audit(
+        subject=name,
+        kind=kind,
+        parameters=dict(given),
+        variant=mi.variant(),
+        angles=angles.ANGLES,
+        curves=curves,
+        checks=checks_of(subject, curves),
+        command=command,
+        versions=record.versions(),
+    )
+
+
+def checks_of(subject: Subject, curves: tuple[Curve, ...]) -> tuple[Checked, ...]:
+    """Return all checks of a subject, with the curves of its materials."""
+    return (
         angles.white_furnace(curves),
         angles.energy(curves),
         angles.reciprocity(subject),
@@ -44,17 +59,6 @@ def audit(kind: Kind, name: str, given: Mapping[str, Any], command: str = "") ->
         gradients(subject),
         _sampling(subject),
         values(subject),  # the last: it tells what the others met with
-    )
-    return Audit(
-        subject=name,
-        kind=kind,
-        parameters=dict(given),
-        variant=mi.variant(),
-        angles=angles.ANGLES,
-        curves=curves,
-        checks=checks,
-        command=command,
-        versions=record.versions(),
     )
 
 

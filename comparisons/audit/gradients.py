@@ -24,6 +24,13 @@ FAINT = 1e-3
 """Derivatives below this share of the largest are judged by their absolute difference."""
 
 
+NOTHING = 1e-5
+"""A derivative below it everywhere is rounding."""
+
+OPPOSITE = 2.0
+"""The largest relative difference that numbers can have; a derivative that is not finite has it."""
+
+
 def gradients(subject: Subject) -> Checked:
     """Check the derivative by every number that the subject depends on."""
     found = {tuned.name: _disagreement(tuned) for tuned in subject.tuned()}
@@ -41,11 +48,12 @@ def _disagreement(tuned: Tuned) -> float:
     automatic = _automatic(tuned)
     finite = _finite(tuned.shade, tuned.centre, len(automatic))
     size = np.maximum(np.abs(automatic), np.abs(finite))
-    if not (np.isfinite(size).all() and size.max() > 1e-5):
-        return 0.0 if np.isfinite(size).all() else float("inf")
-    return float(
-        np.quantile(np.abs(automatic - finite) / np.maximum(size, FAINT * size.max()), QUANTILE)
-    )
+    if not np.isfinite(size).all():
+        return OPPOSITE
+    if size.max() < NOTHING:
+        return 0.0
+    relative = np.abs(automatic - finite) / np.maximum(size, FAINT * size.max())
+    return float(np.quantile(relative, QUANTILE))
 
 
 def _automatic(tuned: Tuned) -> np.ndarray:

@@ -78,8 +78,8 @@ class Scattering(Subject):
         for key, value in self._differentiable():
             centre = float(np.array(value, float).ravel()[0])
             if centre:
-                # Of what must not exceed 1, less than 1.
-                centre = min(centre, 0.9) if "reflectance" in key else centre
+                # Room for differences: what must not exceed 1 is less.
+                centre = min(max(centre, 0.1), 0.9) if "reflectance" in key else centre
                 yield Tuned(key, centre, partial(self._tuned, key, type(value), light, view))
 
     def sampling(self) -> Checked:
@@ -115,10 +115,10 @@ class Scattering(Subject):
         try:
             return mi.load_dict({"type": self.plugin} | self._parameters() | instead)
         except RuntimeError as error:
-            reason = str(error).strip().splitlines()[-1]
+            reason = " ".join(str(error).split())
             raise InputError(
-                f"BSDF {self.plugin!r} with {self.given}: {reason} Give a type of Mitsuba's, and"
-                " parameters of it as -p name=value."
+                f"BSDF {self.plugin!r} with {self.given} cannot be made: give a type of Mitsuba's, and parameters"
+                f" of it as -p name=value. Mitsuba says: {reason}"
             ) from error
 
     def _keys(self) -> set[str]:
@@ -142,7 +142,9 @@ class Scattering(Subject):
     def _setting(
         self, words: str, change: Mapping[str, Any], light: np.ndarray, view: np.ndarray
     ) -> Setting:
-        return Setting(words, lambda: self._values(self._made(**change), light, view))
+        return Setting(
+            words, lambda: self._values(self._made(**change), light, view), (light, view)
+        )
 
     def _values(self, bsdf: Any, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         return np.array(_evaluated(bsdf, light, view), float).reshape(3, -1)

@@ -94,13 +94,17 @@ class Shaded(Subject):
                 partial(self._array, MIDDLE, near, view),
             )
         edge = _edge()
-        along = np.concatenate([UP, -UP, edge, edge * [[1], [1], [-1]]], axis=1)
-        light, view = (each.reshape(3, -1) for each in _all_pairs(along))
+        views = np.concatenate([UP, edge], axis=1)
+        lights = np.concatenate([views, -views], axis=1)
+        light, view = np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
         yield self._setting("grazing, head on and from behind", light, view)
         nothing = np.zeros((3, 1))
         yield self._setting("a normal of length 0", UP, UP, nothing)
         yield self._setting("a viewer at the point itself", UP, nothing)
-        yield Setting("no light at all", partial(self._array, MIDDLE, None, view))
+        dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
+        yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, views))
+        if self.heuristic.prepare is None:  # what is prepared may be one thing a light
+            yield Setting("no light at all", partial(self._array, MIDDLE, None, views))
 
     def tuned(self) -> Iterator[Tuned]:
         light, view = furnace.random_pairs(512)
@@ -128,7 +132,9 @@ class Shaded(Subject):
         **material: float,
     ) -> Setting:
         sun = DirectionalLight(mi.Vector3f(-light), 1.0)
-        return Setting(words, partial(self._array, material or MIDDLE, sun, view, normal))
+        return Setting(
+            words, partial(self._array, material or MIDDLE, sun, view, normal), (light, view)
+        )
 
     def _array(
         self, material: Mapping[str, Any], light: Any, view: np.ndarray, normal: np.ndarray = UP
@@ -184,11 +190,6 @@ def _edge() -> np.ndarray:
     azimuth = np.deg2rad([0.0, 90.0, 180.0])
     rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
     return np.concatenate(rows, axis=1)
-
-
-def _all_pairs(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    count = directions.shape[1]
-    return np.repeat(directions, count, axis=1), np.tile(directions, count)
 
 
 def _square() -> Any:

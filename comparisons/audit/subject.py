@@ -31,11 +31,28 @@ class Tuned:
     shade: Callable[[Any], Any]
 
 
+@dataclass(frozen=True)
 class Setting:
-    """A hard case: its words, and what gives its values."""
+    """A hard case: its words, what gives its values (C, N), and directions (3, N) where they tell.
 
-    def __init__(self, words: str, values: Callable[[], np.ndarray]) -> None:
-        self.words, self.values = words, values
+    Attributes
+    ----------
+    words, values
+        What is hard, and a function of nothing.
+    pairs
+        Light and view.
+    """
+
+    words: str
+    values: Callable[[], np.ndarray]
+    pairs: tuple[np.ndarray, np.ndarray] | None = None
+
+    def told(self, place: int) -> str:
+        """Return one of the values' cases in words."""
+        if self.pairs is None:
+            return self.words
+        light, view = (each[:, place % each.shape[1]] for each in self.pairs)
+        return f"{self.words}: {told(light, view)}"
 
 
 @dataclass

@@ -33,7 +33,8 @@ def albedo_chart(record: Audit) -> dict[str, Any]:
     colour["sort"] = [curve.material for curve in record.curves]
     dash = {"field": "kind", "type": "nominal", "title": None, "sort": list(KINDS)}
     dash["legend"] = {"labelLimit": 400, "orient": "bottom", "direction": "vertical"}
-    line = {"type": "line", "clip": True, "point": {"size": 20}, "strokeWidth": 2}
+    dash["legend"] |= {"symbolType": "stroke", "symbolSize": 400}
+    line = {"type": "line", "clip": True, "strokeWidth": 2}
     curves = {"mark": line, "encoding": {"x": x, "y": y, "color": colour, "strokeDash": dash}}
     one = {"mark": {"type": "rule", "color": FAINT}, "encoding": {"y": {"datum": 1}}}
     return {
