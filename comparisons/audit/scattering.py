@@ -117,12 +117,12 @@ class Scattering(Subject):
         except RuntimeError as error:
             reason = " ".join(str(error).split())
             raise InputError(
-                f"BSDF {self.plugin!r} with {self.given} cannot be made: give a type of Mitsuba's, and parameters"
-                f" of it as -p name=value. Mitsuba says: {reason}"
+                f"BSDF {self.plugin!r} with {self.given} cannot be made: give a type of"
+                f" Mitsuba's, and parameters of it as -p name=value. Mitsuba says: {reason}"
             ) from error
 
     def _keys(self) -> set[str]:
-        return {key.partition(".")[0] for key in mi.traverse(self.bsdf).keys()}  # noqa: SIM118 no mapping
+        return {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
 
     def _differentiable(self) -> Iterator[tuple[str, Any]]:
         parameters = mi.traverse(self.bsdf)

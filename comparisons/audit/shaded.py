@@ -172,10 +172,13 @@ def opened(name: str, given: Mapping[str, float]) -> Shaded:
 
 
 def _material(values: Mapping[str, Any], form: str) -> PairedMaterial:
-    colours = {name: mi.Spectrum(values.get(name, 0.0)) for name in COLOURS}
-    absent = {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
-    numbers = {name: mi.Float(values.get(name, value)) for name, value in absent.items()}
-    return PairedMaterial(**colours, **numbers, form=form)
+    known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
+    # Opaque, as in a scene: of literals Dr.Jit drops what is multiplied by 0, NaN or not.
+    given = {
+        name: value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
+        for name, value in (known | dict(values)).items()
+    }
+    return PairedMaterial(**given | {name: mi.Spectrum(given[name]) for name in COLOURS}, form=form)
 
 
 def _within(parameter: heuristics.Parameter, value: float) -> float | None:

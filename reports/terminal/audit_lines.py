@@ -28,4 +28,9 @@ def verdict(record: Audit) -> str:
 def _rows(record: Audit) -> Iterator[Sequence[str]]:
     yield "check", "verdict", "found", "expected", "worst case"
     for check in record.checks:
-        yield check.name, check.verdict, number(check.value), check.expected, check.worst
+        yield check.name, check.verdict, _found(check.value), check.expected, check.worst
+
+
+def _found(value: float | None) -> str:
+    """Return what was found; a count has no decimals."""
+    return f"{value:g}" if value is not None and value == int(value) else number(value)
