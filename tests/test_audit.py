@@ -162,7 +162,9 @@ def detached_parameter(point, gloss: Range(0, 1) = 0.5):
 
 
 def infinite_derivative(point):
-    return lambert(point) * (1 + dr.maximum(point.material.alpha - 1.5, 0) ** (point.material.n + 1))
+    return lambert(point) * (
+        1 + dr.maximum(point.material.alpha - 1.5, 0) ** (point.material.n + 1)
+    )
 
 
 @pytest.mark.parametrize(
