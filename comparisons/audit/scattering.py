@@ -32,6 +32,13 @@ WHITE = {
 """What makes BSDFs white; others are as Mitsuba has them."""
 
 
+NARROWEST = {"alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1, "roughness": 0.32}
+"""Roughness below which quadrature and cells of χ² do not resolve the lobe at all angles."""
+
+SHARPEST = 50.0
+"""The same of Phong's exponent, from above."""
+
+
 class Scattering(Subject):
     """A BSDF of some type, with its parameters; where they are not given, it is :data:`WHITE`.
 
@@ -44,6 +51,7 @@ class Scattering(Subject):
 
     def __init__(self, plugin: str, given: Mapping[str, Any]) -> None:
         self.plugin, self.given = plugin, dict(given)
+        _require_resolved(plugin, given)
         self.bsdf = self._made()
         if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission) or mi.has_flag(
             self.bsdf.flags(), mi.BSDFFlags.Delta
@@ -84,6 +92,12 @@ class Scattering(Subject):
 
     def sampling(self) -> Checked:
         """Check that samples are as dense as ``pdf`` says: χ² over directions (Mitsuba's test)."""
+        light, view = furnace.random_pairs(256)
+        if not self.response(self.plugin, light, view).any():
+            return Checked(
+                name="sampling", verdict="not asked", value=None, expected="p of χ²",
+                worst="it reflects nothing",
+            )  # fmt: skip
         found = {angle: self._p_value(angle) for angle in INCIDENT}
         worst = min(found, key=lambda angle: found[angle])
         bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
@@ -148,6 +162,22 @@ class Scattering(Subject):
 
     def _values(self, bsdf: Any, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         return np.array(_evaluated(bsdf, light, view), float).reshape(3, -1)
+
+
+def _require_resolved(plugin: str, given: Mapping[str, Any]) -> None:
+    """Refuse lobes that the quadrature would miss."""
+    for name, least in NARROWEST.items():
+        value = given.get(name, least)
+        if isinstance(value, float) and not value >= least:
+            raise InputError(
+                f"BSDF {plugin!r}: {name} = {value:g} makes a lobe that is narrower than the audit"
+                f" resolves: give {least:g} or more."
+            )
+    if isinstance(given.get("n"), float) and not given["n"] <= SHARPEST:
+        raise InputError(
+            f"BSDF {plugin!r}: n = {given['n']:g} makes a lobe that is narrower than the audit"
+            f" resolves: give {SHARPEST:g} or less."
+        )
 
 
 def _evaluated(bsdf: Any, light: np.ndarray, view: np.ndarray) -> Any:
