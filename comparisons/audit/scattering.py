@@ -116,7 +116,7 @@ class Scattering(Subject):
 
         test = mi.chi2.ChiSquareTest(
             mi.chi2.SphericalDomain(), sample, above, sample_dim=3,
-            sample_count=200_000, ires=16, res=50,
+            sample_count=200_000, ires=32, res=100,
         )  # fmt: skip
         test.run(LEVEL, len(INCIDENT), quiet=True)
         p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
