@@ -24,7 +24,8 @@ from heuristic.interpolation import Interpolation
 from reference.planning.plan import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant
-from reports.charts import figures
+from reports.charts import figures, vega
+from reports.charts.albedo_chart import albedo_chart
 from reports.files import images
 from reports.terminal import tables
 from tests.witnesses import page
@@ -68,6 +69,7 @@ def main(words):
     _example()
     _witnesses()
     _shaders()
+    _audits()
     _notebook()
 
 
@@ -186,6 +188,16 @@ def _witnesses():
     direct.register()
     for part in ("closed_forms", "figures", "elsewhere"):
         replace("witnesses.md", part.replace("_", " "), getattr(page, part)())
+
+
+def _audits():
+    """Audit the shaders and some BSDFs."""
+    import audits  # beside this script
+
+    plugins.register()
+    found = audits.audits()
+    replace("audit.md", "audits", audits.table(found))
+    atomic.write(DOCS / "audit.svg", vega.paper(albedo_chart(found[audits.PICTURED])))
 
 
 def _shaders():

@@ -66,29 +66,45 @@ def albedo(bsdf, degrees):
     Mitsuba's ``eval(wi, wo)`` is ``f cos(theta_wo)`` with the light at ``wo``; the outgoing
     directions are those of ``wi`` here, so that models without reciprocity keep their sense.
     """
-    light = _direction(np.deg2rad(degrees), 0.0)
-    # In t with cos = 1 - t^2, so that the directions are dense about the normal.
-    t = (np.arange(HEIGHTS) + 0.5) / HEIGHTS
-    phi = (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS
-    t, phi = (grid.ravel() for grid in np.meshgrid(t, phi))
-    cosine = 1 - t * t
-    outgoing = _direction(np.arccos(cosine), phi)
+    light = direction(np.deg2rad(degrees), 0.0)
+    outgoing, solid_angle = hemisphere()
     value = evaluate(bsdf, outgoing, light) / light[2, 0]  # f
-    return float((value * cosine * 2 * t).sum() * 2 * np.pi / len(t))
+    return float((value * outgoing[2] * solid_angle).sum())
 
 
-def asymmetry(bsdf, pairs=20_000):
+def hemisphere(azimuths=AZIMUTHS, heights=HEIGHTS):
+    """Return directions (3, N) above a surface, and the solid angle (N,) that each stands for.
+
+    They are even in ``t`` with ``cos(theta) = 1 - t^2``, and so dense about the normal.
+    """
+    t = (np.arange(heights) + 0.5) / heights
+    phi = (np.arange(azimuths) + 0.5) * 2 * np.pi / azimuths
+    t, phi = (grid.ravel() for grid in np.meshgrid(t, phi))
+    return direction(np.arccos(1 - t * t), phi), 2 * t * 2 * np.pi / len(t)
+
+
+def asymmetry(bsdf):
     """Return the largest relative difference of ``f(i, o)`` and ``f(o, i)``."""
-    rng = np.random.default_rng(0)
-    a, b = (
-        _direction(np.arccos(rng.uniform(np.cos(np.deg2rad(80)), 1, pairs)),
-                   rng.uniform(0, 2 * np.pi, pairs))
-        for _ in range(2)
-    )  # fmt: skip
+    a, b = random_pairs()
     there, back = evaluate(bsdf, a, b) / b[2], evaluate(bsdf, b, a) / a[2]
+    return float(relative_differences(there, back).max())
+
+
+def random_pairs(count=20_000):
+    """Return two sets of random directions (3, N), within 80 degrees of the normal."""
+    rng = np.random.default_rng(0)
+    return [
+        direction(np.arccos(rng.uniform(np.cos(np.deg2rad(80)), 1, count)),
+                  rng.uniform(0, 2 * np.pi, count))
+        for _ in range(2)
+    ]  # fmt: skip
+
+
+def relative_differences(there, back):
+    """Return ``|a - b|`` over the mean of both, and 0 where that is under 1/1000 of the largest."""
     mean = (there + back) / 2
     counted = mean > 1e-3 * mean.max()
-    return float((np.abs(there - back)[counted] / mean[counted]).max())
+    return np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
 
 
 def evaluate(bsdf, wi, wo):
@@ -102,6 +118,7 @@ def evaluate(bsdf, wi, wo):
     return np.atleast_2d(np.array(value, float))[0]
 
 
-def _direction(theta, phi):
+def direction(theta, phi):
+    """Return unit vectors (3, N) at angles from the normal and about it, in radians."""
     theta, phi = np.broadcast_arrays(np.atleast_1d(theta), phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])

@@ -17,7 +17,8 @@ def shade(point):
     facing = dr.maximum(dr.dot(normal, view), 1e-3)
     value = point.ambient * material.base_color
     for light in point.lights:
-        half = dr.normalize(light.toward + view)
+        half = light.toward + view
+        half *= dr.rsqrt(dr.maximum(dr.squared_norm(half), 1e-12))  # opposite directions have none
         cosine = dr.maximum(dr.dot(normal, light.toward), 0)
         top = dr.maximum(dr.dot(normal, half), 0)
         distribution = square / dr.square(top * top * (square - 1) + 1)  # times pi

@@ -10,7 +10,8 @@ def shade(point):
     for light in point.lights:
         cosine = dr.dot(point.normal, light.toward)
         mirrored = 2 * cosine * point.normal - light.toward
-        lobe = dr.maximum(dr.dot(mirrored, point.view), 0) ** material.n
+        along = dr.dot(mirrored, point.view)
+        lobe = dr.select(along > 0, dr.maximum(along, 1e-6) ** material.n, 0)  # 0 ** 0 is NaN
         reflected = material.k_d * cosine + material.k_s * lobe
         value += dr.select(cosine > 0, light.intensity * reflected, 0)
     return value

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from comparisons.audit.audit import Kind
+    from comparisons.audit.audit_record import Audit
     from comparisons.case import Request
     from comparisons.cost.choice import Choice
     from comparisons.cost.cost_record import Cost
@@ -118,3 +120,18 @@ def fitted(
     result = fit(case.source, case.options, chosen, progress, case.command("fit", **words))
     fit_files.write(place, result)
     return result.record
+
+
+def audited(kind: Kind, name: str, given: dict[str, Any], command: str, place: Path) -> Audit:
+    """Audit a heuristic or a BSDF, and write the audit's files."""
+    from comparisons.audit.audit import audit
+    from comparisons.case import RGB
+    from heuristic import plugins
+    from reference.scene.graph import set_variant
+    from reports.run import audit_files
+
+    set_variant(RGB)
+    plugins.register()
+    record = audit(kind, name, given, command)
+    audit_files.write(place, record)
+    return record

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons import records
+from comparisons.audit.audit_record import Audit
 from comparisons.check.baseline import Baseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
@@ -15,6 +16,7 @@ from reports.run.stages import RunRecord
 FOLDER = Path(__file__).parent
 
 PUBLISHED: dict[str, Any] = {
+    "audit": Audit,
     "baseline": Baseline,
     "check": Checks,
     "comparison": ComparisonRecord,

@@ -1,0 +1,139 @@
+"""Checks over directions: white furnace, energy, reciprocity, and what happens at the horizon.
+
+With ``s(l, v) = pi f cos(theta_l)``, what a viewer sees of a light of intensity 1, light of
+radiance 1 from all directions shows ``1/pi int s(l, v) dl``, which is 1 for a white surface; and of
+light from ``l`` the share ``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv`` is returned.
+"""
+
+import numpy as np
+
+from comparisons.audit.audit_record import Checked, Curve
+from comparisons.audit.subject import Subject, told
+from comparisons.hard import furnace
+
+ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
+"""Degrees from the normal."""
+
+TOLERANCE = 0.01
+"""Of an albedo: the quadrature keeps a tenth of it for lobes wider than a degree or two."""
+
+RECIPROCAL = 1e-3
+"""Largest relative difference of ``f(i, o)`` and ``f(o, i)`` in single precision."""
+
+GRAZING = 1e-6
+"""Sine of the light's elevation at the horizon: what goes to 0 there, however steeply, has gone."""
+
+JUMP = 0.01
+"""Of display white."""
+
+
+def curve(subject: Subject, material: str) -> Curve:
+    """Return the two albedos of a white material over :data:`ANGLES`."""
+    return Curve(
+        material=material,
+        seen=tuple(_seen(subject, material, angle) for angle in ANGLES),
+        returned=tuple(_returned(subject, material, angle) for angle in ANGLES),
+    )
+
+
+def _seen(subject: Subject, material: str, degrees: float) -> float:
+    above, solid_angle = furnace.hemisphere(*subject.grid)
+    view = furnace.direction(np.deg2rad(degrees), 0.0)
+    total = sum(
+        (subject.response(material, light, view) * solid_angle).sum(axis=1)
+        for light in (above, above * [[1], [1], [-1]])
+    )
+    return _farthest(total / np.pi)
+
+
+def _returned(subject: Subject, material: str, degrees: float) -> float:
+    view, solid_angle = furnace.hemisphere(*subject.grid)
+    light = furnace.direction(np.deg2rad(degrees), 0.0)
+    found = subject.response(material, light, view) / light[2, 0]
+    return float((found * view[2] * solid_angle).sum(axis=1).max() / np.pi)
+
+
+def _farthest(values: np.ndarray) -> float:
+    """Return the one of some numbers that is farthest from 1."""
+    return float(values[np.abs(values - 1).argmax()])
+
+
+def white_furnace(curves: tuple[Curve, ...]) -> Checked:
+    """Check that a white surface is as bright as what surrounds it, at every angle."""
+    value, worst = max(
+        ((value, f"{each.material}, viewer at {angle:g}°")
+         for each in curves for angle, value in zip(ANGLES, each.seen, strict=True)),
+        key=lambda found: abs(found[0] - 1),
+    )  # fmt: skip
+    return checked("white furnace", abs(value - 1) <= TOLERANCE, value, f"1 ± {TOLERANCE}", worst)
+
+
+def energy(curves: tuple[Curve, ...]) -> Checked:
+    """Check that no light is returned more than once, for the worst of the angles."""
+    value, worst = max(
+        (value, f"{each.material}, light at {angle:g}°")
+        for each in curves for angle, value in zip(ANGLES, each.returned, strict=True)
+    )  # fmt: skip
+    return checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
+
+
+def reciprocity(subject: Subject) -> Checked:
+    """Check that ``f(i, o) = f(o, i)``, at random pairs of directions."""
+    a, b = furnace.random_pairs()
+
+    def difference(material: str) -> np.ndarray:
+        there = subject.response(material, a, b) / a[2]
+        back = subject.response(material, b, a) / b[2]
+        return furnace.relative_differences(there, back)
+
+    found = {material: difference(material) for material in subject.materials}
+    value, worst = _largest(found, a, b)
+    expected = f"at most {RECIPROCAL} of the mean"
+    return checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
+
+
+def horizon(subject: Subject) -> Checked:
+    """Check that nothing jumps as a light sets."""
+    view = furnace.direction(*(_grid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))))
+    above, below = (np.tile([[1.0], [0.0], [z]], view.shape[1]) for z in (GRAZING, -GRAZING))
+    found = {
+        material: np.abs(
+            subject.response(material, above, view) - subject.response(material, below, view)
+        )
+        for material in subject.materials
+    }
+    value, worst = _largest(found, above, view)
+    return checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
+
+
+def below(subject: Subject) -> Checked:
+    """Check that light from behind the surface is not seen."""
+    polar = np.deg2rad(np.linspace(91, 180, 90))
+    azimuth = np.deg2rad(np.arange(0, 181, 20.0))
+    seen = np.deg2rad(np.array([0.0, 30, 60, 80]))
+    polar, azimuth, seen = (each.ravel() for each in np.meshgrid(polar, azimuth, seen))
+    light, view = furnace.direction(polar, azimuth), furnace.direction(seen, 0 * seen)
+    found = {material: subject.response(material, light, view) for material in subject.materials}
+    value, worst = _largest(found, light, view)
+    return checked("light from below", value <= 1e-5, value, "0", worst)
+
+
+def checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
+    """Return a check that was asked."""
+    verdict = "holds" if holds else "does not hold"
+    return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
+
+
+def _grid(polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    polar, azimuth = np.meshgrid(np.deg2rad(polar), np.deg2rad(azimuth))
+    return polar.ravel(), azimuth.ravel()
+
+
+def _largest(
+    found: dict[str, np.ndarray], light: np.ndarray, view: np.ndarray
+) -> tuple[float, str]:
+    """Return the largest of values (C, N) by material, and its case in words."""
+    material = max(found, key=lambda name: found[name].max())
+    values = found[material].max(axis=0)
+    place = values.argmax()
+    return float(values[place]), f"{material}, {told(light[:, place], view[:, place])}"

@@ -1,0 +1,75 @@
+"""The record of an audit, ``audit.json``: what holds of one way to shade, and where it fails."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from comparisons.records import VERSION, Amount, Record, Versions
+
+Verdict = Literal["holds", "does not hold", "not asked"]
+
+
+class Checked(Record):
+    """One check.
+
+    Attributes
+    ----------
+    name
+        Of the check.
+    verdict
+        ``not asked`` where the check has no meaning for what is audited.
+    value
+        What was found in the worst case; None where the check was not asked.
+    expected
+        What the value has to be for the check to hold, in words.
+    worst
+        The worst case found, or why the check was not asked.
+    """
+
+    name: str
+    verdict: Verdict
+    value: float | None
+    expected: str
+    worst: str
+
+
+class Curve(Record):
+    """How much light a white material returns, over angles from the normal.
+
+    Attributes
+    ----------
+    material
+        Its name.
+    seen
+        What the viewer sees at each angle under light of radiance 1 from all directions.
+    returned
+        The share of the light from each angle that the surface returns, to all viewers.
+    """
+
+    material: str
+    seen: tuple[float, ...]
+    returned: tuple[float, ...]
+
+
+class Audit(Record, kw_only=True):
+    """What holds of one heuristic or BSDF."""
+
+    record_version: int = VERSION
+    subject: str
+    kind: Literal["heuristic", "bsdf"]
+    parameters: Annotated[dict[str, float | str], Meta(description="Those given by name.")]
+    variant: str
+    angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
+    curves: tuple[Curve, ...]
+    checks: tuple[Checked, ...]
+    command: str
+    versions: Versions
+
+    def named(self, name: str) -> Checked:
+        """Return a check by its name."""
+        return next(check for check in self.checks if check.name == name)
+
+    @property
+    def is_defined(self) -> bool:
+        """Whether every value computed is a finite number of 0 or more."""
+        return self.named("values").verdict == "holds"

@@ -1,0 +1,114 @@
+"""What can be audited: anything that says how much light it turns from one direction to another."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+ROUNDING = 1e-5
+"""A value below 0 by less than this, in units of display white, is a rounding error."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A value that no light can have: where it was found, and the value."""
+
+    where: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A number to take the derivative by.
+
+    ``shade`` maps a Dr.Jit float, a single number or one a point, to a float a point.
+    """
+
+    name: str
+    centre: float
+    shade: Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A hard case: its words, what gives its values (C, N), and directions (3, N) where they tell.
+
+    Attributes
+    ----------
+    words, values
+        What is hard, and a function of nothing.
+    pairs
+        Light and view.
+    """
+
+    words: str
+    values: Callable[[], np.ndarray]
+    pairs: tuple[np.ndarray, np.ndarray] | None = None
+
+    def told(self, place: int) -> str:
+        """Return one of the values' cases in words."""
+        if self.pairs is None:
+            return self.words
+        light, view = (each[:, place % each.shape[1]] for each in self.pairs)
+        return f"{self.words}: {told(light, view)}"
+
+
+@dataclass
+class Subject(ABC):
+    """A heuristic or a BSDF, with the normal along z.
+
+    Attributes
+    ----------
+    materials
+        Names of the white materials that it is asked with, which absorb nothing.
+    grid
+        Azimuths and heights of the quadrature over a hemisphere.
+    faults
+        What was found, while other things were asked, that no light can have.
+    """
+
+    materials: tuple[str, ...]
+    grid: tuple[int, int]
+    faults: list[Fault] = field(default_factory=list, kw_only=True)
+
+    @abstractmethod
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return what :meth:`response` returns, as it comes."""
+
+    @abstractmethod
+    def settings(self) -> Iterator[Setting]:
+        """Yield the hard cases."""
+
+    @abstractmethod
+    def tuned(self) -> Iterator[Tuned]:
+        """Yield the numbers that it depends on."""
+
+    def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return ``pi f cos(theta_l)``, (C, N), for unit vectors (3, N) to a light and a viewer.
+
+        It is what a viewer sees of a light of intensity 1: of a white diffuse surface, the cosine.
+        Values that are not finite, or negative, are noted and count as 0.
+        """
+        count = max(light.shape[1], view.shape[1])
+        light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
+        found = np.broadcast_to(self.evaluate(material, light, view), (3, count))
+        self.noted(found, lambda place: f"{material}, {told(light[:, place], view[:, place])}")
+        return np.where(np.isfinite(found) & (found > 0), found, 0.0)
+
+    def noted(self, values: np.ndarray, where: Callable[[int], str]) -> None:
+        """Note the first of some values (C, N) that is not finite, or negative."""
+        is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
+        if is_wrong.any():
+            channel, place = np.argwhere(is_wrong)[0]
+            self.faults.append(Fault(where(place), float(values[channel, place])))
+
+
+def told(light: np.ndarray, view: np.ndarray) -> str:
+    """Return a pair of directions in words: angles from the normal, and the azimuth between."""
+    polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
+    about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
+    return (
+        f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"
+    )
