@@ -214,7 +214,7 @@ def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
 
 def _start(folder, out):
     words = [sys.executable, "-m", "reports", "compare", folder, "-o", out, "--scripts"]
-    words += ["--spp", "8", "--resolution", "16x16"]
+    words += ["--spp", "8", "--resolution", "16x16", "--no-why"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
         words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
