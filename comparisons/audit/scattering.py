@@ -18,7 +18,7 @@ LEVEL = 0.001
 """Chance that densities which are right fail, over all angles together."""
 
 INCIDENT = (0.0, 45.0, 75.0)
-"""Degrees at which samples are held against the density."""
+"""Degrees at which samples are compared with the density."""
 
 GRAZING = 1e-7
 
