@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
 from math import exp, log, sqrt
-from statistics import median
+from statistics import NormalDist, median
 
 import numpy as np
 
@@ -172,6 +172,8 @@ def _reached(forecasts, method, error):
         return method, own[0].spp, own[0].seconds
     for before, after in pairwise(own):
         if after.error.value <= error < before.error.value:
+            if after.error.value == 0:
+                return method, after.spp, after.seconds
             share = log(before.error.value / error) / log(before.error.value / after.error.value)
             return (
                 method,
@@ -273,7 +275,7 @@ def _error(curve, growth, spp, is_random):
     value *= factor
     doubt = np.hypot(doubt, LEAST_DOUBT if is_random else 0.0)
     spread = float(np.hypot(factor * stderr, doubt * value))
-    reach = 1.645 * spread  # the normal quantile of LEVEL
+    reach = NormalDist().inv_cdf((1 + LEVEL) / 2) * spread
     return Range(value, max(value - reach, 0.0), value + reach)
 
 
