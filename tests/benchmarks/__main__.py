@@ -1,43 +1,18 @@
-"""Run benchmarks by name, all of them where none is given."""
+"""Run the named benchmarks, or all of them."""
 
 import json
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import click
 
 from heuristic.errors import FotismosError
-from tests.benchmarks import (
-    batch,
-    cost,
-    growth,
-    guard,
-    kernel,
-    lights,
-    marks,
-    samplers,
-    scaling,
-    stability,
-    study,
-    terms,
-    variance,
-)
 
-BENCHMARKS = {
-    "batch": batch.run,
-    "cost": cost.run,
-    "growth": growth.run,
-    "guard": guard.run,
-    "kernel": kernel.run,
-    "lights": lights.run,
-    "marks": marks.run,
-    "samplers": samplers.run,
-    "scaling": scaling.run,
-    "stability": stability.run,
-    "study": study.run,
-    "terms": terms.run,
-    "variance": variance.run,
-}
+# Each module here is a benchmark, with `run(rounds)`.
+BENCHMARKS = [
+    module.stem for module in Path(__file__).parent.glob("*.py") if not module.stem.startswith("__")
+]
 
 
 @click.command()
@@ -48,7 +23,10 @@ BENCHMARKS = {
 @click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path), help="Write here.")
 def main(names, rounds, file):
     """Measure, print tables, and write the numbers as JSON where asked to."""
-    results = {name: BENCHMARKS[name](rounds) for name in names or sorted(BENCHMARKS)}
+    results = {
+        name: import_module(f"tests.benchmarks.{name}").run(rounds)
+        for name in names or sorted(BENCHMARKS)
+    }
     if file:
         file.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
 
