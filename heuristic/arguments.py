@@ -124,7 +124,8 @@ def _plain(name: str, value: Any) -> tuple[float, float, float]:
     numbers = list(value) if is_sequence and np.ndim(np.asarray(value, object)) == 1 else []
     if len(numbers) != 3 or not all(isinstance(number, Real) for number in numbers):
         raise InputError(f"{name} is {_kind(value)}: {HOW}, or three numbers.")
-    return tuple(map(float, numbers))
+    x, y, z = map(float, numbers)
+    return x, y, z
 
 
 def _kind(value: Any) -> str:

@@ -1,17 +1,17 @@
 """Coefficients and intensities as numbers, RGB, or one value for each wavelength (8.11, 8.12)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
+from typing import Any
 
 import drjit as dr
 import numpy as np
 
+from heuristic.arrays import Colour
 from heuristic.errors import InputError
 
-Coefficient = "float | Sequence[float] | Dr.Jit array"
 
-
-def checked(name, value):
+def checked(name: str, value: Any) -> Any:
     """Return ``value`` as a float, a tuple of floats, or the Dr.Jit array that it is.
 
     Numbers and sequences must be finite and not negative. Dr.Jit arrays pass unread, because
@@ -49,14 +49,14 @@ def _components(value):
         return None
 
 
-def is_zero(value):
+def is_zero(value: Any) -> bool:
     """Tell whether a checked value is zero by construction, so that its term need not be traced."""
     if isinstance(value, tuple):
         return not any(value)
     return isinstance(value, float) and value == 0
 
 
-def wavelength_count(value):
+def wavelength_count(value: Any) -> int:
     """Return the number of components of a checked value, 1 for numbers and Dr.Jit floats."""
     if isinstance(value, tuple):
         return len(value)
@@ -65,7 +65,7 @@ def wavelength_count(value):
     return 1
 
 
-def common_wavelength_count(values):
+def common_wavelength_count(values: Mapping[str, Any]) -> int:
     """Return the number of components that all of ``values`` share; single ones fit any.
 
     ``values`` maps names to checked values.
@@ -86,7 +86,7 @@ def common_wavelength_count(values):
     return max(counts.values(), default=1)
 
 
-def as_array(value, vector_type):
+def as_array(value: Any, vector_type: type) -> Colour:
     """Turn a checked value into what the kernel multiplies with.
 
     Numbers and Dr.Jit arrays stay as they are; a tuple of three or fewer becomes a fixed array of

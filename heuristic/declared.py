@@ -11,7 +11,10 @@ from heuristic.errors import InputError
 class Named(Protocol):
     """What can be declared."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The word by which it is found."""
+        ...
 
 
 Declaration = TypeVar("Declaration", bound=Named)

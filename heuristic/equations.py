@@ -9,7 +9,9 @@ import importlib
 import inspect
 import pkgutil
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import heuristic
 
@@ -39,7 +41,7 @@ class Entry:
     meaning: str
 
 
-def claims(function):
+def claims(function: Callable[..., Any]) -> tuple[str, ...]:
     """Return the equation numbers that a function's docstring begins with."""
     match = _CLAIM.match(inspect.getdoc(function) or "")
     if not match:
@@ -50,32 +52,32 @@ def claims(function):
     return tuple(numbers)
 
 
-def homes():
+def homes() -> dict[str, list[tuple[str, Callable[..., Any]]]]:
     """Return, for each equation number, the list of functions that claim it.
 
     Members of classes count by their qualified name. A test demands one each.
     """
-    found = {}
+    found: dict[str, list[tuple[str, Callable[..., Any]]]] = {}
     for name, function in _functions():
         for number in claims(function):
             found.setdefault(number, []).append((name, function))
     return found
 
 
-def index():
+def index() -> list[Entry]:
     """Return an :class:`Entry` for each equation of the chapters, in order."""
     found = homes()
     entries = []
     for number in NUMBERS:
         for name, function in found.get(number, ())[:1]:
-            text = " ".join(inspect.getdoc(function).split("\n\n")[0].split())
+            text = " ".join((inspect.getdoc(function) or "").split("\n\n")[0].split())
             entries.append(Entry(number, name, _CLAIM.sub("", text, count=1).strip()))
         if number not in found:
             entries.append(Entry(number, None, WITHOUT_HOME.get(number, "")))
     return entries
 
 
-def _functions():
+def _functions() -> Iterator[tuple[str, Callable[..., Any]]]:
     """Yield the qualified names and the functions of all modules of this room."""
     for module_info in pkgutil.iter_modules(heuristic.__path__, "heuristic."):
         module = importlib.import_module(module_info.name)

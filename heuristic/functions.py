@@ -73,10 +73,11 @@ def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
         signature = inspect.signature(function, eval_str=True)
     except (TypeError, ValueError, NameError) as error:
         raise InputError(f"{defined(function)}: its signature cannot be read: {error}.") from error
-    point, *others = signature.parameters.values() or [None]
-    if point is None or point.kind not in (point.POSITIONAL_ONLY, point.POSITIONAL_OR_KEYWORD):
+    given = list(signature.parameters.values())
+    positional = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    if not given or given[0].kind not in positional:
         raise _refused(function, "it does not take a point")
-    return tuple(_parameter(function, one) for one in others)
+    return tuple(_parameter(function, one) for one in given[1:])
 
 
 def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Parameter:

@@ -14,6 +14,7 @@ from enum import Enum
 import drjit as dr
 
 from heuristic import vectors
+from heuristic.arrays import Colour, Direction, Number, Position, Vector
 
 FINEST = 512
 """Tessellation: a sphere then has four million triangles, which take half a gigabyte."""
@@ -27,7 +28,9 @@ class Interpolation(Enum):
     PHONG = "phong"
 
 
-def edge_intensity(intensity_a, intensity_b, y_a, y_b, y):
+def edge_intensity(
+    intensity_a: Colour, intensity_b: Colour, y_a: Number, y_b: Number, y: Number
+) -> Colour:
     """Equation 6.35: ``I_D = [I_A (y_D - y_B) + I_B (y_A - y_D)] / (y_A - y_B)``.
 
     The intensity where the scan line at the height ``y`` meets the edge from A to B; ``I_E``
@@ -37,7 +40,9 @@ def edge_intensity(intensity_a, intensity_b, y_a, y_b, y):
     return _between(intensity_a, intensity_b, y_a, y_b, y)
 
 
-def scan_line_intensity(intensity_d, intensity_e, x_d, x_e, x):
+def scan_line_intensity(
+    intensity_d: Colour, intensity_e: Colour, x_d: Number, x_e: Number, x: Number
+) -> Colour:
     """Equation 6.36: ``I_P = [I_D (x_E - x_P) + I_E (x_P - x_D)] / (x_E - x_D)``.
 
     The chapter's text names I_D and I_C as what is interpolated, which can only mean I_D and I_E.
@@ -45,7 +50,9 @@ def scan_line_intensity(intensity_d, intensity_e, x_d, x_e, x):
     return _between(intensity_d, intensity_e, x_d, x_e, x)
 
 
-def edge_normal(normal_a, normal_b, y_a, y_b, y):
+def edge_normal(
+    normal_a: Direction, normal_b: Direction, y_a: Number, y_b: Number, y: Number
+) -> Vector:
     """Equation 6.37: ``n_D = [n_A (y_D - y_B) + n_B (y_A - y_D)] / (y_A - y_B)``.
 
     Not normalised: that would make the result at P depend on the direction of the scan line.
@@ -53,7 +60,9 @@ def edge_normal(normal_a, normal_b, y_a, y_b, y):
     return _between(normal_a, normal_b, y_a, y_b, y)
 
 
-def scan_line_normal(normal_d, normal_e, x_d, x_e, x):
+def scan_line_normal(
+    normal_d: Direction, normal_e: Direction, x_d: Number, x_e: Number, x: Number
+) -> Direction:
     """Equation 6.38: ``n_P = [n_D (x_E - x_P) + n_E (x_P - x_D)] / |...|``, a unit vector.
 
     Where opposite normals meet in the middle it is zero, and such a point receives no light.
@@ -61,7 +70,9 @@ def scan_line_normal(normal_d, normal_e, x_d, x_e, x):
     return vectors.normalise(_between(normal_d, normal_e, x_d, x_e, x))
 
 
-def barycentric_coordinates(point, p0, p1, p2):
+def barycentric_coordinates(
+    point: Position, p0: Position, p1: Position, p2: Position
+) -> tuple[Number, Number, Number]:
     """Return the weights ``b0, b1, b2`` with ``point = b0 p0 + b1 p1 + b2 p2`` and sum 1.
 
     Of a point outside the triangle's plane they are those of its foot. A triangle without area has

@@ -17,6 +17,7 @@ import drjit as dr
 import numpy as np
 
 from heuristic import colours, numerics
+from heuristic.arrays import Colour, Direction, Number, Position, Vector
 from heuristic.errors import InputError
 
 PLUGINS: dict[str, type["Light"]] = {}
@@ -26,9 +27,9 @@ PLUGINS: dict[str, type["Light"]] = {}
 class Arrival(NamedTuple):
     """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays."""
 
-    toward: object
-    intensity: object
-    distance: object
+    toward: Direction
+    intensity: Colour
+    distance: Number
 
 
 class Light:
@@ -39,6 +40,7 @@ class Light:
     """
 
     plugin: ClassVar[str]
+    intensity: Colour
 
     def __init_subclass__(cls, plugin: str = "") -> None:
         if plugin:
@@ -49,15 +51,15 @@ class Light:
             if hasattr(self, name):
                 object.__setattr__(self, name, check(getattr(self, name)))
 
-    def illuminate(self, position: Any) -> Arrival:
+    def illuminate(self, position: Position) -> Arrival:
         """Return how the light arrives at positions, Dr.Jit arrays of three components."""
         raise NotImplementedError
 
-    def wide_toward(self, position: Any) -> tuple[Any, Any]:
+    def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         """Return ``L`` in double precision, as a vector and its inverse length."""
         raise NotImplementedError
 
-    def compiled(self) -> dict[str, object]:
+    def compiled(self) -> dict[str, Any]:
         """Return the fields that are part of the kernel's code, with their values."""
         return {}
 
@@ -65,26 +67,28 @@ class Light:
         """Return what decides on the light's instructions, apart from its numbers; hashable."""
         return type(self), colours.wavelength_count(self.intensity), *self.compiled().items()
 
-    def numbers(self) -> dict[str, object]:
+    def numbers(self) -> dict[str, Any]:
         """Return the fields that are plain numbers, or tuples of them, and not compiled in."""
+        light: Any = self  # a dataclass, as each kind is
         compiled = self.compiled()
-        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in compiled}
+        given = {f.name: getattr(self, f.name) for f in fields(light) if f.name not in compiled}
         return {
             name: value
             for name, value in given.items()
             if all(isinstance(v, Real) for v in (value if isinstance(value, tuple) else (value,)))
         }
 
-    def with_numbers(self, fetch: Callable[[object], object], vector_type: type) -> Self:
+    def with_numbers(self, fetch: Callable[[Any], Any], vector_type: type) -> Self:
         """Return the light with its :meth:`numbers` replaced by Dr.Jit's, which ``fetch`` gives."""
         fetched = {name: fetch(value) for name, value in self.numbers().items()}
         for name, array in ARRAYS.items():
             if name in fetched:
                 fetched[name] = array(fetched[name], vector_type)
-        return replace(self, **fetched)
+        light: Any = self
+        return replace(light, **fetched)
 
 
-def _triple(name: str, value: Any) -> object:
+def _triple(name: str, value: Any) -> Any:
     """Return three finite floats, or the Dr.Jit array that was given."""
     if dr.is_array_v(value) and dr.is_jit_v(value):
         if dr.depth_v(value) == 2 and dr.size_v(value) == 3:
@@ -99,7 +103,7 @@ def _triple(name: str, value: Any) -> object:
     return triple
 
 
-def _direction(value: Any) -> object:
+def _direction(value: Any) -> Any:
     direction = _triple("direction", value)
     if isinstance(direction, tuple) and not any(direction):
         raise InputError("direction = (0, 0, 0) points nowhere: give a vector of any other length.")
@@ -111,7 +115,7 @@ def _attenuation(value: Any) -> tuple:
     coefficients = tuple(value) if isinstance(value, Sequence) else ()
     if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
         return coefficients
-    are_numbers = all(isinstance(c, Real) and isfinite(c) and c >= 0 for c in coefficients)
+    are_numbers = all(isinstance(c, Real) and isfinite(c) and float(c) >= 0 for c in coefficients)
     if len(coefficients) != 3 or not are_numbers or not any(coefficients):
         raise InputError(
             f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
@@ -120,20 +124,20 @@ def _attenuation(value: Any) -> tuple:
     return coefficients
 
 
-def _number(name: str, is_allowed: Callable[[Real], bool], allowed: str, value: object) -> object:
+def _number(name: str, is_allowed: Callable[[Any], bool], allowed: str, value: Any) -> Any:
     number = numerics.plain(value)
     if number is None or (isinstance(number, Real) and not is_allowed(number)):
         raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
     return number
 
 
-def _flag(name: str, value: object) -> bool:
+def _flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
     return bool(value)
 
 
-CHECKS: dict[str, Callable[[Any], object]] = {
+CHECKS: dict[str, Callable[[Any], Any]] = {
     "position": partial(_triple, "position"),
     "direction": _direction,
     "intensity": partial(colours.checked, "intensity"),

@@ -1,11 +1,12 @@
 """Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3): one class a kind."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 from heuristic import colours, numerics, terms, vectors
+from heuristic.arrays import Colour, Direction, Number, Position, Vector
 from heuristic.light import Arrival, Light
 from heuristic.numerics import is_number
 
@@ -35,31 +36,38 @@ class DirectionalLight(Light, plugin="heuristic_directional"):
         For a zero or non-finite direction, or a negative or non-finite intensity.
     """
 
-    direction: object
-    intensity: colours.Coefficient
+    direction: Direction
+    intensity: Colour
 
-    def illuminate(self, position: Any) -> Arrival:
+    def illuminate(self, position: Position) -> Arrival:
         """Return ``L = -direction / |direction|`` and ``I_p``."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
         return Arrival(toward, colours.as_array(self.intensity, vector_type), inf)
 
-    def wide_toward(self, position: Any) -> tuple[Any, Any]:
+    def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return -numerics.wide_unit(type(position)(self.direction)), 1
 
 
 class _LightFromPoint(Light):
     """What lights at a position share: ``L``, the distance, and attenuation with it."""
 
-    def wide_toward(self, position: Any) -> tuple[Any, Any]:
+    position: Position
+    attenuation: tuple[Number, Number, Number]
+    clamped: bool
+
+    def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return vectors.wide_light_vector(type(position)(self.position), position)
 
-    def compiled(self) -> dict[str, object]:
+    def compiled(self) -> dict[str, Any]:
         even = {"attenuation": UNATTENUATED} if is_unattenuated(self.attenuation) else {}
         return {"clamped": self.clamped} | even
 
-    def _attenuated(self, toward: Any, intensity: Any, distance: Any, position: Any) -> Arrival:
+    def _attenuated(
+        self, toward: Direction, intensity: Colour, distance: Number, position: Position
+    ) -> Arrival:
         if not is_unattenuated(self.attenuation):
+            law: Callable[..., Colour]
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
             if not self.clamped and terms.is_tame(self.attenuation, self.intensity):
                 law = terms.tame_attenuation
@@ -91,12 +99,12 @@ class PointLight(_LightFromPoint, plugin="heuristic_point"):
         negative, non-finite or all zero.
     """
 
-    position: object
-    intensity: colours.Coefficient
-    attenuation: tuple = UNATTENUATED
+    position: Position
+    intensity: Colour
+    attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
 
-    def illuminate(self, position: Any) -> Arrival:
+    def illuminate(self, position: Position) -> Arrival:
         """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6)."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
@@ -127,19 +135,19 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
         negative exponent.
     """
 
-    position: object
-    direction: object
-    intensity: colours.Coefficient
+    position: Position
+    direction: Direction
+    intensity: Colour
     cutoff: float
     exponent: float = 0
-    attenuation: tuple = UNATTENUATED
+    attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
 
-    def compiled(self) -> dict[str, object]:
+    def compiled(self) -> dict[str, Any]:
         even = {"exponent": 0} if is_number(self.exponent, 0) else {}
         return super().compiled() | even
 
-    def illuminate(self, position: Any) -> Arrival:
+    def illuminate(self, position: Position) -> Arrival:
         """Equation 6.3: ``I_0 f_att`` within the cone; times the fall-off of 6.4 where ``m > 0``.
 
         Returns an :class:`heuristic.light.Arrival`.

@@ -1,12 +1,19 @@
 """The cosine of which the specular lobe is a power, as accurately as the exponent asks for."""
 
+from collections.abc import Callable
+
 import drjit as dr
 
 from heuristic import numerics, vectors
+from heuristic.arrays import Cosines, Direction, Mask, Number, Position, Vector
+from heuristic.light import Light
+from heuristic.materials import Material
 from heuristic.numerics import Cosine
 
 
-def lobe(material, normal, view):
+def lobe(
+    material: Material, normal: Vector, view: Vector
+) -> Callable[[Light, Position, Direction, Number], Cosines]:
     """Return a function that gives the lobe's cosine for a light, 0 where it is below the horizon.
 
     ``R.V`` (8.9), or ``N.H`` for the form ``blinn``. What depends on the normal and the view alone
@@ -50,7 +57,7 @@ def lobe(material, normal, view):
     return sharp
 
 
-def local_lobe(material_form, is_moderate, wi, wo):
+def local_lobe(material_form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Cosines:
     """Return the lobe's cosine between two directions, in a frame whose third axis is the normal.
 
     As :func:`lobe`, for directions above the horizon.
@@ -63,7 +70,7 @@ def local_lobe(material_form, is_moderate, wi, wo):
     return narrowed(_local_cosine(material_form, wi, wo, numerics.wide_unit), True, float_type)
 
 
-def narrowed(cosine, is_lit, float_type):
+def narrowed(cosine: Cosines, is_lit: Mask, float_type: type) -> Cosine:
     """Return a cosine in double precision as :class:`heuristic.numerics.Cosine` of a float type.
 
     Its value is 0 where a light is below the horizon.

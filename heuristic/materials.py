@@ -5,6 +5,7 @@ from math import inf
 from numbers import Real
 
 from heuristic import colours, numerics
+from heuristic.arrays import Colour
 from heuristic.errors import InputError, unknown
 
 FORMS = ("phong", "blinn")
@@ -56,10 +57,10 @@ class Material:
     heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values of 0 or more.
     """
 
-    k_i: colours.Coefficient = 0
-    k_a: colours.Coefficient = 0
-    k_d: colours.Coefficient = 0
-    k_s: colours.Coefficient = 0
+    k_i: Colour = 0
+    k_a: Colour = 0
+    k_d: Colour = 0
+    k_s: Colour = 0
     n: float = 1
     form: str = "phong"
     normalised: bool = False
@@ -96,7 +97,7 @@ class PairedMaterial(Material):
         1 for metals, 0 for all other materials; ``principled`` has its own, 0..1.
     """
 
-    base_color: colours.Coefficient = 0
+    base_color: Colour = 0
     alpha: float = 1
     ior: float = 1
     metallic: float = 0
@@ -109,7 +110,7 @@ def _exponent(n):
     return number
 
 
-def check_form(form):
+def check_form(form: str) -> None:
     """Refuse a form of the specular lobe that is not in :data:`FORMS`."""
     if not isinstance(form, str) or form not in FORMS:
         raise unknown("form =", form, FORMS)

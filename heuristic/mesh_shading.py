@@ -11,19 +11,24 @@ to ray.
 Phong shading needs neither: Mitsuba interpolates and normalises the vertex normals.
 """
 
+from collections.abc import Callable, Sequence
+
 import drjit as dr
 import mitsuba as mi
 
 from heuristic import meshes
+from heuristic.arrays import Colour, Interaction, Mask, Mesh, Number, Position, Scene
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation, barycentric_coordinates
+from heuristic.light import Light
+from heuristic.materials import Material
 from heuristic.shading import shade
 
 BLOCK = 3
 """Components of one attribute: Mitsuba 3.9.1 reads 1 or 3, and any other number as zero."""
 
 
-def shading_points(mesh, interpolation):
+def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
     """Return the points of a mesh at which flat or Gouraud shading evaluates the model.
 
     Parameters
@@ -74,16 +79,16 @@ def shading_points(mesh, interpolation):
 
 
 def shade_mesh(
-    mesh,
-    interpolation,
-    viewer,
-    material,
-    lights,
-    ambient=0,
-    visible=None,
-    twosided=False,
-    model=shade,
-):
+    mesh: Mesh,
+    interpolation: Interpolation,
+    viewer: Position,
+    material: Material,
+    lights: Sequence[Light],
+    ambient: Colour = 0,
+    visible: Callable[..., Mask] | None = None,
+    twosided: bool | Mask = False,
+    model: Callable[..., Colour] = shade,
+) -> int:
     """Evaluate the model (8.10) at a mesh's vertices or faces, and store it with the mesh.
 
     Parameters
@@ -115,7 +120,13 @@ def shade_mesh(
     return components
 
 
-def stored_shade(si, interpolation, components=BLOCK, twosided=False, active=True):
+def stored_shade(
+    si: Interaction,
+    interpolation: Interpolation,
+    components: int = BLOCK,
+    twosided: bool | Mask = False,
+    active: Mask = True,
+) -> Colour:
     """Read what :func:`shade_mesh` stored, at the surface interactions of rays.
 
     A face shows its front where the ray meets the side to which its vertices are anticlockwise,
@@ -155,7 +166,7 @@ class MeshCorners:
         For a mesh with vertices that have no normal.
     """
 
-    def __init__(self, scene):
+    def __init__(self, scene: Scene):
         parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face is that of no mesh
         for shape in scene.shapes():
             if shape.is_mesh():
@@ -168,7 +179,7 @@ class MeshCorners:
             _joined(arrays) for arrays in zip(*parts, strict=True)
         )
 
-    def at(self, si, active=True):
+    def at(self, si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
         """Return three pairs of a weight and an interaction, one a vertex of the face hit.
 
         The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of

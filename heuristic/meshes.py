@@ -8,6 +8,7 @@ of the vertices. Call it after ``mitsuba.set_variant``.
 import drjit as dr
 import mitsuba as mi
 
+from heuristic.arrays import Array, Direction, Mesh, Position, Shape
 from heuristic.errors import InputError
 from heuristic.interpolation import FINEST
 from heuristic.normals import triangle_normal
@@ -16,7 +17,7 @@ from heuristic.vertex_normals import Weighting, vertex_normals
 RESOLUTION = 16
 
 
-def to_mesh(shape, resolution=RESOLUTION):
+def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
     """Return a shape as a triangle mesh with the shape's own normals and texture coordinates.
 
     A grid over the shape's ``(u, v)``, two triangles a cell, so that textures stay in place. With
@@ -57,7 +58,7 @@ def to_mesh(shape, resolution=RESOLUTION):
     return _tessellated(shape, kind, *_cells(resolution)[kind])
 
 
-def with_vertex_normals(mesh, weighting=Weighting.ANGLE):
+def with_vertex_normals(mesh: Mesh, weighting: "str | Weighting" = Weighting.ANGLE) -> Mesh:
     """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, in place of any of its own.
 
     Raises
@@ -69,7 +70,7 @@ def with_vertex_normals(mesh, weighting=Weighting.ANGLE):
     return _build(mesh, positions(mesh), computed, texture_coordinates(mesh), faces(mesh))
 
 
-def split_faces(mesh):
+def split_faces(mesh: Mesh) -> Mesh:
     """Return a mesh whose faces share no vertices, each with its face's normal.
 
     It is the form in which a mesh with ``face_normals`` has vertices to evaluate at.
@@ -83,30 +84,30 @@ def split_faces(mesh):
     return _build(mesh, dr.gather(mi.Vector3f, positions(mesh), corners), normals, uv, split)
 
 
-def positions(mesh):
+def positions(mesh: Mesh) -> Position:
     """Return the positions of a mesh's vertices, as vectors."""
     return dr.unravel(mi.Vector3f, mesh.vertex_positions_buffer())
 
 
-def faces(mesh):
+def faces(mesh: Mesh) -> Array:
     """Return the vertex numbers of a mesh's faces, anticlockwise as seen from the outside."""
     corners = dr.unravel(mi.Vector3u, mesh.faces_buffer())
     return corners.xzy if mesh.has_flipped_normals() else corners
 
 
-def texture_coordinates(mesh):
+def texture_coordinates(mesh: Mesh) -> Array | None:
     """Return a mesh's texture coordinates, None where it has none."""
     if not mesh.has_vertex_texcoords():
         return None
     return dr.unravel(mi.Point2f, mesh.vertex_texcoords_buffer())
 
 
-def face_normals(mesh):
+def face_normals(mesh: Mesh) -> Direction:
     """Return the unit normals of a mesh's faces (see 6.19), zero for faces without area."""
     return _flat_normals(positions(mesh), faces(mesh))
 
 
-def normals(mesh):
+def normals(mesh: Mesh) -> Direction:
     """Return a mesh's vertex normals: its own, or by 6.34 where it has none.
 
     Raises

@@ -15,12 +15,13 @@ import drjit as dr
 from drjit import scalar
 
 from heuristic import vectors
+from heuristic.arrays import Direction, Number, Position, Vector
 
 PARALLEL_STEPS = 4
 """Edges and tangents carry half a rounding step in each component, their products as much again."""
 
 
-def plane_coefficients(normal, point):
+def plane_coefficients(normal: Vector, point: Position) -> tuple[Number, Number, Number, Number]:
     """Equation 6.17: ``n.(p - p0) = 0``, the plane through ``p0`` with the normal ``n``.
 
     Returns ``(a, b, c, d) = (n_x, n_y, n_z, -n.p0)``, the coefficients of 6.16.
@@ -28,7 +29,7 @@ def plane_coefficients(normal, point):
     return normal.x, normal.y, normal.z, -dr.dot(normal, point)
 
 
-def plane_normal(a, b, c):
+def plane_normal(a: Number, b: Number, c: Number) -> Direction:
     """Equations 6.16, 6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
 
     ``a``, ``b`` and ``c`` are Dr.Jit floats. Its side is that on which ``ax + by + cz + d > 0``.
@@ -37,7 +38,7 @@ def plane_normal(a, b, c):
     return unit(_vector_type(a)(a, b, c))
 
 
-def triangle_normal(p0, p1, p2):
+def triangle_normal(p0: Position, p1: Position, p2: Position) -> Direction:
     """Equation 6.19: ``n = (p1 - p0) x (p2 - p0) / |(p1 - p0) x (p2 - p0)|``.
 
     It points to the side from which the vertices are seen in anticlockwise order. Another order
@@ -48,7 +49,7 @@ def triangle_normal(p0, p1, p2):
     return unit_cross(*shorter_edges(*edges))
 
 
-def implicit_normal(gradient):
+def implicit_normal(gradient: Vector) -> Direction:
     """Equation 6.20: ``n = grad f / |grad f|`` of the surface ``f(x, y, z) = 0``.
 
     It points to where ``f`` grows: outwards, where ``f`` is negative inside. At a point without a
@@ -57,12 +58,12 @@ def implicit_normal(gradient):
     return unit(gradient)
 
 
-def ellipsoid(position, a, b, c):
+def ellipsoid(position: Position, a: Number, b: Number, c: Number) -> Number:
     """Equation 6.21: ``f = x^2/a^2 + y^2/b^2 + z^2/c^2 - 1``, negative inside the ellipsoid."""
     return dr.squared_norm(position / type(position)(a, b, c)) - 1
 
 
-def ellipsoid_gradient(position, a, b, c):
+def ellipsoid_gradient(position: Position, a: Number, b: Number, c: Number) -> Vector:
     """Equation 6.22: ``grad f = (2x/a^2, 2y/b^2, 2z/c^2)`` of the ellipsoid of 6.21.
 
     ``a``, ``b`` and ``c`` are its half axes: numbers or Dr.Jit floats, greater than 0.
@@ -72,7 +73,7 @@ def ellipsoid_gradient(position, a, b, c):
     return 2 * position / axes / axes
 
 
-def parametric_normal(tangent_u, tangent_v):
+def parametric_normal(tangent_u: Vector, tangent_v: Vector) -> Direction:
     """Equations 6.23, 6.25: ``n = p_u x p_v / |p_u x p_v|`` of the surface ``p = p(u, v)``.
 
     ``p_u`` and ``p_v`` are the derivatives of ``p`` by ``u`` and ``v``. Where they are parallel, or
@@ -81,7 +82,7 @@ def parametric_normal(tangent_u, tangent_v):
     return unit_cross(tangent_u, tangent_v)
 
 
-def ellipsoid_point(u, v, a, b, c):
+def ellipsoid_point(u: Number, v: Number, a: Number, b: Number, c: Number) -> Position:
     """Equation 6.24: ``p = (a cos v cos u, b cos v sin u, c sin v)``.
 
     ``u`` is the longitude in ``[-pi, pi]`` and ``v`` the latitude in ``[-pi/2, pi/2]``, Dr.Jit
@@ -93,7 +94,9 @@ def ellipsoid_point(u, v, a, b, c):
     return _vector_type(u)(a * cos_v * cos_u, b * cos_v * sin_u, c * sin_v)
 
 
-def ellipsoid_tangents(u, v, a, b, c):
+def ellipsoid_tangents(
+    u: Number, v: Number, a: Number, b: Number, c: Number
+) -> tuple[Vector, Vector]:
     """Return the derivatives of 6.24 by ``u`` and ``v``, for :func:`parametric_normal`.
 
     ``p_u = (-a cos v sin u, b cos v cos u, 0)`` and ``p_v = (-a sin v cos u, -b sin v sin u, c cos
@@ -106,12 +109,12 @@ def ellipsoid_tangents(u, v, a, b, c):
     return tangent_u, vector(-a * sin_v * cos_u, -b * sin_v * sin_u, c * cos_v)
 
 
-def unit(vector):
+def unit(vector: Vector) -> Direction:
     """Return ``vector / |vector|``, and zero for zero, for lengths in the type's whole range."""
     return vectors.normalise(_scaled(vector))
 
 
-def unit_cross(a, b):
+def unit_cross(a: Vector, b: Vector) -> Direction:
     """Return ``a x b / |a x b|``, and zero where the two are parallel or one is zero."""
     a, b = _scaled(a), _scaled(b)
     product = cross(a, b)
@@ -120,7 +123,7 @@ def unit_cross(a, b):
     return vectors.normalise(dr.select(is_turned, product, type(a)(0)))
 
 
-def cross(a, b):
+def cross(a: Vector, b: Vector) -> Vector:
     """Return ``a x b`` such that ``b x a`` is its exact opposite.
 
     ``dr.cross`` fuses one product of each pair and rounds the other, so that two opposing faces
@@ -129,14 +132,14 @@ def cross(a, b):
     return type(a)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
-def scaled_edges(p0, p1, p2):
+def scaled_edges(p0: Position, p1: Position, p2: Position) -> tuple[tuple[Vector, ...], Number]:
     """Return the edges ``p1 - p0, p2 - p1, p0 - p2`` over their largest component, and that."""
     edges = (p1 - p0, p2 - p1, p0 - p2)
     largest = dr.maximum(_largest(edges[0]), dr.maximum(_largest(edges[1]), _largest(edges[2])))
     return tuple(_over(edge, largest) for edge in edges), largest
 
 
-def shorter_edges(a, b, c):
+def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
     """Return two of the three edges of a closed triangle, in order, leaving out the longest.
 
     Any two give the same cross product. In a needle the two long edges are nearly parallel, and

@@ -15,9 +15,11 @@ Three ideas carry the module:
 import sys
 from math import factorial, inf, log2, nan
 from numbers import Integral, Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
+
+from heuristic.arrays import Array, Cosines, Direction, Number, Vector
 
 LARGEST_LITERAL_EXPONENT = 64
 """Up to here an integer exponent is multiplied out: at most 11 products, and an error of
@@ -38,7 +40,7 @@ class Cosine(NamedTuple):
     supplement: object = None
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     """Return a number as a Python int or float, and a Dr.Jit float as it is; else None.
 
     NumPy's numbers and fractions are numbers, too; NaN comes of what is beyond all floats.
@@ -51,12 +53,12 @@ def plain(value):
     return float(value) if isinstance(value, Real) else None
 
 
-def is_moderate(n):
+def is_moderate(n: Number) -> bool:
     """Tell whether an exponent is a plain number within :data:`MODERATE_EXPONENTS`."""
-    return isinstance(n, Real) and MODERATE_EXPONENTS[0] <= n <= MODERATE_EXPONENTS[1]
+    return isinstance(n, Real) and MODERATE_EXPONENTS[0] <= float(n) <= MODERATE_EXPONENTS[1]
 
 
-def cosine_of_degrees(angle):
+def cosine_of_degrees(angle: Number) -> Cosine:
     """Return the :class:`Cosine` of an angle in degrees, a plain number or a Dr.Jit float.
 
     ``1 - c = 2 sin^2(a / 2)`` and ``1 + c = 2 cos^2(a / 2)``, accurate near 0 and near 180 degrees.
@@ -65,7 +67,7 @@ def cosine_of_degrees(angle):
     return Cosine(1 - 2 * sine * sine, 2 * sine * sine, 2 * cosine * cosine)
 
 
-def power(cosine, n):
+def power(cosine: Cosines, n: Number) -> Number:
     """Return ``c ** n`` where the cosine is positive, and 0 elsewhere, for ``n = 0`` too.
 
     Parameters
@@ -88,7 +90,7 @@ def power(cosine, n):
     return dr.select(lobe, exp2(n * log2_of(value, complement)), 0)
 
 
-def log2_of(value, complement):
+def log2_of(value: Any, complement: Number) -> Number:
     """Return ``log2(c)`` of a cosine in (0, 1] from ``c`` and ``1 - c``, each accurate in itself.
 
     Within two rounding steps relative to the result, also where ``c`` rounds to 1. In single
@@ -109,7 +111,7 @@ def log2_of(value, complement):
     return dr.select(is_same, -complement / _LN_2, logarithm)
 
 
-def exp2(x):
+def exp2(x: Number) -> Number:
     """Return ``2^x`` for ``x <= 0``, 0 where that is below the smallest normal float.
 
     Within two rounding steps. In single precision: ``2^i 2^f`` with a polynomial in
@@ -124,7 +126,7 @@ def exp2(x):
     return _polynomial(x - (shifted - _ROUNDER), _EXP2) * scale
 
 
-def one_less_exp2(x):
+def one_less_exp2(x: Number) -> Number:
     """Return ``1 - 2^-x`` for ``x >= 0``, accurate relative to the result where ``x`` is small.
 
     Below ``x = 1/2`` by the series of the exponential function, whose next term is under 1e-9 of
@@ -135,7 +137,7 @@ def one_less_exp2(x):
     return dr.select(x < 0.5, series, 1 - exp2(-x))
 
 
-def scaled(vector):
+def scaled(vector: Vector) -> tuple[Vector, Number, Number]:
     """Return a vector over a power of two near its length, that power's inverse, and its square.
 
     The square of what is returned lies between 1/8 and 8, or for lengths at the ends of the type's
@@ -147,12 +149,12 @@ def scaled(vector):
     return vector, inverse, dr.squared_norm(vector)
 
 
-def inverse_root(square):
+def inverse_root(square: Number) -> Number:
     """Return ``1 / sqrt(square)``, finite where ``square`` is 0."""
     return dr.rsqrt(at_least(square, smallest(square)))
 
 
-def inverse_length(square):
+def inverse_length(square: Number) -> Number:
     """Return ``1 / sqrt(square)``, and 0 where ``square`` is 0.
 
     A vector times that is a unit vector or zero, and so is its derivative at the zero vector, where
@@ -161,7 +163,7 @@ def inverse_length(square):
     return dr.select(square >= smallest(square), inverse_root(square), 0)
 
 
-def at_least(value, low):
+def at_least(value: Any, low: Number) -> Number:
     """Return the larger of two, and NaN for NaN.
 
     This form is one instruction; ``dr.maximum`` is four, because it tells -0 from 0.
@@ -169,37 +171,37 @@ def at_least(value, low):
     return dr.select(value < low, low, value)
 
 
-def at_most(value, high):
+def at_most(value: Any, high: Number) -> Number:
     """Return the smaller of two, and NaN for NaN."""
     return dr.select(value > high, high, value)
 
 
-def is_number(value, number):
+def is_number(value: Any, number: float) -> bool:
     """Tell whether a value is a plain number and that number; Dr.Jit arrays are not looked at."""
     return isinstance(value, Real) and value == number
 
 
-def epsilon(value):
+def epsilon(value: Any) -> float:
     """Return the rounding step at 1 of a value's type."""
     return 2 * dr.epsilon(value) if dr.is_array_v(value) else sys.float_info.epsilon
 
 
-def smallest(value):
+def smallest(value: Any) -> float:
     """Return the smallest normal float of a value's type."""
     return dr.smallest(value) if dr.is_array_v(value) else sys.float_info.min
 
 
-def largest(value):
+def largest(value: Any) -> float:
     """Return the largest float of a value's type."""
     return dr.largest(value) if dr.is_array_v(value) else sys.float_info.max
 
 
-def wide(value):
+def wide(value: Any) -> Array:
     """Return a Dr.Jit array of single precision in double precision; anything else as it is."""
     return dr.float64_array_t(type(value))(value) if dr.is_array_v(value) else value
 
 
-def wide_unit(vector):
+def wide_unit(vector: Vector) -> Direction:
     """Return a vector in double precision with length 1 to 1e-13, and zero for zero."""
     scaled_vector, _, square = scaled(vector)
     root = inverse_length(square)
@@ -209,7 +211,7 @@ def wide_unit(vector):
     return vector * refined_inverse(dr.squared_norm(vector), wide(root))
 
 
-def refined_inverse(square, estimate):
+def refined_inverse(square: Number, estimate: Number) -> Number:
     """Return ``1 / sqrt(square)`` in double precision, from an estimate that is right to 1e-7.
 
     One step of Newton: half the time of a root in double precision, and wrong by 1e-13.
@@ -217,7 +219,7 @@ def refined_inverse(square, estimate):
     return estimate * dr.fma(-0.5 * square * estimate, estimate, 1.5)
 
 
-def add(total, lost, term):
+def add(total: Array, lost: Array, term: Array) -> tuple[Array, Array]:
     """Return ``total + term``, and with ``lost`` added what the sum's rounding took away.
 
     The pair ``total, lost`` stands for ``total + lost`` (Neumaier). Start with ``0, 0``.
@@ -228,12 +230,12 @@ def add(total, lost, term):
     return result, lost + ((total - (result - back)) + (term - back))
 
 
-def summed(total, lost):
+def summed(total: Array, lost: Array) -> Array:
     """Return ``total + lost``; what was lost of a sum beyond the type's range is no number."""
     return total + dr.select(dr.isfinite(lost), lost, 0)
 
 
-def inverse_of_power(power_of_two):
+def inverse_of_power(power_of_two: Number) -> Number:
     """Return the inverse of a power of two, without a division."""
     if not _is_single(power_of_two):
         return 1 / power_of_two

@@ -55,7 +55,8 @@ class LightAtPoint:
     def visible(self) -> Array:
         """Return the mask of points that the light reaches, by a shadow ray, which is a need."""
         self._point.require("visible")
-        return self._point.given.visible(self.toward, self.distance)
+        ray: Any = self._point.given.visible  # there is one, since it was declared
+        return ray(self.toward, self.distance)
 
 
 def _input(read: Callable[["Point"], Any]) -> cached_property:

@@ -9,11 +9,20 @@ import drjit as dr
 import numpy as np
 
 from heuristic import arguments, colours, lobes, numerics, terms, vectors
+from heuristic.arrays import Array, Colour, Mask, Position, Vector
 from heuristic.light import Light
 from heuristic.materials import COEFFICIENTS, Material
 
 
-def shade(position, normal, view, material, lights, ambient=0, visible=None):
+def shade(
+    position: Position,
+    normal: Vector,
+    view: Vector,
+    material: Material,
+    lights: Sequence[Light],
+    ambient: Colour = 0,
+    visible: Callable[..., Mask] | None = None,
+) -> Colour:
     """Equations 8.10-8.12, 6.11-6.15: the sum of all terms over all lights.
 
     ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
@@ -165,11 +174,11 @@ def sum_lights(
     blocks = _blocks(lights, type(position)) if in_blocks else _portions(lights)
     lobe = lobes.lobe(material, normal, view) if has_specular else None
     normal = vectors.normalise(normal)
-    sums = {}
+    sums: dict[str, tuple[Array, Array]] = {}
     for block in blocks:
         if in_blocks and sums:
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
-        parts = {}
+        parts: dict[str, Array] = {}
         for light in block:
             arrival = light.illuminate(position)
             cos_incidence = dr.dot(normal, arrival.toward)
@@ -179,7 +188,7 @@ def sum_lights(
                 intensity = dr.select(seen, intensity, 0)
             if has_diffuse:
                 _add(parts, "diffuse", terms.diffuse(intensity, 1, cos_incidence))
-            if has_specular:
+            if lobe:
                 cosine = lobe(light, position, arrival.toward, cos_incidence)
                 _add(parts, "specular", terms.specular(intensity, 1, cosine, material.n))
         for name, part in parts.items():
@@ -225,7 +234,7 @@ def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
     dr.eval(buffer)
     place = iter(range(len(flat)))
 
-    def fetched(value: object) -> object:
+    def fetched(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(map(fetched, value))
         return dr.gather(type(buffer), buffer, next(place))

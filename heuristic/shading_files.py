@@ -35,7 +35,7 @@ def opened(word: str) -> Heuristic:
     InputError
         When there is no such file or function, or its code fails: by its line.
     """
-    file, function = in_file(word)
+    file, function = in_file(word) or (word, "")
     path, function = Path(file), function or FUNCTION
     key = word, path.resolve(), mi.variant()
     if key in _opened:

@@ -7,25 +7,27 @@ each wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The s
 the kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
 """
 
+from collections.abc import Sequence
 from numbers import Real
 
 import drjit as dr
 
 from heuristic import numerics
+from heuristic.arrays import Colour, Cosines, Number
 from heuristic.numerics import power
 
 
-def emission(k_i):
+def emission(k_i: Colour) -> Colour:
     """Equation 8.1: ``I = k_i``, independent of geometry and never attenuated."""
     return k_i
 
 
-def ambient(ambient_intensity, k_a):
+def ambient(ambient_intensity: Colour, k_a: Colour) -> Colour:
     """Equations 8.2, 6.5: ``I = I_a k_a``, independent of normal and viewer."""
     return ambient_intensity * k_a
 
 
-def diffuse(intensity, k_d, cos_incidence):
+def diffuse(intensity: Colour, k_d: Colour, cos_incidence: Number) -> Colour:
     """Equations 8.5, 8.6, 6.6, 6.7: ``I = I_p k_d (N.L)`` for ``N.L > 0``, otherwise 0.
 
     8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
@@ -41,7 +43,7 @@ def diffuse(intensity, k_d, cos_incidence):
     return intensity * k_d * numerics.at_least(cos_incidence, 0)
 
 
-def specular(intensity, k_s, cos_reflection, n):
+def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number) -> Colour:
     """Equations 8.8, 8.9, 6.8-6.10: ``I = I_p k_s (R.V)^n``.
 
     6.10 is the same for an ``intensity`` that is already attenuated. The limit of large ``n`` is
@@ -55,7 +57,7 @@ def specular(intensity, k_s, cos_reflection, n):
     return intensity * k_s * power(cos_reflection, n)
 
 
-def normalisation(form, n):
+def normalisation(form: str, n: Number) -> Number:
     """Return the factor on ``k_s`` that makes the lobe's albedo at normal incidence ``k_s``.
 
     With light along the normal, the lobes of 8.9 and of Blinn's ``(N.H)^n`` send back
@@ -68,12 +70,19 @@ def normalisation(form, n):
     6.0
     """
     if form == "blinn":
-        halves = 2 ** (-n / 2) if isinstance(n, Real) else dr.exp2(-n / 2)
+        halves = 2 ** (-float(n) / 2) if isinstance(n, Real) else dr.exp2(-n / 2)
         return (n + 2) * (n + 4) / (8 * (n + halves))
     return (n + 2) / 2
 
 
-def attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
+def attenuation(
+    distance: Number,
+    k0: Number,
+    k1: Number,
+    k2: Number,
+    intensity: Colour = 1,
+    inverse: Number | None = None,
+) -> Colour:
     """Equation 6.1: ``I = I_0 / (k0 + k1 d + k2 d^2)``: constant, linear and quadratic parts.
 
     Without an ``intensity`` it is ``f_att``; ``inverse`` is ``1 / d`` where the caller has it at
@@ -92,7 +101,7 @@ def attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
     return _representable(intensity * root * root)
 
 
-def is_tame(coefficients, intensity):
+def is_tame(coefficients: Sequence[Number], intensity: Colour) -> bool:
     """Tell whether :func:`tame_attenuation` will do: all are plain numbers of moderate size.
 
     With ``k0 >= 1e-30`` the denominator is never 0, and small products are lost beside it; with
@@ -106,12 +115,26 @@ def is_tame(coefficients, intensity):
     return 1e-30 <= k0 <= 1e30 and max(k1, k2) <= 1 and max(numbers[3:]) <= 4
 
 
-def tame_attenuation(distance, k0, k1, k2, intensity, inverse=None):
+def tame_attenuation(
+    distance: Number,
+    k0: Number,
+    k1: Number,
+    k2: Number,
+    intensity: Colour,
+    inverse: Number | None = None,
+) -> Colour:
     """Equation 6.1 as printed, where :func:`is_tame`: a quarter of the work of the general form."""
     return intensity * dr.rcp(dr.fma(distance, dr.fma(distance, k2, k1), k0))
 
 
-def clamped_attenuation(distance, c1, c2, c3, intensity=1, inverse=None):
+def clamped_attenuation(
+    distance: Number,
+    c1: Number,
+    c2: Number,
+    c3: Number,
+    intensity: Colour = 1,
+    inverse: Number | None = None,
+) -> Colour:
     """Text at 8.6: ``f_att = min(1 / (c1 + c2 d + c3 d^2), 1)``, so that ``0 <= f_att <= 1``.
 
     >>> [clamped_attenuation(distance, 0, 0, 1) for distance in (0.5, 2.0)]
@@ -121,7 +144,14 @@ def clamped_attenuation(distance, c1, c2, c3, intensity=1, inverse=None):
     return intensity * root * root
 
 
-def attenuation_root(distance, k0, k1, k2, inverse=None, at_zero=0):
+def attenuation_root(
+    distance: Number,
+    k0: Number,
+    k1: Number,
+    k2: Number,
+    inverse: Number | None = None,
+    at_zero: Number = 0,
+) -> Number:
     """Return ``1 / sqrt(k0 + k1 d + k2 d^2)``, and ``at_zero`` where the denominator is 0.
 
     Its product with an intensity, and that with it once more, stay between numbers that exist.
@@ -155,7 +185,7 @@ def _inverse_root(value, at_zero):
     return dr.select(is_positive, dr.rsqrt(dr.select(is_positive, value, 1)), at_zero)
 
 
-def spot_cone(cos_axis, cos_cutoff):
+def spot_cone(cos_axis: Cosines, cos_cutoff: Cosines) -> Number:
     """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it.
 
     Both are cosines, or both :class:`heuristic.numerics.Cosine` with supplement; these compare by
@@ -175,7 +205,7 @@ EDGE_STEPS = 8
 directions and cutoff."""
 
 
-def spot_falloff(cos_axis, m):
+def spot_falloff(cos_axis: Cosines, m: Number) -> Number:
     """Equation 6.4: ``(v_L.v_P)^m``, the factor by which the cone of 6.3 fades from its axis.
 
     0 from 90 degrees on, but for ``m = 0``, which does not fade at all: the even cone of 6.3.

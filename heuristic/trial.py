@@ -227,7 +227,7 @@ def _kind(value: Any) -> str:
     return "None" if value is None else f"a {kind}"
 
 
-def _advice(error: Exception) -> str:
+def _advice(error: BaseException) -> str:
     """Return what to do about the mistake that is made most: a branch on an array."""
     text = str(error)
     while error.__cause__ is not None:

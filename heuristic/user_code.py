@@ -48,11 +48,12 @@ def _place(error: BaseException) -> tuple[str, int] | None:
     """Return the innermost line of a user's that led to an error."""
     if isinstance(error, SyntaxError) and error.filename:
         return _shown(error.filename), error.lineno or 1
-    frames = traceback.extract_tb(_first(error).__traceback__) or []
-    frames = frames if any(map(_is_users, frames)) else traceback.extract_tb(error.__traceback__)
+    frames = traceback.extract_tb(_first(error).__traceback__)
+    if not any(map(_is_users, frames)):
+        frames = traceback.extract_tb(error.__traceback__)
     for frame in reversed(frames):
         if _is_users(frame):
-            return _shown(frame.filename), frame.lineno
+            return _shown(frame.filename), frame.lineno or 1
     return None
 
 

@@ -7,9 +7,10 @@ Lengths may have any size that the type has; those below its smallest normal flo
 import drjit as dr
 
 from heuristic import numerics
+from heuristic.arrays import Cosines, Direction, Number, Position, Vector
 
 
-def normalise(vector):
+def normalise(vector: Vector) -> Direction:
     """Return ``vector / |vector|``, and zero for the zero vector.
 
     A direction that does not exist then contributes nothing to a scalar product, instead of NaN.
@@ -18,7 +19,7 @@ def normalise(vector):
     return vector * numerics.inverse_length(square)
 
 
-def light_vector(light_position, position):
+def light_vector(light_position: Position, position: Position) -> tuple[Direction, Number]:
     """Equation 6.26: ``L = (P_L - P) / |P_L - P|``, with the distance ``d = |P_L - P|``.
 
     Returns ``(L, d)``. On the light itself (``d = 0``) the direction is undefined and ``L`` is
@@ -31,13 +32,13 @@ def light_vector(light_position, position):
     return half * inverse_length, numerics.at_most(distance, numerics.largest(distance))
 
 
-def inverse_distance(light_position, position):
+def inverse_distance(light_position: Position, position: Position) -> Number:
     """Return ``1 / d``; where ``d`` is 0 or too small to invert, a large number."""
     _, inverse, square = numerics.scaled(_half_offset(light_position, position))
     return numerics.inverse_root(square) * 0.5 * inverse
 
 
-def wide_light_vector(light_position, position):
+def wide_light_vector(light_position: Position, position: Position) -> tuple[Vector, Number]:
     """Return ``L`` of 6.26 in double precision as a vector and its inverse length, to 1e-13."""
     half = _half_offset(light_position, position)
     scaled, inverse, square = numerics.scaled(half)
@@ -55,12 +56,12 @@ def _half_offset(light_position, position):
     return dr.fma(position, -0.5, light_position * 0.5)
 
 
-def view_vector(viewer_position, position):
+def view_vector(viewer_position: Position, position: Position) -> Direction:
     """Equation 6.27: ``V = (P_V - P) / |P_V - P|``, and zero on the viewer itself."""
     return light_vector(viewer_position, position)[0]
 
 
-def mirror_vector(normal, direction, cosine):
+def mirror_vector(normal: Vector, direction: Direction, cosine: Cosines) -> Direction:
     """Equations 6.28-6.31: ``R = 2 (L.N) N - L``, the mirror image of ``L`` about ``N``.
 
     It follows from three demands on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and
@@ -71,7 +72,7 @@ def mirror_vector(normal, direction, cosine):
     return dr.fma(2 * cosine, normal, -direction)
 
 
-def chord_cosine(a, b):
+def chord_cosine(a: Direction, b: Direction) -> numerics.Cosine:
     """Return the :class:`heuristic.numerics.Cosine` of the angle between two unit vectors.
 
     ``1 - a.b = |a - b|^2 / 2`` and ``1 + a.b = |a + b|^2 / 2``: near 0 and near 180 degrees the

@@ -20,6 +20,7 @@ from enum import Enum
 
 import drjit as dr
 
+from heuristic.arrays import Array, Direction, Number, Position
 from heuristic.errors import InputError, unknown
 from heuristic.normals import cross, scaled_edges, shorter_edges, triangle_normal, unit
 
@@ -35,7 +36,9 @@ class Weighting(Enum):
     ANGLE = "angle"
 
 
-def vertex_normals(positions, faces, weighting=Weighting.ANGLE):
+def vertex_normals(
+    positions: Position, faces: Array, weighting: "str | Weighting" = Weighting.ANGLE
+) -> Direction:
     """Return the unit normal at each vertex, in a weighting or under its name (6.32-6.34).
 
     Weighting by angle is the default because it alone does not depend on how a flat part of the
@@ -55,22 +58,22 @@ def vertex_normals(positions, faces, weighting=Weighting.ANGLE):
     return _FUNCTIONS[weighting](positions, faces)
 
 
-def mean_normals(positions, faces):
+def mean_normals(positions: Position, faces: Array) -> Direction:
     """Equation 6.32: ``n = sum_i n_i / |sum_i n_i|``, the mean of the faces' normals."""
     return _weighted(positions, faces, lambda *corners: (1, 1, 1))
 
 
-def area_weighted_normals(positions, faces):
+def area_weighted_normals(positions: Position, faces: Array) -> Direction:
     """Equation 6.33: ``n = sum_i A_i n_i / |sum_i A_i n_i|``, with the faces' areas ``A_i``."""
     return _weighted(positions, faces, lambda *corners: (relative_areas(*corners),) * 3)
 
 
-def angle_weighted_normals(positions, faces):
+def angle_weighted_normals(positions: Position, faces: Array) -> Direction:
     """Equation 6.34: ``n = sum_i theta_i n_i / |...|``, with the faces' angles at the vertex."""
     return _weighted(positions, faces, corner_angles)
 
 
-def relative_areas(p0, p1, p2):
+def relative_areas(p0: Position, p1: Position, p2: Position) -> Number:
     """Return the areas of triangles, in units of twice the square of the largest edge component.
 
     The unit is common to all triangles, and keeps meshes of any size in the type's range.
@@ -81,7 +84,7 @@ def relative_areas(p0, p1, p2):
     return dr.norm(cross(*shorter_edges(*edges))) * dr.square(relative_size)
 
 
-def corner_angles(p0, p1, p2):
+def corner_angles(p0: Position, p1: Position, p2: Position) -> tuple[Number, Number, Number]:
     """Return the three angles of triangles, in radians: ``atan2(|a x b|, a.b)`` at each corner.
 
     The arc cosine of the scalar product would lose half the digits of small angles.

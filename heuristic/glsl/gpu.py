@@ -38,7 +38,7 @@ def device() -> Device:
         When moderngl, or a driver of OpenGL 4.3 that EGL finds, is missing.
     """
     pid, found = getattr(_kept, "device", (None, None))
-    if pid != os.getpid():  # a context does not outlive a fork
+    if found is None or pid != os.getpid():  # a context does not outlive a fork
         found = _opened()
         _kept.device = os.getpid(), found
     return found
@@ -53,7 +53,8 @@ def _opened() -> Device:
             " as by pip install 'fotismos[glsl]'."
         ) from error
     try:
-        context = moderngl.create_context(standalone=True, backend="egl", require=VERSION)
+        options: Any = {"backend": "egl"}  # moderngl's own annotation is of all options as one
+        context = moderngl.create_context(standalone=True, require=VERSION, **options)
     except Exception as error:  # of several kinds, by which library is missing
         raise InstallationError(
             f"there is no OpenGL {VERSION / 100:.1f} by EGL, and heuristics in GLSL need it:"

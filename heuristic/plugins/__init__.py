@@ -22,10 +22,10 @@ from heuristic import backend
 from heuristic.errors import InputError
 from heuristic.plugins import emitters, integrator, mapped, phong
 
-_registered = set()
+_registered: set[str] = set()
 
 
-def register():
+def register() -> None:
     """Make the plugins known to Mitsuba, for the current variant. Calling it again does nothing.
 
     Raises

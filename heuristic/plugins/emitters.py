@@ -37,6 +37,7 @@ emission and ambient light do not travel.
 """
 
 from dataclasses import fields
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -64,7 +65,7 @@ def define() -> None:
     }
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
-    def registered(plugin: type) -> type:
+    def registered(plugin: Any) -> Any:
         mi.register_emitter(plugin.model.plugin, plugin)
         return plugin
 
@@ -148,7 +149,7 @@ def define() -> None:
     class HeuristicPoint(HeuristicEmitter):
         """Equation 6.1, and both forms of attenuation of 8.6."""
 
-        model = PointLight
+        model: type[Light] = PointLight
 
         def __init__(self, props):
             super().__init__(props)
@@ -175,7 +176,7 @@ def define() -> None:
     class HeuristicSpot(HeuristicPoint):
         """Equations 6.2-6.4."""
 
-        model = SpotLight
+        model: type[Light] = SpotLight
 
         def sample_direction(self, it, sample, active=True):
             ds, weight = super().sample_direction(it, sample, active)

@@ -66,7 +66,7 @@ class _Known:
         return is_same and values == self.values
 
 
-def define():
+def define() -> None:
     """Create the classes for the current variant and register them under one name."""
 
     class HeuristicIntegrator(mi.SamplingIntegrator):

@@ -5,15 +5,18 @@ renders, and Mitsuba interpolates the stored values. Spectral variants draw othe
 each ray; there the heuristic runs at the corners of the face that a ray meets.
 """
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
+from heuristic.arrays import Position
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
 
 
-def interpolating(base):
+def interpolating(base: type) -> type:
     """Return the class for the current variant, made from that of the integrator ``heuristic``."""
 
     class InterpolatingIntegrator(base):
@@ -79,7 +82,7 @@ def _meshes(scene):
     return scene.shapes()
 
 
-def viewpoint(sensor):
+def viewpoint(sensor: Any) -> Position:
     """Return the viewer's position, refusing cameras that have none."""
     if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
         raise InputError(

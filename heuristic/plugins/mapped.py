@@ -68,14 +68,14 @@ OPERATIONS = {
 KINDS = (*OPERATIONS, "heuristic_interior")
 
 
-def define():
+def define() -> None:
     """Create the classes for the current variant and register them."""
     _define_tilt()
 
     class Mapped(mi.Texture):
         """See the module's docstring."""
 
-        operands = ()
+        operands: tuple[str, ...] = ()
 
         def __init__(self, props):
             super().__init__(props)

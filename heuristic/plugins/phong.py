@@ -46,7 +46,7 @@ SMALLEST_SAMPLE = 2.0**-25
 """In place of a random number of 0, which stands for all those below 2^-24."""
 
 
-def define():
+def define() -> None:
     """Create the class for the current variant and register it."""
 
     class PhongBSDF(mi.BSDF):

@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from heuristic import terms
+from heuristic.arrays import Array, Colour, Direction, Interaction, Mask, Scene
 from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
 
@@ -25,7 +26,9 @@ class SceneMaterials:
 
     DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
 
-    def __init__(self, scene, prune=True, form=None, physical=False):
+    def __init__(
+        self, scene: Scene, prune: bool = True, form: str | None = None, physical: bool = False
+    ):
         self.prune, self.form, self.physical = prune, form, physical
         self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
         for bsdf in self.bsdfs:
@@ -38,7 +41,7 @@ class SceneMaterials:
         numbers = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
         self.table = mi.UInt32(numbers)
 
-    def at(self, si, active):
+    def at(self, si: Interaction, active: Mask) -> list[tuple[Material, Mask]]:
         """Return the materials at a surface interaction, as pairs of a material and a mask.
 
         There is one pair for each form of the lobe that the scene has, since the form decides on
@@ -66,21 +69,21 @@ class SceneMaterials:
             for form in forms
         ]
 
-    def twosided(self, si, active):
+    def twosided(self, si: Interaction, active: Mask) -> bool | Mask:
         """Return whether the surface is two-sided; a plain value where all agree."""
         sides = [bsdf.twosided for bsdf in self.bsdfs]
         if len(set(sides)) <= 1:
             return any(sides)
         return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
 
-    def transmittance(self, si, active):
+    def transmittance(self, si: Interaction, active: Mask) -> Colour:
         """Return the share of light that passes straight through; a plain 0 where none can."""
         if not any(bsdf.is_clear for bsdf in self.bsdfs):
             return 0
         readers = [_transmittance_of(bsdf) for bsdf in self.bsdfs]
         return dr.select(active, self._switch(readers, si, active), 0)
 
-    def normal(self, si, active):
+    def normal(self, si: Interaction, active: Mask) -> Direction:
         """Return the shading normal in world space, bump and normal maps applied."""
         if not any(bsdf.tilt for bsdf in self.bsdfs):
             return mi.Vector3f(si.sh_frame.n)
@@ -92,7 +95,7 @@ class SceneMaterials:
             return readers[0](si, active)
         return dr.switch(self.index(si, active), readers, si, active)
 
-    def index(self, si, active):
+    def index(self, si: Interaction, active: Mask) -> Array:
         """Return the number in ``bsdfs`` of the material at a surface interaction."""
         bsdf = dr.reinterpret_array(mi.UInt32, si.bsdf())
         return dr.gather(mi.UInt32, self.table, bsdf, active)

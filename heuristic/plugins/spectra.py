@@ -1,6 +1,7 @@
 """Reading the spectra of plugin parameters, alike in all variants."""
 
 from numbers import Real
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -8,7 +9,7 @@ import mitsuba as mi
 from heuristic import colours
 
 
-def coefficient(props, name):
+def coefficient(props: Any, name: str) -> Any:
     """Read a reflection coefficient, 0 where it is not given.
 
     Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same
@@ -20,7 +21,7 @@ def coefficient(props, name):
     return props.get_texture(name, 0.0)
 
 
-def emitted(props, name, default):
+def emitted(props: Any, name: str, default: Any) -> Any:
     """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
 
     Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum out of nothing.
@@ -41,7 +42,7 @@ def _plain(props, name, default):
     return components
 
 
-def may_be_nonzero(texture):
+def may_be_nonzero(texture: Any) -> bool:
     """Tell whether a texture can be other than zero anywhere; one that cannot tell counts as so."""
     if texture.is_spatially_varying():
         return True

@@ -116,17 +116,17 @@ def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
         else:
             ends = shape.bbox().min, shape.bbox().max
             corners.append(np.array([np.ravel(end) for end in ends], float))
-    corners = np.concatenate(corners)
-    corners = corners[np.isfinite(corners).all(axis=1)]
-    if not len(corners):
+    points = np.concatenate(corners)
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
         return np.zeros(3), np.zeros(3)
-    return corners.min(axis=0), corners.max(axis=0)
+    return points.min(axis=0), points.max(axis=0)
 
 
 def light_map(scene: Any, light: Any, resolution: int) -> LightMap:
     """Trace the depth image of a lamp of the kernel."""
     low, high = box(scene)
-    radius = 0.5 * float(np.linalg.norm(high - low)) + np.finfo(np.float32).tiny
+    radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
     if isinstance(light, DirectionalLight):
         return _square(scene, light, resolution, (low + high) / 2, radius)
     return _cube(scene, light, resolution, LEAST * radius)
