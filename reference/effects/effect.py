@@ -73,6 +73,7 @@ class Effect:
             ruling = self.pruning.judge(facts)
             rule = "structural" if ruling.holds else "simulated"
             return Decision(self, not ruling.holds, rule, ruling.words)
+        assert self.rule, "an effect has a rule or a way to be pruned"
         called_for, evidence = self.rule(facts)
         rule = "simulated" if called_for and self.undecided else "structural"
         return Decision(self, bool(called_for), rule, evidence)

@@ -136,7 +136,7 @@ def _interface(plastic: RoughPlastic) -> Interface | None:
     # The plugin keeps both in single precision, which tells near an IOR of 1.
     alpha = float(np.float32(plastic.alpha))
     with np.errstate(all="ignore"):
-        eta = float(np.divide(*np.float32([plastic.int_ior, plastic.ext_ior])))
+        eta = float(np.float32(plastic.int_ior) / np.float32(plastic.ext_ior))
     is_known = (
         plastic.distribution in DISTRIBUTIONS
         and np.float32(SMALLEST_ALPHA) <= alpha <= ROUGHEST

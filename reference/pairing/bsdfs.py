@@ -2,14 +2,16 @@
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from typing import Any
 
 import mitsuba as mi
 
 from reference.pairing import albedo, factors
 from reference.pairing.factors import Convention, Phong
 from reference.pairing.nearest import WRAPPERS, nearest_of, simple
+from reference.pairing.nearest.material import Nearest
 from reference.scene import values
-from reference.scene.graph import properties
+from reference.scene.graph import Graph, properties
 
 BSDF = mi.ObjectType.BSDF
 COLOURS = {
@@ -41,7 +43,7 @@ class PairedBSDF:
     note: str = ""
 
 
-def give_default(graph):
+def give_default(graph: Graph) -> None:
     """Give shapes without a BSDF the one that Mitsuba gives them, so that it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
         if not graph.children(shape, BSDF) and not graph.children(shape, mi.ObjectType.Shape):
@@ -50,7 +52,7 @@ def give_default(graph):
             graph.attach(shape, "bsdf", graph.add(BSDF, default))
 
 
-def check(graph):
+def check(graph: Graph) -> None:
     """Refuse coefficients that are no reflectances.
 
     Raises
@@ -62,7 +64,7 @@ def check(graph):
         values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
 
 
-def to_heuristic(graph, convention):
+def to_heuristic(graph: Graph, convention: Convention) -> list[PairedBSDF]:
     """Replace the BSDFs of all shapes by the nearest ``phong`` (:mod:`reference.pairing.nearest`).
 
     Returns
@@ -72,7 +74,7 @@ def to_heuristic(graph, convention):
     """
     nodes = graph.nodes(BSDF)
     simple.prepare(graph, convention)
-    found = {}
+    found: dict[int, Nearest] = {}
     for shape in graph.nodes(mi.ObjectType.Shape):
         for _, index in graph.children(shape, BSDF):
             nearest_of(graph, index, convention, found)
@@ -94,7 +96,7 @@ def to_heuristic(graph, convention):
     return records
 
 
-def to_physical(graph, convention):
+def to_physical(graph: Graph, convention: Convention) -> list[PairedBSDF]:
     """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
     glossy = [
         phong(graph, index)
@@ -160,7 +162,7 @@ def _physical_properties(graph, index, convention):
     return props, record
 
 
-def physical_partner(graph, index, convention):
+def physical_partner(graph: Graph, index: int, convention: Convention) -> Any:
     """Return the properties of the physical BSDF that stands for a ``phong``."""
     props, _ = _physical_properties(graph, index, convention)
     return props
@@ -175,7 +177,7 @@ def _unreal(plastic):
     return f"no real plastic has the index {index:.3g}: theirs are {low:g} to {high:g}"
 
 
-def phong(graph, index):
+def phong(graph: Graph, index: int) -> Phong:
     """Read the parameters of a ``phong``, with the plugin's defaults.
 
     Raises

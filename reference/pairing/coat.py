@@ -157,7 +157,7 @@ def _rule_in(variant: str, size: int) -> Rule:
     """Return the :class:`Rule` in a variant, to which its arrays belong."""
     nodes, weights = legendre(size)
     half = size // 2
-    place = np.float32(nodes) * np.float32(0.5) + np.float32(0.5)
+    place: np.ndarray = np.asarray(nodes, np.float32) * np.float32(0.5) + np.float32(0.5)
     first, second = np.repeat(place, half), np.tile(place[half:], size)
     disc = mi.warp.square_to_uniform_disk_concentric(mi.Point2f(mi.Float(second), mi.Float(first)))
     found = Rule(

@@ -89,7 +89,7 @@ class Miss:
     reached: float
 
 
-def alpha_of(n, form="phong"):
+def alpha_of(n: float, form: str = "phong") -> float:
     """Return the roughness whose microfacet lobe is as wide as a lobe of exponent ``n``.
 
     At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
@@ -107,7 +107,7 @@ def alpha_of(n, form="phong"):
     return sqrt(2 / (n + 2)) if form == "blinn" else sqrt(1 / (2 * n + 1))
 
 
-def exponent_of(alpha, form="phong"):
+def exponent_of(alpha: float, form: str = "phong") -> float:
     """Return the inverse of :func:`alpha_of`; 0 from ``alpha = 1`` upwards.
 
     >>> round(exponent_of(0.2), 9)
@@ -116,7 +116,7 @@ def exponent_of(alpha, form="phong"):
     return max(2 / alpha**2 - 2 if form == "blinn" else (1 / alpha**2 - 1) / 2, 0.0)
 
 
-def specular_albedo(phong):
+def specular_albedo(phong: Phong) -> np.ndarray:
     """Return the albedo of a phong's lobe at normal incidence, for each channel.
 
     ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
@@ -130,7 +130,7 @@ def specular_albedo(phong):
     return np.asarray(phong.k_s) * scale
 
 
-def to_roughplastic(phong, convention):
+def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, list[Miss]]:
     """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses.
 
     In the current variant of Mitsuba, since its own plugin tells the albedo:
@@ -151,8 +151,8 @@ def to_roughplastic(phong, convention):
         prepare([phong], convention)
     white, wanted = _whites[phong], _wanted(phong)
     passed = albedo.of_roughplastic(white).diffuse
-    rho = np.minimum(wanted.diffuse / passed, 1)  # the diffuse albedo is linear in rho
-    plastic = replace(white, diffuse_reflectance=tuple(map(float, rho)))
+    red, green, blue = np.minimum(wanted.diffuse / passed, 1).tolist()  # it is linear in rho
+    plastic = replace(white, diffuse_reflectance=(red, green, blue))
     return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
 
 
@@ -176,7 +176,7 @@ def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
     keep(_whites, found)
 
 
-def to_phong(plastic, convention):
+def to_phong(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list[Miss]]:
     """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses.
 
     By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
@@ -192,7 +192,8 @@ def to_phong(plastic, convention):
     n = exponent_of(plastic.alpha)
     reflected = albedo.of_roughplastic(plastic)
     k_s = reflected.specular * normalisation("phong", n)
-    return Phong(tuple(map(float, reflected.diffuse)), tuple(map(float, k_s)), n), []
+    (red, green, blue), lobe = reflected.diffuse.tolist(), k_s.tolist()
+    return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n), []
 
 
 def _white(phong):

@@ -23,6 +23,7 @@ from reference.rendering.gbuffer import gbuffer
 from reference.scene import preparation
 from reference.scene.graph import Graph, properties
 from reference.scene.preparation import Overridden
+from reference.scene.source import Source
 
 BSDF, INTEGRATOR, SENSOR = (
     getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Sensor")
@@ -73,13 +74,13 @@ class Pair:
 
 
 def pair(
-    source,
-    convention=Convention.MATCHED,
-    resolution=None,
-    interpolation=Interpolation.PHONG,
-    tessellation=None,
-    prune=True,
-    sensor=0,
+    source: Source,
+    convention: Convention = Convention.MATCHED,
+    resolution: tuple[int, int] | None = None,
+    interpolation: Interpolation = Interpolation.PHONG,
+    tessellation: int | None = None,
+    prune: bool = True,
+    sensor: int = 0,
     heuristic: str = PHONG.name,
     with_partners: bool = False,
 ) -> Pair:

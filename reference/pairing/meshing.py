@@ -8,15 +8,18 @@ from tempfile import mkdtemp
 import mitsuba as mi
 
 from heuristic import meshes
+from heuristic.arrays import Scene
 from heuristic.errors import InputError, OutputError
 from heuristic.interpolation import Interpolation
 from heuristic.plugins.interpolated import viewpoint
-from reference.scene.graph import Reference, properties
+from reference.scene.graph import Graph, Reference, properties
 
 SHAPE = mi.ObjectType.Shape
 
 
-def replace_shapes(graph, scene, resolution, interpolation):
+def replace_shapes(
+    graph: Graph, scene: Scene, resolution: int | None, interpolation: Interpolation
+) -> None:
     """Replace every shape of a graph by a mesh of the same place, name, material and light.
 
     Parameters

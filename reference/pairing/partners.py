@@ -30,6 +30,7 @@ An interface of index 1 is none: it reflects nothing at normal incidence.
 
 from dataclasses import dataclass, fields
 from math import sqrt
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -52,12 +53,12 @@ LARGEST_IOR = 4.0
 class Partner:
     """The parameters of a physical material; values as of `nearest.operations`."""
 
-    base_color: object = 0.0
-    alpha: object = 1.0
-    ior: object = 1.0
-    metallic: object = 0.0
+    base_color: Any = 0.0
+    alpha: Any = 1.0
+    ior: Any = 1.0
+    metallic: Any = 0.0
 
-    def named(self) -> dict[str, object]:
+    def named(self) -> dict[str, Any]:
         """Return them by the names of the plugin ``phong``."""
         found = {each.name: getattr(self, each.name) for each in fields(self)}
         colour = found["base_color"]
@@ -96,7 +97,7 @@ def _wrapped(graph: Graph, index: int, plugin: str, inner: list[Partner]) -> Par
     if plugin == "twosided":
         return Partner(**{k: operations.sides(graph, *pair) for k, pair in pairs.items()})
     weight = graph.props(index).get("weight", 0.5)
-    return Partner(**{k: operations.blend(graph, *pair, weight) for k, pair in pairs.items()})
+    return Partner(**{k: operations.blend(graph, a, b, weight) for k, (a, b) in pairs.items()})
 
 
 def _of_phong(graph: Graph, index: int, convention: Convention) -> Partner:
@@ -118,7 +119,7 @@ def _plastic(context: Context, index: int) -> Partner:
 
 def _conductor(context: Context, index: int) -> Partner:
     tint = context.value(index, "specular_reflectance", 1.0)
-    white = probe.with_values(context, index, specular_reflectance=1.0)
+    white = probe.measured(context, index, specular_reflectance=1.0)
     base = operations.product(context.graph, white.reflected, tint)
     return Partner(base, _alpha(context, index), metallic=1.0)
 
@@ -150,14 +151,14 @@ def _measured(context: Context, index: int) -> Partner:
     return Partner(found.diffuse, min(max(found.alpha, SMALLEST_ALPHA), 1.0), ior)
 
 
-def _alpha(context: Context, index: int) -> object:
+def _alpha(context: Context, index: int) -> Any:
     """Return the roughness of a BSDF, that of a smooth one too."""
     rough = context.plugin(index).startswith("rough")
     along = context.value(index, "alpha_u", 0.1)
     return _at_least(context.value(index, "alpha", along if rough else 0.0))
 
 
-def _at_least(alpha: object) -> object:
+def _at_least(alpha: Any) -> Any:
     known = operations.plain(alpha)
     return alpha if known is None else max(known, SMALLEST_ALPHA)
 

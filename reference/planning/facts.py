@@ -7,6 +7,7 @@ there.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -98,7 +99,8 @@ def _lights(graph: Graph) -> Iterator[LightFacts]:
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
             continue
-        yield LightFacts(name, plugin, **lights.of(plugin).place(Given(graph, index)))
+        place: dict[str, Any] = lights.of(plugin).place(Given(graph, index))
+        yield LightFacts(name, plugin, **place)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ takes milliseconds per shape. The tests compare normals with those that Mitsuba'
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -114,7 +115,7 @@ class Meshes:
         """Return meshes of one size; where ``smooth``, they are shaded by normals at vertices."""
         count = len(meshes)
 
-        def read(buffers: Iterable[object], kind: type) -> np.ndarray:
+        def read(buffers: Iterable[Any], kind: type) -> np.ndarray:
             return np.array([np.array(buffer) for buffer in buffers], kind).reshape(count, -1, 3)
 
         points = read((mesh.vertex_positions_buffer() for mesh in meshes), float)

@@ -28,6 +28,7 @@ noise is left.
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mitsuba as mi
 
@@ -108,7 +109,12 @@ class Plan:
     @property
     def simulated(self) -> tuple:
         """What tells its integrator from that of another plan for the same scene."""
-        own = (self.shadows, self.bsdf_samples, self.tabulate_environment, self.light_samples)
+        own: tuple[Any, ...] = (
+            self.shadows,
+            self.bsdf_samples,
+            self.tabulate_environment,
+            self.light_samples,
+        )
         if self.integrator != "direct_all":
             own = (self.rr_depth,)
         return self.integrator, self.max_depth, *own
@@ -136,6 +142,7 @@ class Plan:
         omitted = [e for e in EFFECTS if e.without and e not in effects and self.calls_for(e)]
         plan = self.directly() if omitted else self
         for effect in omitted:
+            assert effect.without  # as was asked above
             plan = effect.without(plan)
         is_limited = self.calls_for(INTERREFLECTION) and INTERREFLECTION not in omitted
         if max_depth in (None, plan.max_depth) or not is_limited:

@@ -228,7 +228,8 @@ def _reach(low: np.ndarray, high: np.ndarray, least: np.ndarray, most: np.ndarra
 
 def _sorted(level: Level, numbers: np.ndarray) -> np.ndarray:
     """Return numbers of shapes along Morton's curve, but for meshes without faces."""
-    numbers = numbers[(level.low <= level.high).all(axis=1)[numbers]]
+    has_faces = np.all(level.low <= level.high, axis=1)
+    numbers = numbers[has_faces[numbers]]
     if not len(numbers):
         return numbers
     some = level.take(numbers)

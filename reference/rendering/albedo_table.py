@@ -1,11 +1,12 @@
 """Light of a constant environment without sampling: the albedo of a BSDF, tabulated."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Colour, Number
 from reference.pairing.nearest.probe import lattice
 
 NODES = 256
@@ -24,9 +25,9 @@ class AlbedoTable:
     on its back too does so as on its front.
     """
 
-    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
+    DRJIT_STRUCT: ClassVar = {"table": Any}  # what dr.freeze has to know of
 
-    def __init__(self, bsdf):
+    def __init__(self, bsdf: Any):
         self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         mu = np.linspace(1e-3, 1, NODES) ** 2
         grid_mu = mi.Float(np.repeat(mu, SAMPLES))
@@ -41,7 +42,7 @@ class AlbedoTable:
         self.table = dr.ravel(mi.Color3f(*means))
         dr.eval(self.table)
 
-    def at(self, mu):
+    def at(self, mu: Number) -> Colour:
         """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
         mu = abs(mu) if self.has_back else mu
         place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)

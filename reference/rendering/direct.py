@@ -28,17 +28,19 @@ Parameter           Type (default)      Meaning
 """
 
 from operator import is_
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from heuristic.arrays import Colour, Interaction, Mask, Scene
 from reference.rendering import light_sums
 from reference.rendering.light_choice import LightChoice
 
-_registered = set()
+_registered: set[str] = set()
 
 
-def register():
+def register() -> None:
     """Make the plugin known to Mitsuba, for the current variant. Calling it again does nothing."""
     if mi.variant() not in _registered:
         _define()
@@ -179,8 +181,16 @@ SURVIVAL = 0.95
 
 @dr.syntax
 def indirect_light(
-    scene, sampler, si, bsdf, max_depth, active, shadows=True, bsdf_samples=1, choice=None
-):
+    scene: Scene,
+    sampler: Any,
+    si: Interaction,
+    bsdf: Any,
+    max_depth: int,
+    active: Mask,
+    shadows: bool = True,
+    bsdf_samples: int = 1,
+    choice: LightChoice | None = None,
+) -> Colour:
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Paths begin with a sample of the BSDF there. The direct light takes every light in turn; this

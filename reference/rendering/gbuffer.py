@@ -1,11 +1,13 @@
 """What the camera sees of a scene's geometry."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Scene
 from heuristic.errors import InputError
 
 GRID = 192
@@ -28,7 +30,11 @@ class GBuffer:
     normal: np.ndarray
     hit: np.ndarray
 
-    def mean_irradiance(self, light_position, falloff):
+    def mean_irradiance(
+        self,
+        light_position: Sequence[float],
+        falloff: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    ) -> float:
         """Return the mean of ``(N.L)+ falloff(d, travel)`` over the surface, for a unit light.
 
         ``travel`` holds the unit vectors from the light to the surface, (M, 3).
@@ -60,12 +66,13 @@ def require_surface(hit: np.ndarray, name: str) -> None:
         )
 
 
-def image_size(scene):
+def image_size(scene: Scene) -> tuple[int, int]:
     """Return width and height of the images of a scene's first sensor: those of its film's crop."""
-    return tuple(int(side) for side in scene.sensors()[0].film().crop_size())
+    width, height = scene.sensors()[0].film().crop_size()
+    return int(width), int(height)
 
 
-def resize(scene, size):
+def resize(scene: Scene, size: tuple[int, int]) -> None:
     """Give the film of a scene's first sensor a width and height of the same shape."""
     if image_size(scene) != tuple(size):
         parameters = mi.traverse(scene.sensors()[0])
@@ -75,7 +82,7 @@ def resize(scene, size):
         parameters.update()
 
 
-def gbuffer(scene, width=GRID, height=GRID, sensor=0):
+def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0) -> GBuffer:
     """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     position = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))

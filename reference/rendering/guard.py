@@ -146,7 +146,8 @@ def examine_plan(
     integrators = [physical_integrator(p, scene, hide_emitters) for p in (plan, whole)]
     seeds = (pass_seed(seed, number, Stream.PROBE) for number in range(2**31))
     budget = int(min(max(FEWEST, SHARE * samples), MOST))
-    sizes, found = list(_looks(budget)), []
+    sizes = list(_looks(budget))
+    found: list[np.ndarray] = []
     for size in sizes:
         found.append(_followed(scene, integrators, size - sum(map(_width, found)), seeds))
         tally = _tally(found)

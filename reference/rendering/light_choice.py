@@ -10,10 +10,13 @@ gives is divided by ``N p_i``: its mean is the sum over all lights, as long as n
 uniform share ``u`` sees to that, and bounds what a light weighs that the points do not see.
 """
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Array, Mask, Number
 from reference.pairing.nearest.probe import lattice
 from reference.rendering.light_sums import sampled
 
@@ -58,16 +61,16 @@ class LightChoice:
         self._delta = mi.UInt32(np.array(are_delta, np.uint32))
         self._by_pointer = _by_pointer(lights, self.chances)
 
-    def pick(self, number, active):
+    def pick(self, number: Array, active: Mask) -> tuple[Array, Number]:
         """Return a light's number, and how often it is expected, for a random number."""
         index, chance = self.distribution.sample_pmf(number, active)
         return index, self.picks * chance
 
-    def is_delta(self, number, active):
+    def is_delta(self, number: Array, active: Mask) -> Mask:
         """Tell whether the light of a number is a point or direction."""
         return dr.gather(mi.UInt32, self._delta, number, active) > 0
 
-    def expected(self, emitter, active):
+    def expected(self, emitter: Any, active: Mask) -> Number:
         """Return how often a light is expected that a ray has met, 0 for any other."""
         place = dr.minimum(_number(emitter), len(self._by_pointer) - 1)
         return self.picks * dr.gather(mi.Float, self._by_pointer, place, active)

@@ -10,24 +10,48 @@ do, and ``shadows`` and ``bsdf_samples`` as :mod:`reference.rendering.direct`. `
 whether the lights are points or directions, which need no random number.
 """
 
+from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic import numerics
+from heuristic.arrays import Array, Colour, Direction, Interaction, Mask, Number, Position, Scene
 
 UNROLLED = 16
 """Lights of a list that are code of their own."""
 
 
-def of_one(light, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
+def of_one(
+    light: Any,
+    is_delta: bool,
+    scene: Scene,
+    si: Interaction,
+    bsdf: Any,
+    sampler: Any,
+    active: Mask,
+    shadows: bool,
+    bsdf_samples: int,
+) -> Colour:
     """Return what a light gives."""
     drawn = _sampled(light, si, _numbers(sampler, is_delta, active), active)
     return _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples)
 
 
-def of_many(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples, choice=None):
+def of_many(
+    lights: Sequence[Any],
+    is_delta: bool,
+    scene: Scene,
+    si: Interaction,
+    bsdf: Any,
+    sampler: Any,
+    active: Mask,
+    shadows: bool,
+    bsdf_samples: int,
+    choice: Any = None,
+) -> Colour:
     """Return what a list of lights gives.
 
     ``choice`` picks some of them (:class:`reference.rendering.light_choice.LightChoice`); without
@@ -37,7 +61,9 @@ def of_many(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_sa
     return _each(lights, *given) if choice is None else _picked(choice, *given)
 
 
-def sampled(lights, number, si, sample, active):
+def sampled(
+    lights: Sequence[Any], number: Array, si: Interaction, sample: Array, active: Mask
+) -> tuple[Position, Direction, Number, Colour]:
     """Sample the direction to lights by their numbers: point, direction, density and weight.
 
     Through the emitters' pointers Dr.Jit would trace every emitter that is alive, those of the
@@ -46,7 +72,14 @@ def sampled(lights, number, si, sample, active):
     return dr.switch(number, [partial(_sampled, light) for light in lights], si, sample, active)
 
 
-def any_one(scene, si, sample, shadows, active, choice=None):
+def any_one(
+    scene: Scene,
+    si: Interaction,
+    sample: Array,
+    shadows: bool,
+    active: Mask,
+    choice: Any = None,
+) -> tuple[Direction, Number, Mask, Colour]:
     """Sample the direction to one light of the scene: direction, density, whether it is a delta.
 
     The fourth is the weight. Without a ``choice`` Mitsuba picks the light, most often evenly.
@@ -62,7 +95,9 @@ def any_one(scene, si, sample, shadows, active, choice=None):
     return direction, found * chance, choice.is_delta(number, active), weight / chance
 
 
-def density(scene, reference, ds, active, choice=None):
+def density(
+    scene: Scene, reference: Interaction, ds: Any, active: Mask, choice: Any = None
+) -> Number:
     """Return the density of :func:`any_one` for a direction in which a ray met a light."""
     if choice is None:
         return scene.pdf_emitter_direction(reference, ds, active)

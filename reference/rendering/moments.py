@@ -5,13 +5,15 @@ pixel looks darker and surer than it is. The third moment of the passes tells ho
 contributions are, and means of groups of passes tell how any number made of the image scatters.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.rendering.sums import Accumulator, Estimate, flattened, values
+from reference.rendering.sums import Accumulator, Estimate, Mean, flattened, values
 
 GROUPS = 8
 """Of passes, at most: seven degrees of freedom for an interval."""
@@ -48,7 +50,7 @@ class Grouped:
     sampled: int
     total: int
 
-    def by_block(self, values):
+    def by_block(self, values: np.ndarray) -> np.ndarray:
         """Return the sums (B, ...) over the sampled blocks of values (P, ...) of the pixels."""
         sums = np.zeros((self.sampled, *values.shape[1:]))
         np.add.at(sums, self.blocks, values)
@@ -83,16 +85,16 @@ class DifferenceSums(Accumulator):
         As for :class:`reference.rendering.sums.Mean`.
     """
 
-    SUMS = (*Accumulator.SUMS, "cubes")
+    SUMS: tuple[str, ...] = (*Accumulator.SUMS, "cubes")
 
-    def __init__(self, counted, compact=False):
+    def __init__(self, counted: np.ndarray, compact: bool = False):
         super().__init__(compact)
         self._sample = sample(counted)
         flat = 3 * self._sample[0][:, None] + np.arange(3)
         self._index = mi.UInt32(flat.ravel().astype(np.uint32))
         self._groups = np.zeros((GROUPS, flat.size))
 
-    def add(self, image, less=None):
+    def add(self, image: Any, less: Any = None) -> None:
         """Add a pass: a tensor (H, W, 3), less another one if that is given."""
         super().add(image, less)
         if self._index.shape[0]:
@@ -108,20 +110,20 @@ class DifferenceSums(Accumulator):
         sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
         super()._step(sums, image)
 
-    def state(self):
+    def state(self) -> dict[str, Callable[..., np.ndarray]]:
         """Return functions that make the array of each sum, for :meth:`restore`."""
         return super().state() | {"groups": self._groups.copy}
 
-    def shapes(self, size):
+    def shapes(self, size: tuple[int, int]) -> dict[str, tuple[int, ...]]:
         """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
         return super().shapes(size) | {"groups": self._groups.shape}
 
-    def restore(self, state):
+    def restore(self, state: dict[str, Any]) -> None:
         """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
         super().restore(state)
         self._groups = np.array(state["groups"])
 
-    def estimate(self, dtype=float, last=False):
+    def estimate(self, dtype: type = float, last: bool = False) -> DifferenceEstimate:
         """Return what the passes so far say, as the base does; the third cumulant in doubles."""
         third, n = self._array("cubes", float, last), self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, that of the mean 1/n² of it.
@@ -154,11 +156,11 @@ class SumsOfHalves(DifferenceSums):
 
     SUMS = tuple(name for name in DifferenceSums.SUMS if name != "mean")
 
-    def __init__(self, counted, halves, compact=False):
+    def __init__(self, counted: np.ndarray, halves: tuple[Mean, Mean], compact: bool = False):
         super().__init__(counted, compact)
         self._halves = halves
 
-    def mean(self, dtype=float, last=False):
+    def mean(self, dtype: type = float, last: bool = False) -> np.ndarray:
         """Return the mean of the passes so far; with ``last`` too, the halves keep theirs."""
         test, reference = self._halves
         found = test.mean()
@@ -174,14 +176,14 @@ class SumsOfHalves(DifferenceSums):
         return super()._sums(number, size) | {"mean": mean}
 
 
-def block_numbers(counted):
+def block_numbers(counted: np.ndarray) -> np.ndarray:
     """Return the number of the block of each counted pixel, (N,), in reading order."""
     rows, columns = np.nonzero(counted)
     across = -(-counted.shape[1] // BLOCK)
     return rows // BLOCK * across + columns // BLOCK
 
 
-def sample(counted):
+def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Draw blocks that hold counted pixels; the same ones for the same image.
 
     Returns

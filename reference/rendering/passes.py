@@ -7,6 +7,7 @@ their camera rays are the same, and pixel filter and edges cancel in a differenc
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def passes(
 
 def _images(renderers: Sequence[Renderer], seed: int) -> tuple:
     """Render one pass, those of one variant together: a change takes as long as a small image."""
-    images: dict[int, object] = {}
+    images: dict[int, Any] = {}
     for name in dict.fromkeys(renderer.variant for renderer in renderers):
         with variant(name):
             for place, renderer in enumerate(renderers):

@@ -7,16 +7,20 @@ so that every standard error here comes from the spread of passes.
 """
 
 import gc
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Scene
 from heuristic.errors import FotismosError, InputError, NonFiniteError
+from reference.planning.plan import Plan
 from reference.rendering import direct
 from reference.rendering.albedo_table import AlbedoTable
 from reference.rendering.gbuffer import image_size, resize
@@ -73,21 +77,28 @@ class Renderer:
         For more samples than :data:`LARGEST_PASS` in a pass, when it is rendered.
     """
 
-    def __init__(self, scene, integrator, spp, label, size=None):
+    def __init__(
+        self,
+        scene: Scene,
+        integrator: Any,
+        spp: int,
+        label: str,
+        size: tuple[int, int] | None = None,
+    ):
         self.scene = scene
         self.integrator = integrator or scene.integrator()
         self.spp = spp
         shading = getattr(self.integrator, "model", None)  # of the integrator `heuristic` alone
         self._is_users = shading is not None and not shading.is_own
-        self.label = f"{label} ({shading.name})" if self._is_users else label
+        self.label = f"{label} ({shading.name})" if shading and self._is_users else label
         self.size = size
         self.variant = mi.variant()
-        self.times = []
+        self.times: list[float] = []
         self.compilation = 0.0
         # Of a user's own code nobody knows whether it can be recorded: NumPy ends the process.
         self._replayed = None if self._is_users else dr.freeze(_rendered)
 
-    def render(self, seed):
+    def render(self, seed: int) -> Any:
         """Render one pass and return it as a tensor (H, W, 3), noting the time.
 
         Raises
@@ -130,7 +141,7 @@ class Renderer:
         return image
 
     @property
-    def replays(self):
+    def replays(self) -> bool:
         """See the class."""
         return self._replayed is not None
 
@@ -166,7 +177,7 @@ class Renderer:
                 " smaller image with --resolution."
             )
 
-    def pass_times(self):
+    def pass_times(self) -> PassTimes:
         """Return the :class:`PassTimes` of the passes so far."""
         steady = self.times[1:] or self.times
         return PassTimes(
@@ -179,7 +190,7 @@ class Renderer:
 
 
 @contextmanager
-def variant(name):
+def variant(name: str) -> Iterator[None]:
     """Switch to a Mitsuba variant for the block, if it is not the current one already."""
     if name == mi.variant():
         yield
@@ -188,7 +199,7 @@ def variant(name):
         yield
 
 
-def physical_integrator(plan, scene, hide_emitters):
+def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
     """Make the integrator that a plan names, for the physical half's scene."""
     direct.register()
     description = {"type": plan.integrator, "hide_emitters": hide_emitters}
@@ -229,7 +240,7 @@ def _chain(error):
         error = error.__cause__ or error.__context__
 
 
-def require_finite(image, layer):
+def require_finite(image: np.ndarray, layer: str) -> None:
     """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity.
 
     The message names the layer, how many pixels are concerned and the first one as (x, y), counted
@@ -243,7 +254,7 @@ def require_finite(image, layer):
         )
 
 
-def require_light(image, layer):
+def require_light(image: np.ndarray, layer: str) -> None:
     """Raise `InputError` if an image holds a value that is negative by more than rounding."""
     right = image >= -ROUNDING
     if not right.all():

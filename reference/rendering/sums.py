@@ -3,13 +3,17 @@
 Every standard error here comes from the spread of passes, which are independent.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import prod
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+from heuristic.arrays import Array
 
 POWERS = {"signed": 1, "squares": 2, "cubes": 3}
 ROOTS = {1: lambda value: value, 2: dr.sqrt, 3: dr.cbrt}
@@ -52,15 +56,15 @@ class Mean:
         their range is that of the images. Each pass adds less than 2e-7 of a sum to its error.
     """
 
-    SUMS = ("mean",)
+    SUMS: tuple[str, ...] = ("mean",)
 
-    def __init__(self, compact=False):
+    def __init__(self, compact: bool = False):
         self.count = 0
         self._compact = compact
         self._shape = ()
-        self._parts = []
+        self._parts: list[dict[str, Array]] = []
 
-    def add(self, image, less=None):
+    def add(self, image: Any, less: Any = None) -> None:
         """Add a pass: a tensor (H, W, 3), less another one if that is given."""
         flat = flattened(image, less)
         if self.count == 0:
@@ -78,24 +82,24 @@ class Mean:
             del sums
             dr.eval(kept)
 
-    def mean(self, dtype=float, last=False):
+    def mean(self, dtype: type = float, last: bool = False) -> np.ndarray:
         """Return the mean of the passes so far, as :meth:`Accumulator.estimate` does."""
         return self._array("mean", dtype, last)
 
-    def part(self, name, number):
+    def part(self, name: str, number: int) -> Array:
         """Return a part of a sum."""
         return self._unpacked(name, self._parts[number][name])
 
-    def state(self):
+    def state(self) -> dict[str, Callable[..., np.ndarray]]:
         """Return functions that make the array of each sum, for :meth:`restore`."""
         sums = {name: partial(self._array, name) for name in self.SUMS}
         return {"count": lambda: np.array(self.count)} | sums
 
-    def shapes(self, size):
+    def shapes(self, size: tuple[int, int]) -> dict[str, tuple[int, ...]]:
         """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
         return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
 
-    def restore(self, state):
+    def restore(self, state: dict[str, Any]) -> None:
         """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
         self.count = int(state["count"])
         self._shape = state[self.SUMS[0]].shape
@@ -144,9 +148,9 @@ class Mean:
 class Deviations(Mean):
     """The running mean of passes, and how far they are from it."""
 
-    SUMS = ("mean", "squares")
+    SUMS: tuple[str, ...] = ("mean", "squares")
 
-    def standard_error(self, dtype=float, last=False):
+    def standard_error(self, dtype: type = float, last: bool = False) -> np.ndarray:
         """Return the standard error of the mean, as :meth:`Accumulator.estimate` does."""
         error = self._array("squares", float, last)
         error /= max(self.count - 1, 1) * self.count
@@ -162,7 +166,7 @@ class Deviations(Mean):
 class Accumulator(Deviations):
     """Running sums of passes, for an :class:`Estimate`."""
 
-    SUMS = (*Deviations.SUMS, "signed")
+    SUMS: tuple[str, ...] = (*Deviations.SUMS, "signed")
 
     def _step(self, sums, image):
         super()._step(sums, image)
@@ -170,13 +174,13 @@ class Accumulator(Deviations):
         image = mi.Float64(mi.Float32(image)) if self._compact else image
         sums["signed"] += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
 
-    def noise(self, dtype=float, last=False):
+    def noise(self, dtype: type = float, last: bool = False) -> np.ndarray:
         """Return the noise image of :class:`Estimate`; the number of passes should be even."""
         noise = self._array("signed", dtype, last)
         noise /= self.count
         return noise
 
-    def estimate(self, dtype=float, last=False):
+    def estimate(self, dtype: type = float, last: bool = False) -> Estimate:
         """Return what the passes so far say; their number should be even and at least 2.
 
         Parameters
@@ -190,19 +194,19 @@ class Accumulator(Deviations):
         return Estimate(self.mean(dtype, last), error, noise, self.count)
 
 
-def flattened(image, less=None):
+def flattened(image: Any, less: Any = None) -> Any:
     """Return the values of one tensor or array (H, W, 3) or two as Dr.Jit arrays."""
     given = [one for one in (image, less) if one is not None]
     return [(one if dr.is_tensor_v(one) else mi.TensorXd(one)).array for one in given]
 
 
-def values(images, places):
+def values(images: Any, places: Array) -> Array:
     """Return some values of the first flat image in doubles, less those of a second one."""
     found = [mi.Float64(dr.gather(type(image), image, places)) for image in images]
     return found[0] - found[1] if len(found) == 2 else found[0]
 
 
-def add_difference(sums, images):
+def add_difference(sums: Any, images: Any) -> None:
     """Add the images of both halves, and their difference, to three sums."""
     heuristic, reference = images
     # First, since it may build on the means of the passes before.

@@ -8,6 +8,7 @@ transforms against :func:`_transform`, and every number has to be one that singl
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -129,7 +130,7 @@ def _refusal(graph: Graph, index: int, objection: str) -> InputError:
     return InputError(f"{graph.name}: {graph.label(index)}: {objection}")
 
 
-def _objections(plugin: str, key: str, value: object) -> Iterator[str]:
+def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
     """Yield what would be allowed in place of a value that is not."""
     if isinstance(value, bool):
         return
@@ -146,7 +147,7 @@ def _objections(plugin: str, key: str, value: object) -> Iterator[str]:
         yield f"finite numbers of at most {LARGEST:.2g}"
 
 
-def _numbers(key: str, value: object) -> np.ndarray | None:
+def _numbers(key: str, value: Any) -> np.ndarray | None:
     """Return the numbers that a value has, (n,); None for what has none."""
     if isinstance(value, Real):
         return np.array([float(value)])
@@ -161,7 +162,7 @@ def _numbers(key: str, value: object) -> np.ndarray | None:
     return values if values.dtype.kind in "iuf" else None
 
 
-def _is_transform(value: object) -> bool:
+def _is_transform(value: Any) -> bool:
     """Tell whether a value is a transform; vectors, too, have something called a matrix."""
     return "Transform" in type(value).__name__
 
@@ -237,7 +238,7 @@ def _crop(props: mi.Properties) -> Iterator[str]:
             )
 
 
-def _shown(value: object) -> str:
+def _shown(value: Any) -> str:
     if _is_transform(value):
         rows = np.array(value.matrix, float)
         return "[" + "; ".join(" ".join(f"{number:g}" for number in row) for row in rows) + "]"

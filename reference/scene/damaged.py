@@ -15,7 +15,7 @@ import struct
 from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import mitsuba as mi
 import numpy as np
@@ -136,7 +136,7 @@ def _fault_of_ply(path: str, number: int, stamp: tuple) -> str:
 
 def _head_of_ply(file: BinaryIO) -> tuple[bytes, list[tuple[bytes, int, list[list[bytes]]]]]:
     """Return the format, and name, number and properties of each element."""
-    form, elements = b"", []
+    form, elements = b"", list[Any]()
     for line in file:
         words = line.split()
         if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():

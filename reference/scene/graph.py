@@ -4,8 +4,10 @@ Both halves of a pair are derived from one such graph. It comes from an XML file
 dictionary, and knows the file and line of each node, which is what error messages name.
 """
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -30,7 +32,7 @@ KINDS_OF_OWN_PLUGINS |= dict.fromkeys(light.PLUGINS, mi.ObjectType.Emitter)
 KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
 
 
-def set_variant(variant):
+def set_variant(variant: str) -> None:
     """Switch Mitsuba to one of the variants that fotismos supports.
 
     Raises
@@ -50,15 +52,15 @@ class Graph:
     A node is named by its index. Nodes are only ever added or replaced, so that indices stay valid.
     """
 
-    def __init__(self, name, config, state):
+    def __init__(self, name: str, config: Any, state: Any):
         self.name = name
         self.config = config
         self.state = state
-        self.folders = []  # temporary ones with files that nodes refer to
-        self.kinds = {}  # of plugins written in Python
+        self.folders: list[Any] = []  # temporary ones with files that nodes refer to
+        self.kinds: dict[str, Any] = {}  # of plugins written in Python
         self.resolver = None  # where relative names of files begin, if not as Mitsuba has it
 
-    def copy(self):
+    def copy(self) -> "Graph":
         """Return a graph that can be edited apart from this one."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
@@ -86,7 +88,7 @@ class Graph:
                     node.props[key] = Reference(places[value.index()])
         return part
 
-    def instantiate(self, index=0):
+    def instantiate(self, index: int = 0) -> Any:
         """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
 
         Raises
@@ -149,11 +151,11 @@ class Graph:
                     " Give it a finite size and place, its transforms and files included."
                 )
 
-    def nodes(self, kind):
+    def nodes(self, kind: Any) -> list[int]:
         """Return the indices of the nodes of a kind (``mitsuba.ObjectType``) that are in use."""
         return [index for index in self.nodes_in_use() if self.kind(index) == kind]
 
-    def kind(self, index):
+    def kind(self, index: int) -> Any:
         """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
         kind = self.state.nodes[index].type
         if kind != mi.ObjectType.Unknown:
@@ -171,24 +173,24 @@ class Graph:
                 return getattr(mi.ObjectType, kind)
         return mi.ObjectType.Unknown
 
-    def plugin(self, index):
+    def plugin(self, index: int) -> str:
         """Return the name of a node's plugin."""
         return self.props(index).plugin_name()
 
-    def props(self, index):
+    def props(self, index: int) -> Any:
         """Return a node's properties. They are its own: changing them changes the graph."""
         return self.state.nodes[index].props
 
-    def label(self, index):
+    def label(self, index: int) -> str:
         """Return a short name of a node for records and messages: its id, or else its place."""
         identifier = self.props(index).id()
         return identifier or f"{self.plugin(index)} at {self.location(index)}"
 
-    def location(self, index):
+    def location(self, index: int) -> str:
         """Return where a node was written, as a person would look it up."""
         return Parser.file_location(self.state, self.state.nodes[index])
 
-    def file(self, index):
+    def file(self, index: int) -> Path | None:
         """Return the path of the file that a node reads; None where it reads none, or a lost one.
 
         It is where Mitsuba finds it.
@@ -204,7 +206,7 @@ class Graph:
         except OSError:  # a name that is too long
             return None
 
-    def children(self, index, kind):
+    def children(self, index: int, kind: Any) -> list[tuple[str, int]]:
         """Return ``(key, index)`` for the children of a node that are of a kind."""
         return [
             (key, value.index())
@@ -212,35 +214,35 @@ class Graph:
             if isinstance(value, Reference) and self.kind(value.index()) == kind
         ]
 
-    def add(self, kind, props):
+    def add(self, kind: Any, props: Any) -> int:
         """Add a node, and return its index."""
         node = Parser.SceneNode()
         node.type, node.props = kind, props
         self.state.nodes.append(node)
         return len(self.state.nodes) - 1
 
-    def attach(self, parent, key, child):
+    def attach(self, parent: int, key: str, child: int) -> None:
         """Make a node the child of another, in place of what was under that key."""
         self.props(parent)[key] = Reference(child)
 
-    def detach(self, parent, key):
+    def detach(self, parent: int, key: str) -> None:
         """Take a child away."""
         del self.props(parent)[key]
 
-    def remove(self, index):
+    def remove(self, index: int) -> None:
         """Take a node out of its parent, the scene."""
         for key, value in list(self.props(0).items()):
             if isinstance(value, Reference) and value.index() == index:
                 self.detach(0, key)
 
-    def replace(self, index, props):
+    def replace(self, index: int, props: Any) -> None:
         """Give a node other properties; its id stays."""
         props.set_id(self.props(index).id())
         node = Parser.SceneNode(self.state.nodes[index])
         node.type, node.props = self.kind(index), props
         self.state.nodes[index] = node
 
-    def nodes_in_use(self, root=0):
+    def nodes_in_use(self, root: int = 0) -> list[int]:
         """Return the indices of all nodes that the scene, or another, refers to, and its own."""
         seen, queue = set(), [root]
         while queue:
@@ -254,7 +256,7 @@ class Graph:
         return sorted(seen)
 
 
-def files_from(folder):
+def files_from(folder: Path) -> Any:
     """Return what looks for files in a scene's own folder first, as Mitsuba's own command does."""
     widened = mi.FileResolver(mi.file_resolver())
     widened.prepend(str(folder))
@@ -262,7 +264,7 @@ def files_from(folder):
 
 
 @contextmanager
-def resolving(resolver):
+def resolving(resolver: Any) -> Iterator[None]:
     """Let Mitsuba look for files with a resolver, to which a ``<path>`` in a scene adds places."""
     if resolver is None:
         yield
@@ -290,7 +292,7 @@ def _message(error):
     return f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
 
 
-def properties(plugin, **values):
+def properties(plugin: str, **values: Any) -> Any:
     """Make the properties of a node."""
     props = mi.Properties(plugin)
     for key, value in values.items():

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -43,7 +44,7 @@ def digest(source: Source) -> str:
     return found.hexdigest()
 
 
-def _parts(value: object) -> Iterator[bytes]:
+def _parts(value: Any) -> Iterator[bytes]:
     """Yield a property's value as bytes; printed, floats are rounded and arrays shortened."""
     if value is None or isinstance(value, (bool, int, float, str)):
         yield repr(value).encode("utf-8", "surrogateescape")

@@ -17,7 +17,7 @@ import mitsuba as mi
 class _Listener(mi.Appender):
     """Mitsuba's messages, one call each; progress is shown by commands themselves."""
 
-    def __init__(self, hear: Callable[[str], object]) -> None:
+    def __init__(self, hear: Callable[[str], Any]) -> None:
         super().__init__()
         self._hear = hear
 
@@ -35,7 +35,7 @@ class _Plain(mi.Formatter):
         return told[-1]
 
 
-def divert(hear: Callable[[str], object]) -> None:
+def divert(hear: Callable[[str], Any]) -> None:
     """Send what Mitsuba says from now on to ``hear``, a line or more at a time."""
     logger = mi.logger()
     logger.clear_appenders()

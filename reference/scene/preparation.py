@@ -1,13 +1,14 @@
 """What both halves of a pair need of a scene: its sensor, film, integrator, ids and BSDFs."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import mitsuba as mi
 
 from heuristic.errors import InputError
 from reference.pairing import bsdfs, lights
 from reference.scene import allowed, damaged, reading
-from reference.scene.graph import Reference, properties
+from reference.scene.graph import Graph, Reference, properties
 
 FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
     getattr(mi.ObjectType, kind)
@@ -41,7 +42,7 @@ class Settings:
     """
 
     integrator: str | None = None
-    ambient: object = None
+    ambient: Any = None
     hide_emitters: bool = False
     max_depth: int = -1
     rr_depth: int | None = None
@@ -49,7 +50,7 @@ class Settings:
     overridden: list[Overridden] = field(default_factory=list)
 
 
-def prepare(graph, resolution, sensor=0):
+def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:
     """Check the graph, fill in what both halves need, and return its :class:`Settings`.
 
     Of several sensors one is kept, by its number among those of the Mitsuba scene. The integrator
@@ -65,14 +66,14 @@ def prepare(graph, resolution, sensor=0):
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")
-    overridden = []
+    overridden: list[Overridden] = []
     kept = keep_sensor(graph, sensor)
     _prepare_film(graph, kept, resolution, overridden)
     _note_sampler(graph, kept, overridden)
     return _take_integrator(graph, overridden)
 
 
-def media(graph):
+def media(graph: Graph) -> list[int]:
     """Return the nodes of participating media."""
     return graph.nodes(MEDIUM)
 
@@ -86,7 +87,7 @@ def _open_merged(graph):
             graph.remove(index)
 
 
-def film_size(graph, sensor=0):
+def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
     """Return the width and height that the film of a sensor is given."""
     films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
     for _, film in films:
@@ -96,11 +97,11 @@ def film_size(graph, sensor=0):
 
 def _size(film):
     """Return a film's width and height, or what Mitsuba takes where they are not given."""
-    sides = zip(("width", "height"), allowed.FILM, strict=True)
-    return tuple(int(film.get(side, usual)) for side, usual in sides)
+    width, height = allowed.FILM
+    return int(film.get("width", width)), int(film.get("height", height))
 
 
-def keep_sensor(graph, number):
+def keep_sensor(graph: Graph, number: int) -> int:
     """Keep one sensor of the scene, and return its index.
 
     Raises

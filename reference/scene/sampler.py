@@ -30,6 +30,7 @@ from math import isqrt
 import drjit as dr
 import mitsuba as mi
 
+from heuristic.arrays import Array, Mask
 from reference.scene.graph import Graph, properties
 
 SAMPLER = "rotated_multijitter"
@@ -139,7 +140,7 @@ def _under_one(number):
     return dr.minimum(number, dr.one_minus_epsilon(mi.Float))
 
 
-def turned(index, count: int, permutation, turn, active):
+def turned(index: Array, count: int, permutation: Array, turn: Array, active: Mask) -> Array:
     """Return ``(p(index) + r) mod count`` for a hash of p, and one of r: integers below count."""
     if count == 1:
         return mi.UInt32(0)

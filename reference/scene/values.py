@@ -1,16 +1,20 @@
 """Reading and scaling the values of a scene's parameters, as the parser keeps them."""
 
+from collections.abc import Iterable
 from numbers import Real
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Colour
 from heuristic.errors import InputError
+from reference.scene.graph import Graph
 
 COLOURS = (mi.ScalarColor3f, mi.ScalarColor3d)
 
 
-def colour(graph, index, key, default):
+def colour(graph: Graph, index: int, key: str, default: Any) -> tuple[float, float, float]:
     """Return a parameter as three components.
 
     Raises
@@ -23,7 +27,8 @@ def colour(graph, index, key, default):
     if isinstance(value, Real):
         components = (float(value),) * 3
     elif isinstance(value, COLOURS):
-        components = tuple(float(component) for component in value)
+        red, green, blue = map(float, value)
+        components = red, green, blue
     elif hasattr(value, "is_uniform") and value.is_uniform():
         components = (float(value.values[0]),) * 3
     else:
@@ -39,7 +44,7 @@ def colour(graph, index, key, default):
     return components
 
 
-def check_colours(graph, index, keys):
+def check_colours(graph: Graph, index: int, keys: Iterable[str]) -> None:
     """Refuse plain values that are negative or not finite; textures and spectra pass unread.
 
     Raises
@@ -53,7 +58,7 @@ def check_colours(graph, index, keys):
             colour(graph, index, key, 0.0)
 
 
-def number(graph, index, key, default):
+def number(graph: Graph, index: int, key: str, default: Any) -> float:
     """Return a parameter as a finite number.
 
     Raises
@@ -65,7 +70,7 @@ def number(graph, index, key, default):
     value = props.get(key, default)
     if not isinstance(value, Real):
         graph.instantiate(index)
-    if not isinstance(value, Real) or not np.isfinite(value):
+    if not isinstance(value, Real) or not np.isfinite(float(value)):
         raise InputError(
             f"{graph.name}: {graph.label(index)}: {key} = {value!r} is not allowed: give a finite"
             " number."
@@ -73,12 +78,12 @@ def number(graph, index, key, default):
     return float(value)
 
 
-def index_of_refraction(graph, index, key, default):
+def index_of_refraction(graph: Graph, index: int, key: str, default: Any) -> float:
     """Return an index of refraction, given as a number or as the name of a material."""
     return float(mi.lookup_ior(graph.props(index), key, default))
 
 
-def may_be_nonzero(value):
+def may_be_nonzero(value: Any) -> bool:
     """Tell whether a parameter can be other than zero; textures and spectra can."""
     if isinstance(value, Real):
         return value != 0
@@ -87,7 +92,7 @@ def may_be_nonzero(value):
     return True
 
 
-def scaled(components, factor):
+def scaled(components: Colour, factor: Colour) -> tuple[float, ...]:
     """Return a colour times a factor, itself a number or one value for each channel."""
     return tuple(float(value) for value in np.multiply(components, factor))
 

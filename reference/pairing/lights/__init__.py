@@ -37,6 +37,7 @@ Equal mean irradiance            ``heuristic_point``, ``heuristic_spot`` of anot
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 import mitsuba as mi
 
@@ -87,7 +88,7 @@ def check(graph: Graph) -> None:
 
 def to_heuristic(
     graph: Graph, geometry: Callable[[], mi.Scene], hide_emitters: bool
-) -> tuple[list[PairedEmitter], object]:
+) -> tuple[list[PairedEmitter], Any]:
     """Replace physical lights by heuristic ones.
 
     ``geometry()`` returns the Mitsuba scene, for the size and place of area lights. The environment
@@ -96,7 +97,7 @@ def to_heuristic(
     Returns
     -------
     records : list of PairedEmitter
-    ambient : object or None
+    ambient : Any or None
         The radiance of the environment, as the parser keeps it, to become ``I_a``.
     """
     records, ambient = [], None
@@ -113,7 +114,7 @@ def to_heuristic(
     return records, ambient
 
 
-def to_physical(graph: Graph, surface: Callable[[], object]) -> list[PairedEmitter]:
+def to_physical(graph: Graph, surface: Callable[[], Any]) -> list[PairedEmitter]:
     """Replace heuristic lights by physical ones.
 
     ``surface()`` returns the `GBuffer` that the mean irradiance is taken over where the attenuation

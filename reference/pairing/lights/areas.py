@@ -1,5 +1,7 @@
 """Shapes that shine: ``area``. In the far field a point or an even spot, near by a glow ``k_i``."""
 
+from typing import Any
+
 import mitsuba as mi
 import numpy as np
 
@@ -35,7 +37,7 @@ def _to_heuristic(light: Given) -> PairedEmitter:
 
 
 def _far_light(
-    graph: Graph, shape: int, radiance: object, made: mi.Shape
+    graph: Graph, shape: int, radiance: Any, made: mi.Shape
 ) -> tuple[mi.Properties, PairedEmitter]:
     centroid, area, normal = _extent(made)
     if _varies(graph, radiance):
@@ -55,7 +57,7 @@ def _far_light(
     return derived, PairedEmitter(graph.label(shape), "area", plugin, factor, False, note)
 
 
-def _varies(graph: Graph, value: object) -> bool:
+def _varies(graph: Graph, value: Any) -> bool:
     """Tell whether a value is a texture that differs from point to point."""
     if not isinstance(value, Reference):
         return False
@@ -72,7 +74,7 @@ def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float]]:
     return centroid.tolist(), float(np.ravel(shape.surface_area())[0]), normal.tolist()
 
 
-def _glow(graph: Graph, shape: int, radiance: object) -> None:
+def _glow(graph: Graph, shape: int, radiance: Any) -> None:
     """Give a shape its own copy of its phong, with ``k_i`` set to a radiance."""
     ((key, bsdf),) = graph.children(shape, BSDF)
     props = mi.Properties(graph.props(bsdf))

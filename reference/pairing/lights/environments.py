@@ -5,6 +5,8 @@ environment nor of another kind is left out: it has no nearest form. Of ``sunsky
 ``timed_sunsky`` the sky is ``I_a``, and the sun a directional light.
 """
 
+from typing import Any
+
 import mitsuba as mi
 
 from reference.pairing.factors import Convention
@@ -14,7 +16,7 @@ from reference.scene import values
 from reference.scene.graph import Graph, properties
 
 
-def _ambient(light: Given) -> object:
+def _ambient(light: Given) -> Any:
     if light.shape is None and light.emitter.is_environment():
         return measured.mean_radiance(light.graph, light.emitter)
     return None
@@ -42,7 +44,7 @@ CONSTANT = LightKind(
 
 
 def add_environment(
-    physical: Graph, graph: Graph, ambient: object, convention: Convention
+    physical: Graph, graph: Graph, ambient: Any, convention: Convention
 ) -> PairedEmitter:
     """Add the constant environment that stands for ``I_a`` to the physical half of a graph.
 
@@ -50,7 +52,8 @@ def add_environment(
     ``matched`` radiance is ``I_a k_a / k_d``, by least squares where materials differ; the
     ``literal`` one is ``I_a``.
     """
-    ratio, exact = (1.0,) * 3, True
+    ratio: tuple[float, ...] = (1.0,) * 3
+    exact = True
     if convention is Convention.MATCHED:
         ratio, exact = _ambient_ratio(graph)
     plain = isinstance(ambient, (float, int, *values.COLOURS))
@@ -86,7 +89,7 @@ def _ambient_ratio(graph: Graph) -> tuple[tuple[float, ...], bool]:
     return tuple(ratio), exact
 
 
-def _sky(light: Given) -> object:
+def _sky(light: Given) -> Any:
     return measured.mean_radiance(light.graph, _only(light, "sun_scale"))
 
 

@@ -6,6 +6,7 @@ A kind is one :class:`LightKind` at the top of a module of :mod:`reference.pairi
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -51,9 +52,9 @@ class Given:
 
     graph: Graph
     index: int
-    shape: int | None = None
-    geometry: Callable[[], mi.Scene] | None = None
-    surface: Callable[[], object] | None = None
+    shape: Any = None
+    geometry: Any = None
+    surface: Any = None
     hide_emitters: bool = False
 
     @property
@@ -71,7 +72,7 @@ class Given:
         """The light as Mitsuba makes it."""
         return self.graph.instantiate(self.index)
 
-    def value(self, key: str, default: object) -> object:
+    def value(self, key: str, default: Any) -> Any:
         """Return a parameter as the parser keeps it."""
         return self.graph.props(self.index).get(key, default)
 
@@ -149,7 +150,7 @@ class LightKind:
     to_heuristic: Callable[[Given], PairedEmitter]
     to_physical: Callable[[Given], PairedEmitter] | None = None
     model: type[Light] | None = None
-    ambient: Callable[[Given], object] | None = None
+    ambient: Callable[[Given], Any] | None = None
     colour: str = ""
     place: Callable[[Given], dict[str, np.ndarray]] = lambda light: {}
     exact: bool = False
@@ -163,11 +164,11 @@ class LightKind:
         return self.model is not None and _has(self.model, name)
 
 
-def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: object) -> mi.Properties:
+def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
     """Return the properties of a heuristic light, which falls off as Mitsuba's do."""
     falloff = FALLOFF_OF_MITSUBA if _has(PLUGINS[plugin], "attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
 
 
-def _has(model: type[Light], name: str) -> bool:
+def _has(model: Any, name: str) -> bool:
     return name in {entry.name for entry in fields(model)}

@@ -5,6 +5,7 @@ Every mean is over a rank-1 lattice of samples, and comes as a value that a grap
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -30,16 +31,16 @@ class Beam:
     """
 
     cutoff: float
-    intensity: object
+    intensity: Any
 
 
-def mean_radiance(graph: Graph, emitter: mi.Emitter) -> object:
+def mean_radiance(graph: Graph, emitter: mi.Emitter) -> Any:
     """Return the mean radiance of an environment over the sphere, ``int L dw / (4 pi)``."""
     means, _ = _arriving(emitter)
     return as_value(graph, means / (4 * np.pi), emitted=True)
 
 
-def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[object, list[float]] | None:
+def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | None:
     """Return ``int L dw`` of a distant light as intensity ``I_p``, and its mean direction.
 
     The direction, in which the light travels, is that of the mean of the directions that it comes
@@ -73,7 +74,7 @@ def beam(
     return Beam(float(cutoff), as_value(graph, found.mean(axis=1) / share, emitted=True))
 
 
-def surface_mean(graph: Graph, shape: mi.Shape) -> object:
+def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     """Return the mean radiance of a shape's textured emission over its area."""
     emitter = shape.emitter()
     x, y = _lattice()
@@ -95,7 +96,7 @@ def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
         weight = dr.select(dr.isfinite(weight) & (ds.pdf > 0), weight, 0)
         means.append(_channel_means(weight))
         toward += np.array(ds.d, float) @ np.mean(np.array(weight, float), axis=0)
-    return np.concatenate(means), toward / max(np.linalg.norm(toward), 1e-30)
+    return np.concatenate(means), toward / max(float(np.linalg.norm(toward)), 1e-30)
 
 
 def _intensities(

@@ -5,6 +5,7 @@ Parallel light is an exact pair; a point is one where it falls off as Mitsuba's 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -44,8 +45,8 @@ def _everywhere(travel: np.ndarray) -> float:
 
 def level(
     light: Given,
-    cone: Callable[[np.ndarray], object] = _everywhere,
-    derived_cone: Callable[[np.ndarray], object] = _everywhere,
+    cone: Callable[[np.ndarray], Any] = _everywhere,
+    derived_cone: Callable[[np.ndarray], Any] = _everywhere,
     flux_ratio: float = 1.0,
 ) -> Level:
     """Return the :class:`Level` of a heuristic point or spot (:mod:`reference.pairing.lights`).

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import mitsuba as mi
 
@@ -29,16 +30,16 @@ class Nearest:
         Quantities that were not reached, :class:`reference.pairing.factors.Miss`.
     """
 
-    k_i: object = 0.0
-    k_a: object = 0.0
-    k_d: object = 0.0
-    k_s: object = 0.0
-    n: object = 1.0
+    k_i: Any = 0.0
+    k_a: Any = 0.0
+    k_d: Any = 0.0
+    k_s: Any = 0.0
+    n: Any = 1.0
     form: str = "phong"
     normalised: bool = False
     twosided: bool = False
-    transmittance: object = 0.0
-    tilt: object = None
+    transmittance: Any = 0.0
+    tilt: Any = None
     lost: tuple[tuple[str, str], ...] = ()
     misses: tuple = ()
 
@@ -58,7 +59,7 @@ class Nearest:
             props["tilt"] = self.tilt
         return props
 
-    def parameters(self) -> dict[str, object]:
+    def parameters(self) -> dict[str, Any]:
         """Return the coefficients for records: numbers, or the word ``texture``."""
         found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
         if not operations.is_zero(self.transmittance):
@@ -78,9 +79,9 @@ class Context:
 
     graph: Graph
     convention: Convention
-    nearest: Callable[[int], Nearest] = field(repr=False, default=None)
+    nearest: Any = field(repr=False, default=None)
 
-    def value(self, index: int, key: str, default: object) -> object:
+    def value(self, index: int, key: str, default: Any) -> Any:
         """Return a parameter as the parser keeps it."""
         return self.graph.props(index).get(key, default)
 
@@ -123,7 +124,7 @@ def alike(graph: Graph, first: Nearest, second: Nearest) -> tuple[Nearest, Neare
     """Return two materials with their lobes scaled in one way, so that ``k_s`` can be mixed."""
     if first.normalised == second.normalised:
         return first, second
-    return tuple(_normalised(graph, material) for material in (first, second))
+    return _normalised(graph, first), _normalised(graph, second)
 
 
 def _normalised(graph: Graph, material: Nearest) -> Nearest:

@@ -7,6 +7,7 @@ Where all operands are plain the result is plain too; otherwise it is a referenc
 
 from collections.abc import Callable
 from numbers import Real
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -17,7 +18,7 @@ from reference.scene.values import COLOURS
 TEXTURE = mi.ObjectType.Texture
 
 
-def plain(value: object) -> float | tuple[float, ...] | None:
+def plain(value: Any) -> float | tuple[float, ...] | None:
     """Return a value as a float or three floats, None where it is a texture or spectrum."""
     if isinstance(value, Real):
         return float(value)
@@ -28,30 +29,30 @@ def plain(value: object) -> float | tuple[float, ...] | None:
     return None
 
 
-def is_zero(value: object) -> bool:
+def is_zero(value: Any) -> bool:
     """Tell whether a value is plain and 0."""
     known = plain(value)
     return known is not None and not np.any(known)
 
 
-def product(graph: Graph, a: object, b: object) -> object:
+def product(graph: Graph, a: Any, b: Any) -> Any:
     """Return ``a b``."""
     if is_zero(a) or is_zero(b):
         return 0.0
     for one, other in ((a, b), (b, a)):
-        if plain(one) is not None and np.all(np.equal(plain(one), 1)):
+        if _same(one, 1.0):
             return other
     return _combined(graph, "heuristic_product", np.multiply, a=a, b=b)
 
 
-def total(graph: Graph, a: object, b: object) -> object:
+def total(graph: Graph, a: Any, b: Any) -> Any:
     """Return ``a + b``."""
     if is_zero(a) or is_zero(b):
         return b if is_zero(a) else a
     return _combined(graph, "heuristic_sum", np.add, a=a, b=b)
 
 
-def share(graph: Graph, a: object, weight: object) -> object:
+def share(graph: Graph, a: Any, weight: Any) -> Any:
     """Return ``a weight``; the weight is a scalar, clipped to [0, 1]."""
     if is_zero(a) or is_zero(weight):
         return 0.0
@@ -60,7 +61,7 @@ def share(graph: Graph, a: object, weight: object) -> object:
     )
 
 
-def rest(graph: Graph, a: object, weight: object) -> object:
+def rest(graph: Graph, a: Any, weight: Any) -> Any:
     """Return ``a (1 - weight)``; the weight is a scalar, clipped to [0, 1]."""
     if is_zero(a) or is_zero(weight):
         return a
@@ -69,7 +70,7 @@ def rest(graph: Graph, a: object, weight: object) -> object:
     )
 
 
-def blend(graph: Graph, a: object, b: object, weight: object) -> object:
+def blend(graph: Graph, a: Any, b: Any, weight: Any) -> Any:
     """Return ``a (1 - weight) + b weight``; the weight is a scalar, clipped to [0, 1]."""
     if _same(a, b):
         return a
@@ -81,24 +82,24 @@ def blend(graph: Graph, a: object, b: object, weight: object) -> object:
     return _combined(graph, "heuristic_blend", mixed, a=a, b=b, weight=weight)
 
 
-def sides(graph: Graph, front: object, back: object) -> object:
+def sides(graph: Graph, front: Any, back: Any) -> Any:
     """Return ``front`` where the front of a surface is seen, else ``back``."""
     if _same(front, back):
         return front
     return node(graph, "heuristic_sides", front=front, back=back)
 
 
-def exponent(graph: Graph, alpha: object) -> Reference:
+def exponent(graph: Graph, alpha: Any) -> Reference:
     """Return the exponent of the lobe as wide as microfacets of a textured roughness."""
     return node(graph, "heuristic_exponent", alpha=alpha)
 
 
-def node(graph: Graph, plugin: str, **values: object) -> Reference:
+def node(graph: Graph, plugin: str, **values: Any) -> Reference:
     """Add a texture node, and return the reference to it."""
     return Reference(graph.add(TEXTURE, properties(plugin, **values)))
 
 
-def _combined(graph: Graph, plugin: str, function: Callable, **operands: object) -> object:
+def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) -> Any:
     known = [plain(value) for value in operands.values()]
     if all(value is not None for value in known):
         found = np.asarray(function(*(np.asarray(value) for value in known)), float)
@@ -106,8 +107,8 @@ def _combined(graph: Graph, plugin: str, function: Callable, **operands: object)
     return node(graph, plugin, **operands)
 
 
-def _same(a: object, b: object) -> bool:
+def _same(a: Any, b: Any) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
         return a.index() == b.index()
-    known = plain(a), plain(b)
-    return None not in known and bool(np.all(np.equal(*known)))
+    one, other = plain(a), plain(b)
+    return one is not None and other is not None and bool(np.all(np.equal(one, other)))

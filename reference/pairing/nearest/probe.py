@@ -18,11 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import cos, log, pi, radians, sin
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic.errors import InputError
 from heuristic.terms import normalisation
 from reference.pairing.factors import exponent_of
 from reference.pairing.nearest import operations
@@ -66,10 +68,11 @@ def probe(bsdf: mi.BSDF) -> Probed | None:
     alpha = float(np.mean([part[4] for part in parts]))
     if not all(np.isfinite(albedo).all() for albedo in albedos) or not np.isfinite(alpha):
         return None
-    return Probed(*albedos, alpha)
+    reflected, diffuse, passed, scattered = albedos
+    return Probed(reflected, diffuse, passed, scattered, alpha)
 
 
-def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> object:
+def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> Any:
     """Return albedos as a value of a graph: a number, a colour, or a tabulated spectrum.
 
     What is ``emitted`` is always tabulated in spectral variants, where a number means daylight.
@@ -176,11 +179,11 @@ Its albedo is kept, so that the highlight holds what the mirror image of a small
 class White:
     """The probe's albedos as values of the graph, and the lobe's width."""
 
-    reflected: object
-    diffuse: object
-    specular: object
-    passed: object
-    scattered: object
+    reflected: Any
+    diffuse: Any
+    specular: Any
+    passed: Any
+    scattered: Any
     alpha: float
 
 
@@ -199,8 +202,8 @@ def nearest(context: Context, index: int) -> Nearest:
         everything = operations.total(
             graph, operations.total(graph, found.reflected, found.passed), found.scattered
         )
-        lost = ((lost, "k_d is the whole albedo"),)
-        return Nearest(k_a=everything, k_d=everything, twosided=True, lost=lost)
+        whole = ((lost, "k_d is the whole albedo"),)
+        return Nearest(k_a=everything, k_d=everything, twosided=True, lost=whole)
     if not operations.is_zero(found.scattered):
         lost += ", and light scattered through"
     return Nearest(
@@ -212,7 +215,7 @@ def nearest(context: Context, index: int) -> Nearest:
     )
 
 
-def with_values(context: Context, index: int, **values: object) -> White | None:
+def with_values(context: Context, index: int, **values: Any) -> White | None:
     """Probe a node's BSDF with some parameters changed; returns :class:`White`, None in vain.
 
     Only parameters that are given are changed: what has its default keeps it.
@@ -225,11 +228,31 @@ def with_values(context: Context, index: int, **values: object) -> White | None:
     found = probe(part.instantiate())
     if found is None:
         return None
-    parts = (found.reflected, found.diffuse, found.specular, found.passed, found.scattered)
-    return White(*(as_value(context.graph, part) for part in parts), found.alpha)
+    names = ("reflected", "diffuse", "specular", "passed", "scattered")
+    return White(
+        **{name: as_value(context.graph, getattr(found, name)) for name in names}, alpha=found.alpha
+    )
 
 
-def lobe(context: Context, albedo: object, alpha: object) -> dict[str, object]:
+def measured(context: Context, index: int, **values: Any) -> White:
+    """Probe as :func:`with_values`, of a BSDF that can be sampled.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be.
+    """
+    found = with_values(context, index, **values)
+    if found is None:
+        graph = context.graph
+        raise InputError(
+            f"{graph.name}: {graph.label(index)}: its albedo is not a number, or Mitsuba cannot"
+            " sample it. Check its parameters."
+        )
+    return found
+
+
+def lobe(context: Context, albedo: Any, alpha: Any) -> dict[str, Any]:
     """Return ``k_s``, ``n`` and ``normalised`` of a lobe of an albedo and a roughness.
 
     ``n`` is :func:`reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the albedo times
@@ -241,6 +264,6 @@ def lobe(context: Context, albedo: object, alpha: object) -> dict[str, object]:
     if known is None:
         n = operations.exponent(context.graph, alpha)
         return {"k_s": albedo, "n": n, "normalised": True}
-    n = exponent_of(max(known, SMOOTH_ALPHA))
+    n = exponent_of(max(float(np.mean(known)), SMOOTH_ALPHA))
     scale = float(normalisation("phong", n))
     return {"k_s": operations.product(context.graph, albedo, scale), "n": n}

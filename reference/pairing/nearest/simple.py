@@ -7,6 +7,7 @@ such surfaces on each path.
 
 from dataclasses import asdict
 from functools import lru_cache
+from typing import Any
 
 from heuristic.errors import InputError
 from heuristic.plugins.mapped import SMALLEST_ALPHA
@@ -98,16 +99,16 @@ def conductor(context: Context, index: int) -> Nearest:
     point; ``n`` is of the same width as ``alpha``, of the mean of ``alpha_u`` and ``alpha_v`` where
     they differ. A constant environment is returned by the lobe: ``k_a`` is that albedo.
     """
-    white = probe.with_values(context, index, specular_reflectance=1.0)
+    white = probe.measured(context, index, specular_reflectance=1.0)
     reflected = operations.product(
         context.graph, white.reflected, context.value(index, "specular_reflectance", 1.0)
     )
     if context.plugin(index) == "conductor":
-        alpha, lost = 0.0, (MIRROR,)
+        alpha, lost = 0.0, [MIRROR]
     else:
-        alpha, lost = context.value(index, "alpha", white.alpha), ()
-    lost += (("Fresnel reflection", "the reflectance at normal incidence, at all angles"),)
-    return Nearest(k_a=reflected, **probe.lobe(context, reflected, alpha), lost=lost)
+        alpha, lost = context.value(index, "alpha", white.alpha), []
+    lost += [("Fresnel reflection", "the reflectance at normal incidence, at all angles")]
+    return Nearest(k_a=reflected, **probe.lobe(context, reflected, alpha), lost=tuple(lost))
 
 
 @rule("principled")
@@ -122,7 +123,7 @@ def principled(context: Context, index: int) -> Nearest:
     k_d = context.value(index, "base_color", 0.5)
     for key in ("metallic", "spec_trans"):
         k_d = operations.rest(graph, k_d, context.value(index, key, 0.0))
-    found = probe.with_values(context, index)
+    found = probe.measured(context, index)
     roughness = context.value(index, "roughness", 0.5)
     return Nearest(
         k_a=found.reflected if operations.plain(k_d) is not None else k_d,
@@ -133,7 +134,7 @@ def principled(context: Context, index: int) -> Nearest:
     )
 
 
-def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
+def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
     """Return the albedo of a plastic's diffuse base at each point of a reflectance.
 
     Light that the coat throws back is reflected by the base again, so that the albedo is ``c rho /
@@ -147,8 +148,8 @@ def _of_base(graph: Graph, rho: object, whole: float, half: float) -> object:
     if returned < 1e-5:
         return operations.product(graph, rho, whole)
     scale = whole * (1 - returned)
-    if operations.plain(rho) is not None:
-        level = operations.plain(rho)
+    level = operations.plain(rho)
+    if level is not None:
         shares = level if isinstance(level, tuple) else (level,)
         found = tuple(scale * share / (1 - returned * share) for share in shares)
         return found if len(found) > 1 else found[0]
@@ -222,7 +223,7 @@ def sheet(context: Context, index: int) -> Nearest:
 
 def _clear(context: Context, index: int, lost: str, twosided: bool) -> Nearest:
     given = context.graph.props(index)
-    white = probe.with_values(context, index, specular_reflectance=1.0, specular_transmittance=1.0)
+    white = probe.measured(context, index, specular_reflectance=1.0, specular_transmittance=1.0)
     passed = operations.product(
         context.graph, white.passed, given.get("specular_transmittance", 1.0)
     )

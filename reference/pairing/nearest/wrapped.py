@@ -1,6 +1,7 @@
 """Rules for BSDFs that are made of others."""
 
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -61,13 +62,14 @@ def blend(context: Context, index: int) -> Nearest:
         name: operations.blend(graph, getattr(first, name), getattr(second, name), weight)
         for name in (*COEFFICIENTS, "transmittance")
     }
+    lost: tuple[tuple[str, str], ...] = ()
     lobes = [material for material in (first, second) if not operations.is_zero(material.k_s)]
     if len(lobes) == 2:
         mixed["n"] = operations.blend(graph, first.n, second.n, weight)
         lost = (("two lobes", "one, of the blended exponent and coefficient"),)
         form = first.form
     else:
-        mixed["n"], form, lost = *((lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")), ()
+        mixed["n"], form = (lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")
     return Nearest(
         **mixed,
         form=form,
@@ -96,7 +98,7 @@ def bump_map(context: Context, index: int) -> Nearest:
     return _tilted(context, index, heights=heights, scale=scale)
 
 
-def _require(context: Context, index: int, texture: object, ability: str, what: str) -> None:
+def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
     """Refuse a texture that lacks what its map evaluates, which shading would only find out.
 
     Mitsuba has no such texture either, but in integrators that evaluate no material.
@@ -118,7 +120,7 @@ def _require(context: Context, index: int, texture: object, ability: str, what: 
             ) from error
 
 
-def _tilted(context: Context, index: int, **values: object) -> Nearest:
+def _tilted(context: Context, index: int, **values: Any) -> Nearest:
     ((_, child),) = context.graph.children(index, BSDF)
     inner = context.nearest(child)
     lost = inner.lost
