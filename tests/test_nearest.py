@@ -132,6 +132,15 @@ def test_two_sides_may_differ_in_a_lobe_higher_than_one(rgb):
     assert all(np.isfinite(image).all() and image.max() > 0 for image in found)
 
 
+def test_a_colour_as_roughness_is_taken_for_its_mean(rgb):
+    """As Mitsuba takes it: one number is read of a texture of three."""
+    (of_colour, _), (of_mean, _) = (
+        images(scene({"s": {"type": "sphere", "b": {"type": "roughconductor", "alpha": alpha}}}))
+        for alpha in ({"type": "rgb", "value": [0.1, 0.2, 0.3]}, 0.2)
+    )
+    np.testing.assert_allclose(of_colour, of_mean, rtol=1e-5)
+
+
 def test_the_back_of_a_twosided_has_its_own_material(rgb):
     flip = mi.ScalarTransform4f().rotate([1, 0, 0], 180)
     shape = {"type": "rectangle", "to_world": flip, "b": EXACT["front"]}

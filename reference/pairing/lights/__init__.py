@@ -120,11 +120,9 @@ def to_physical(graph: Graph, surface: Callable[[], Any]) -> list[PairedEmitter]
     ``surface()`` returns the `GBuffer` that the mean irradiance is taken over where the attenuation
     is not the inverse square.
     """
-    return [
-        of(graph.plugin(index)).to_physical(Given(graph, index, surface=surface))
-        for index in graph.nodes(EMITTER)
-        if is_heuristic(graph.plugin(index))
-    ]
+    own = [index for index in graph.nodes(EMITTER) if is_heuristic(graph.plugin(index))]
+    ways = [(index, of(graph.plugin(index)).to_physical) for index in own]
+    return [way(Given(graph, index, surface=surface)) for index, way in ways if way]
 
 
 def _lights(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
