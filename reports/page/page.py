@@ -5,8 +5,8 @@ but how to print a number.
 Names and messages come from users' files, so everything is escaped, and the page may load nothing:
 a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
 
-The page is whole without JavaScript: pictures, numbers and charts, one scene after another. With
-it, ``templates/viewer`` shows one scene at a time, by its embedded numbers.
+Without JavaScript the page holds small pictures, numbers and charts, one scene after another. With
+it, ``templates/viewer`` shows one scene at a time, by its embedded numbers; the others wait as text.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ STYLES = ("base", "verdict", "overview", "scene", "viewer", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "main",
+    "verdict", "lazy", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.

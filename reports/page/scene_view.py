@@ -39,12 +39,10 @@ class SceneView(Record):
 
     record
         The content of ``comparison.json``.
-    images
-        PNG bytes by name, as `reports.files.images.pictures` makes them. A missing one is left out.
     thumbnails
         Small PNG bytes by name, of both halves and of the map by which scenes are judged.
     embedded
-        The images as numbers, without which the scene has no viewer.
+        The images as numbers, without which the scene has no pictures but the thumbnails.
     files
         Paths relative to the page by label, shown as links.
     charts, cost
@@ -52,7 +50,6 @@ class SceneView(Record):
     """
 
     record: ComparisonRecord
-    images: dict[str, bytes] = field(default_factory=dict)
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     embedded: Embedded | None = None
     files: dict[str, str] = field(default_factory=dict)

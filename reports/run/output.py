@@ -14,10 +14,6 @@ from reports.page.scene_view import SceneView
 from reports.run import finished
 from reports.run.places import FIGURES, PAGE, RUN, TABLES
 
-LONGEST_IN_PAGE = 1024
-"""Pixels; longer pictures are reduced inside the page, never in the files."""
-
-
 @contextmanager
 def held(folder: str | Path, command: str) -> Iterator[Path]:
     """Make the output folder, keep other commands out of it, and clear away what killed ones left.
@@ -113,12 +109,10 @@ def write_scene(folder, name, comparison, study=None, key=None):
     exposure = record.viewing.exposure
     layers = _layers(shown)
     pictured = images.pictures(shown, exposure)
-    reduced = max(record.resolution) > LONGEST_IN_PAGE
     priced = cost_files.documents(study) if study else {}
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
     view = SceneView(
         record=record,
-        images=images.pictures(shown, exposure, LONGEST_IN_PAGE) if reduced else pictured,
         thumbnails=images.thumbnails(shown, exposure),
         embedded=embedding.embed(exr.channels(layers), shown.counted),
         files={file: f"{name}/{file}" for file in links},
