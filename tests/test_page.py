@@ -148,7 +148,13 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     scripts = [attrs.get("type", "") for tag, attrs in shown.tags if tag == "script"]
     assert scripts.count("") == 1
     assert scripts.count("module") == scripts.count("text/plain") == 1
-    assert set(scripts) == {"", "module", "text/plain", "application/json", "application/octet-stream"}
+    assert set(scripts) == {
+        "",
+        "module",
+        "text/plain",
+        "application/json",
+        "application/octet-stream",
+    }
     assert not {"link", "iframe", "object", "base"} & {tag for tag, _ in shown.tags}
     for tag, attrs in shown.tags:
         assert not [name for name in attrs if name.startswith("on")], tag

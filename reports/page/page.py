@@ -32,7 +32,7 @@ from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import overview, verdict_view
 from reports.page.legends import legends
-from reports.page.scene_view import SceneView
+from reports.page.scene_view import Making, SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import (
     NOTICEABLE,
@@ -76,6 +76,9 @@ SCRIPTS = (
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
 EARLY = 'document.documentElement.className = "js";'
 
+#: Tells the page that the module before it has run, of which inline ones say nothing.
+LOADED = '\nwindow.dispatchEvent(new Event("vega"));'
+
 
 class Scene(SceneView, kw_only=True):
     """A scene in the page: what is shown of it, and its name in the page's address."""
@@ -98,12 +101,13 @@ def render(
     hard_cases: HardCases | None = None,
     failures: Sequence[Failure] = (),
     run: Run | None = None,
+    making: Making | None = None,
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
     `equations` is the index of `heuristic.equations`; it, `verifications` and `hard_cases` are
     sections of their own, left out where they are empty. `failures` are the scenes that could not
-    be compared. `run` says where the time went.
+    be compared. `run` says where the time went, `making` how far a run is that has not ended.
     """
     taken: set[str] = set()
     scenes = [_scene(view, taken) for view in views]
@@ -113,7 +117,7 @@ def render(
     ]
     charted = any(scene.histograms or scene.charts for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
-    scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
+    scripts = [EARLY, *([vega.bundle() + LOADED] if charted else []), '"use strict";\n' + code]
     return (
         _environment()
         .get_template("page.html.j2")
@@ -133,6 +137,7 @@ def render(
             verifications=verifications,
             **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
             run=run,
+            making=making,
         )
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
@@ -47,6 +49,8 @@ class SceneView(Record):
         Paths relative to the page by label, shown as links.
     charts, cost
         Of what accuracy costs, where that was studied.
+    is_coarse
+        Whether it is a small preview, which a later writing of the page replaces.
     """
 
     record: ComparisonRecord
@@ -55,6 +59,16 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
+    is_coarse: bool = False
+
+
+@dataclass(frozen=True)
+class Making:
+    """How many of the scenes of a run are refined, where the page is not finished yet."""
+
+    done: int
+    total: int
+    is_interrupted: bool = False
 
 
 def picture_name(kind, name):

@@ -6,12 +6,9 @@ let vega;
 /** @returns {Promise<any>} */
 function loadVega() {
   return (vega ??= new Promise((done) => {
-    const script = Object.assign(document.createElement("script"), {
-      type: "module",
-      textContent: document.getElementById("vega")?.textContent,
-      onload: () => done(/** @type {any} */ (window).vegaEmbed),
-    });
-    document.body.append(script);
+    const textContent = document.getElementById("vega")?.textContent;
+    window.addEventListener("vega", () => done(/** @type {any} */ (window).vegaEmbed));
+    document.body.append(Object.assign(document.createElement("script"), { type: "module", textContent }));
   }));
 }
 
