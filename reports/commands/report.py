@@ -75,7 +75,9 @@ def _verified(pool, bar, names, request, quick):
     size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
     small = replace(request, resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
-    verified = (Task(name, tasks.verified, (name, small, level), bar.of(name)) for name in names)
+    verified = (
+        Task(name, tasks.verified, (name, small, level, not quick), bar.of(name)) for name in names
+    )
     found = {}
     bar.begin("verification and hard cases", 1 + len(names), batch.MORE)
     for task, outcome in pool.each(chain([Task("hard cases", tasks.hard_cases, ())], verified)):

@@ -5,8 +5,9 @@ but how to print a number.
 Names and messages come from users' files, so everything is escaped, and the page may load nothing:
 a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
 
-Without JavaScript the page holds small pictures, numbers and charts, one scene after another. With
-it, ``templates/viewer`` shows one scene at a time, by its embedded numbers; the others wait as text.
+Without JavaScript the page has small pictures, numbers and charts, one scene after another. With
+it, ``templates/viewer`` shows one scene at a time, by its embedded numbers, and the others wait as
+text.
 """
 
 from __future__ import annotations

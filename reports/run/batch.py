@@ -2,7 +2,7 @@
 
 A scene that cannot be compared does not keep the others from it: the page names it with its error,
 and the command ends with that error's exit code. Scenes are compared in a process apart, which one
-of them may kill. The page is written as soon as there is a picture, and again while the run goes on.
+of them may kill. The page is written as soon as there is a picture, and again as the run goes on.
 """
 
 from __future__ import annotations

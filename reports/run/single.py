@@ -23,8 +23,8 @@ SKETCH_WIDTH, SKETCH_SPP = 64, 8
 class Wanted:
     """What a command wants of each of its scenes.
 
-    ``request`` says how; ``sketched`` begins with all scenes at a small size; ``fresh`` renders what
-    is finished, too; ``with_scripts`` runs the scripts that are found in folders.
+    ``request`` says how; ``sketched`` begins with all scenes at a small size; ``fresh`` renders
+    what is finished, too; ``with_scripts`` runs the scripts that are found in folders.
     """
 
     request: Request

@@ -101,7 +101,11 @@ def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visit
 
 
 COLOURS = """canvases => canvases.map((canvas) => {
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const { width, height } = canvas;
+  const copy = Object.assign(document.createElement("canvas"), { width, height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
   return new Set(new Uint32Array(data.buffer)).size;
 })"""
 
