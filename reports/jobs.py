@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import math
 import os
@@ -302,6 +303,8 @@ class Ready:
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up
+
+        gc.freeze()  # what is loaded by now stays: collecting for each scene need not look at it
 
 
 def _enter(folder: str) -> None:

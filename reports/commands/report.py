@@ -10,7 +10,7 @@ from reports import jobs, opening
 from reports.run import batch, tasks
 from reports.terminal import verbosity
 
-VERIFIED_AT = (96, 96)
+VERIFIED_AT = (64, 64)
 """Resolution at which a report verifies its plans."""
 
 QUICK = {"resolution": (64, 64), "spp": 16}
