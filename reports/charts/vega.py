@@ -109,14 +109,8 @@ def _cache() -> Path:
     return (given if given.is_absolute() else Path.home() / ".cache") / "fotismos"
 
 
-def _rounded(places: re.Match[str]) -> str:
-    """Places to hundredths of a pixel, which are enough."""
-    return re.sub(r"(\.\d\d)\d+", r"\1", places[0])
-
-
 def _inline(svg: str) -> str:
     """The SVG with ids of its own, since several share one page; described by its figure."""
-    svg = re.sub(r' (?:d|transform)="[^"]+"', _rounded, svg)
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)
     return owned.replace("<svg ", '<svg aria-hidden="true" ', 1)
