@@ -198,7 +198,7 @@ timeout_option = click.option(
 )
 
 
-def _workers(default: int | None, shown: str) -> Callable[[Any], Any]:
+def _workers(default: int | None, shown: str | bool = True) -> Callable[[Any], Any]:
     return click.option(
         "--workers",
         default=default,
@@ -209,7 +209,7 @@ def _workers(default: int | None, shown: str) -> Callable[[Any], Any]:
     )
 
 
-workers_option = _workers(1, "1")
+workers_option = _workers(1)
 all_workers_option = _workers(None, "one per core")
 
 IN_PROCESSES = True

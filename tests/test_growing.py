@@ -6,11 +6,11 @@ from comparisons.gallery import builtin
 from heuristic.errors import OutputError
 from reports.commands import report
 from reports.page.scene_view import SceneView
-from reports.run import growing, output, tasks
+from reports.run import growing, output, single, tasks
 from tests import records
 
 NAMES = ("fig-8-5a", "fig-8-9")
-WORDS = ("--resolution", "16x16", "--spp", "4")
+WORDS = ("--resolution", "16x16", "--spp", "4", "--everything")
 
 
 @pytest.fixture
@@ -28,9 +28,9 @@ def pages(monkeypatch):
 
 @pytest.fixture
 def small_report(monkeypatch):
-    """A report of two scenes, whose page is written at every occasion."""
+    """A report of two scenes without causes, whose page is written at every occasion."""
     monkeypatch.setattr(builtin, "SCENES", {name: builtin.SCENES[name] for name in NAMES})
-    monkeypatch.setattr(report, "VERIFIED_AT", (8, 8))
+    monkeypatch.setattr(single, "_explained", lambda case, progress, made: (made, None))
     monkeypatch.setattr(growing, "INTERVAL_S", 0.0)
     monkeypatch.setattr(growing, "SHARE", 1.0)
     monkeypatch.setattr(tasks, "hard_cases", lambda: None)
@@ -45,13 +45,13 @@ def view(name, is_coarse=False):
     "A report's page is written with the first pictures, shows all scenes in a coarse form before"
     " one is refined, and says how many are refined until it is finished.",
 )
-def test_a_report_grows_from_coarse_to_whole_to_verified(run, small_report, pages, tmp_path):
+def test_a_report_grows_from_coarse_to_whole_to_hard_cases(run, small_report, pages, tmp_path):
     assert run("report", "-o", tmp_path / "out", *WORDS)[0] == 0
     coarse = [[v.is_coarse for v in views] for views, _ in pages]
     assert coarse[:4] == [[True], [True, True], [False, True], [False, False]]
     done = [shown["making"] and shown["making"].done for _, shown in pages]
     assert done == [0, 0, 1, 2, 2, None]
-    assert [bool(shown.get("verifications")) for _, shown in pages] == [False] * 5 + [True]
+    assert ["hard_cases" in shown for _, shown in pages] == [False] * 5 + [True]
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "reload to see more" not in page
     assert "Preview:" not in page
@@ -61,7 +61,7 @@ def test_an_interrupted_report_keeps_its_page(run, small_report, tmp_path, monke
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tasks, "verified", interrupted)
+    monkeypatch.setattr(tasks, "hard_cases", interrupted)
     assert run("report", "-o", tmp_path / "out", *WORDS)[0] == 130
     text = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "Interrupted: 2 of 2 scenes are refined" in text
@@ -113,8 +113,8 @@ def test_a_page_is_opened_once_it_is_there(run, scene_file, tmp_path, monkeypatc
 
 
 def test_quick_takes_a_small_size_unless_another_is_given(run, small_report, pages, tmp_path):
-    assert run("report", "--quick", "--spp", 4, "-o", tmp_path / "out")[0] == 0
-    (view, _), _ = pages[-1]
-    assert view.record.resolution == report.QUICK["resolution"]
-    assert view.record.plan.spp == 4
-    assert not any(view.is_coarse for views, _ in pages for view in views)
+    assert run("report", "--quick", "--spp", 4, "--everything", "-o", tmp_path / "out")[0] == 0
+    (shown, _), _ = pages[-1]
+    assert shown.record.resolution == report.QUICK["resolution"]
+    assert shown.record.plan.spp == 4
+    assert not any(one.is_coarse for views, _ in pages for one in views)
