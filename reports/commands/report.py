@@ -29,7 +29,7 @@ QUICKLY_VERIFIED_AT = (32, 32)
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-@click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
+@click.option("--quick", is_flag=True, help="Everything at a small size, in a minute or two.")
 @opening.option
 def report(output, figures, fresh, timeout, workers, scheduler, quick, is_opened, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
