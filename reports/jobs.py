@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import math
 import os
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -196,14 +197,20 @@ timeout_option = click.option(
     help="End a scene that makes no progress for so long.",
 )
 
-workers_option = click.option(
-    "--workers",
-    default=1,
-    show_default=True,
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Processes that render at the same time, each with its share of the cores.",
-)
+
+def _workers(default: int | None, shown: str | bool = True) -> Callable[[Any], Any]:
+    return click.option(
+        "--workers",
+        default=default,
+        show_default=shown,
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Processes that render at the same time, each with its share of the cores.",
+    )
+
+
+workers_option = _workers(1)
+all_workers_option = _workers(None, "one per core")
 
 IN_PROCESSES = True
 """Whether scenes are read and rendered in processes apart; tests do so in their own."""
@@ -217,7 +224,7 @@ scheduler_option = click.option(
 
 
 def pool(
-    timeout: float, workers: int = 1, scheduler: str | None = None
+    timeout: float, workers: int | None = 1, scheduler: str | None = None
 ) -> AbstractContextManager[Pool | Cluster]:
     """Return where scenes are read and rendered: apart from the process that the user sees.
 
@@ -228,14 +235,15 @@ def pool(
     timeout
         Seconds that a task may take without any progress; Dask's clusters have limits of their own.
     workers
-        Processes at the same time.
+        Processes at the same time; None for one per core.
     scheduler
         Address of a Dask cluster to use in place of processes here. Its workers need the same
         folders.
     """
     if scheduler is None:
+        workers = workers or cores()
         return Pool(workers if IN_PROCESSES else 0, Ready.among(workers), timeout)
-    if workers > 1:
+    if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from comparisons.processes import cluster
 
@@ -295,6 +303,8 @@ class Ready:
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up
+
+        gc.freeze()  # what is loaded by now stays: collecting for each scene need not look at it
 
 
 def _enter(folder: str) -> None:

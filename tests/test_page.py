@@ -1,7 +1,6 @@
 """The record's schema, and the page: its numbers are the record's and it loads nothing."""
 
 import copy
-from dataclasses import replace
 from html.parser import HTMLParser
 
 import jsonschema
@@ -11,7 +10,6 @@ import pytest
 from comparisons.departure.metrics import METRICS, drawn
 from comparisons.verification import Factor, Verification
 from heuristic.equations import Entry
-from reports.files import images
 from reports.page import embedding, page
 from reports.run.stages import Failure
 from reports.terminal import printing
@@ -27,10 +25,16 @@ def record():
     return records.data()
 
 
+CHANNELS = (
+    {f"{half}.{c}": np.ones((4, 6)) for half in ("heuristic", "reference") for c in "RGB"}
+    | {f"reference_stderr.{colour}": np.zeros((4, 6)) for colour in "RGB"}
+    | {f"{name}.Y": np.ones((4, 6)) for name in (*drawn(), "significant")}
+)
+
+
 @pytest.fixture
 def pictures():
-    shown = records.images(4, 6)
-    return images.pictures(replace(shown, significant=shown.maps["dE2000"] > 9))
+    return embedding.embed(CHANNELS, np.ones((4, 6), bool))
 
 
 class Page(HTMLParser):
@@ -95,7 +99,7 @@ def test_no_required_key_may_be_missing(record):
 
 
 def test_the_numbers_on_the_page_are_the_records(record, pictures):
-    shown = Page(page.render([records.view(record, images=pictures)]))
+    shown = Page(page.render([records.view(record, embedded=pictures)]))
     values = {value for value, _ in shown.values}
     keys = ("metrics", "log2_luminance", "significant", "limits", "viewing", "pixels", "pairing")
     keys += ("time",)
@@ -116,7 +120,7 @@ def test_the_numbers_on_the_page_are_the_records(record, pictures):
 
 def test_two_scenes_keep_their_order_and_their_anchors(record, pictures):
     other = copy.deepcopy(record) | {"scene": "second"}
-    shown = Page(page.render([records.view(record, images=pictures), records.view(other)]))
+    shown = Page(page.render([records.view(record, embedded=pictures), records.view(other)]))
     ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
     assert len(ids) == len(set(ids))
     targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
@@ -136,15 +140,21 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record["pairing"]["bsdfs"][0]["parameters"][HOSTILE] = {HOSTILE: [HOSTILE]}
     record["pairing"]["misses"][0]["what"] = HOSTILE
     html = page.render(
-        [records.view(record, images=pictures, files={HOSTILE: "javascript:" + HOSTILE})],
+        [records.view(record, embedded=pictures, files={HOSTILE: "javascript:" + HOSTILE})],
         title=HOSTILE,
         failures=[Failure(scene=HOSTILE, error=HOSTILE)],
     )
     shown = Page(html)
     scripts = [attrs.get("type", "") for tag, attrs in shown.tags if tag == "script"]
     assert scripts.count("") == 1
-    assert scripts.count("module") == 2
-    assert set(scripts) == {"", "module", "application/json"}
+    assert scripts.count("module") == scripts.count("text/plain") == 1
+    assert set(scripts) == {
+        "",
+        "module",
+        "text/plain",
+        "application/json",
+        "application/octet-stream",
+    }
     assert not {"link", "iframe", "object", "base"} & {tag for tag, _ in shown.tags}
     for tag, attrs in shown.tags:
         assert not [name for name in attrs if name.startswith("on")], tag
@@ -163,11 +173,10 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
 
 
 def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
-    shown = Page(page.render([records.view(record, images=pictures)]))
-    pictures_shown = [attrs for tag, attrs in shown.tags if tag == "img"]
-    assert len(pictures_shown) == 7
-    assert len({attrs["src"] for attrs in pictures_shown}) == 7
-    assert all(len(attrs["alt"]) > 15 for attrs in pictures_shown)
+    shown = Page(page.render([records.view(record, embedded=pictures)]))
+    drawings = [attrs for tag, attrs in shown.tags if "data-picture" in attrs]
+    assert len({attrs["data-picture"] for attrs in drawings}) == len(drawings) == 7
+    assert all(len(attrs["aria-label"]) > 15 for attrs in drawings)
     for metric_ in METRICS.values():
         assert metric_.definition in shown.text
         assert metric_.caution in shown.text
@@ -176,14 +185,8 @@ def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
 
 
 def test_an_image_that_is_reduced_in_the_page_is_said_to_be(record, pictures, monkeypatch):
-    channels = {
-        f"{half}.{c}": np.ones((4, 6)) for half in ("heuristic", "reference") for c in "RGB"
-    }
-    channels |= {f"reference_stderr.{colour}": np.zeros((4, 6)) for colour in "RGB"}
-    channels |= {f"{name}.Y": np.ones((4, 6)) for name in (*drawn(), "significant")}
-
     def shown():
-        embedded = embedding.embed(channels, np.ones((4, 6), bool))
+        embedded = embedding.embed(CHANNELS, np.ones((4, 6), bool))
         return Page(page.render([records.view(record, embedded=embedded)])).text
 
     assert "means over" not in shown()
@@ -246,7 +249,7 @@ def test_the_index_of_equations_is_printed_with_code_and_escaped(record, picture
         Entry("8.5", "heuristic.terms.diffuse", "``I = k_d`` for ``N.L > 0``."),
         Entry("8.7", None, HOSTILE),
     ]
-    view = records.view(record, images=pictures)
+    view = records.view(record, embedded=pictures)
     html = page.render([view], equations=entries)
     assert "<code>I = k_d</code> for <code>N.L &gt; 0</code>." in html
     assert "heuristic.terms.diffuse" in html
@@ -270,7 +273,7 @@ def test_verifications_are_printed(record, pictures):
         for name, (value, low, high) in steps.items()
     )
     verification = Verification(scene=HOSTILE, planned="direct_all", everything="path", **numbers)
-    view = records.view(record, images=pictures)
+    view = records.view(record, embedded=pictures)
     html = page.render([view], verifications=[verification])
     assert "3 of 1436" in html
     assert "91.5 ×" in html

@@ -81,6 +81,27 @@ def test_progress_has_time_left_and_colours_unless_no_color_is_set(no_color, col
     assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is coloured
 
 
+def test_the_line_of_the_run_and_every_bar_reach_their_end(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress.shown(total=5) as bar:
+        whole = bar._progress.tasks[0]
+        bar.begin("first pictures", 2, weight=1)
+        for scene in "ab":
+            update = bar.of(scene)
+            update("rendering", 1, 2)
+            bar.over(update)
+        assert whole.percentage == 40
+        assert whole.description == "first pictures, 2 of 2"
+        bar.begin("scenes", 1, weight=1, skipped=1)
+        assert whole.percentage == 50
+        bar.begin("the rest", 2, weight=1)
+        bar.over(None)
+        bar.over(None)
+        assert whole.finished
+        assert bar._progress.tasks == [whole]
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_prints_what_the_shell_sources(shell, run):
     code, printed, messages = run("completion", shell)

@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -186,6 +187,13 @@ class _Around:
             own_freedom=freedom,
         )
 
+    @cached_property
+    def quantile(self) -> Array:
+        """Student's quantile at 97.5 % for the pixels of each block: they share their freedom."""
+        from scipy.special import stdtrit
+
+        return stdtrit(self.pooled_freedom + self.own_freedom, 0.975)
+
     def differing(self, level: float, inflation: float) -> NDArray[np.bool_]:
         """The blocks (h, w) that differ.
 
@@ -220,12 +228,16 @@ def _variance(difference: DifferenceEstimate, rows: slice) -> Array:
 
 @dataclass(frozen=True)
 class _Pixels:
-    """Some pixels (N, 3), with what is pooled around them; ``sizes`` (2, N, 3)."""
+    """Some pixels (N, 3), with what is pooled around them; ``sizes`` (2, N, 3).
+
+    ``quantile`` is Student's at 97.5 %, for ``freedom``.
+    """
 
     difference: Array
     variance: Array
     sizes: Array
     freedom: Array
+    quantile: Array
 
     @classmethod
     def of(
@@ -235,13 +247,13 @@ class _Pixels:
         mask = mask[rows]
         mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
-        prior, pooled, *sizes = (
-            spread_out(values[blocks], mask.shape)[mask]
-            for values in (around.pooled_freedom, around.pooled_variance, *around.sizes)
+        pooled = around.pooled_freedom, around.quantile, around.pooled_variance
+        prior, quantile, pooled, *sizes = (
+            spread_out(values[blocks], mask.shape)[mask] for values in (*pooled, *around.sizes)
         )
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * own) / freedom
-        return cls(mean, np.maximum(own, moderated), np.array(sizes), freedom)
+        return cls(mean, np.maximum(own, moderated), np.array(sizes), freedom, quantile)
 
     def chances(self) -> Array:
         return _chances(self.difference, self.variance, self.sizes, self.freedom)
@@ -253,9 +265,7 @@ class _Pixels:
         reference makes the true difference smaller. Open is also where neither a pixel nor any
         other has noise: nothing has come that could vary.
         """
-        from scipy.special import stdtrit
-
-        t = stdtrit(self.freedom, 0.975)
+        t = self.quantile
         half = t * t * self.sizes / 2.0
         below, above = half + np.sqrt(half**2 + t * t * self.variance)
         ends = shown - self.difference + below, shown - self.difference - above

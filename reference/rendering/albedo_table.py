@@ -30,8 +30,11 @@ class AlbedoTable:
     def __init__(self, bsdf: Any):
         self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         mu = np.linspace(1e-3, 1, NODES) ** 2
-        grid_mu = mi.Float(np.repeat(mu, SAMPLES))
-        points = [mi.Float(np.tile(row, NODES)) for row in lattice(SAMPLES)[:3]]
+        # Spread out by the kernel: millions of numbers need not come from here.
+        places = dr.arange(mi.UInt32, NODES * SAMPLES)
+        grid_mu = dr.gather(mi.Float, mi.Float(mu), places // SAMPLES)
+        rows = lattice(SAMPLES)[:3]
+        points = [dr.gather(mi.Float, mi.Float(row), places % SAMPLES) for row in rows]
         si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
         si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
         _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))

@@ -2,7 +2,7 @@
 
 import click
 
-from reports import jobs
+from reports import jobs, opening
 from reports.run import batch
 from reports.terminal import verbosity
 
@@ -45,6 +45,7 @@ from reports.terminal import verbosity
     default=None,
     help="Find causes and remedies, in a small size; not of a picture. [default: why]",
 )
+@opening.option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
 def compare(
     scenes,
@@ -57,6 +58,7 @@ def compare(
     timeout,
     workers,
     scheduler,
+    is_opened,
     **rendering,
 ):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
@@ -86,5 +88,7 @@ def compare(
     if has_image and (len(scenes) > 1 or is_asked):
         raise click.UsageError("--image goes with one scene, and without --why.")
     with_cost = is_asked or (with_cost is None and not has_image)
-    wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
-    batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler))
+    request = jobs.request(rendering)
+    wanted = batch.Wanted(request, figures, with_cost=with_cost, fresh=fresh, with_scripts=scripts)
+    rendered = jobs.pool(timeout, workers, scheduler)
+    batch.run(scenes, output, wanted, rendered, seen=opening.seen(is_opened))

@@ -52,7 +52,7 @@ def plan(scene, as_json, verify, within, metric, timeout, **rendering):
             lines, code = [choice_lines.sentence(found)], int(found.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                task = Task(scene, tasks.verified, (scene, request, None), bar.of(scene))
+                task = Task(scene, tasks.verified, (scene, request, None, True), bar.of(scene))
                 found = pool.do(task)
             lines = plan_lines.verification_lines([found])
         else:

@@ -1,16 +1,22 @@
 """``fotismos report``: all built-in scenes in one report."""
 
 from dataclasses import replace
+from itertools import chain
 
 import click
 
 from comparisons.processes.worker import Task
-from reports import jobs
+from reports import jobs, opening
 from reports.run import batch, tasks
 from reports.terminal import verbosity
 
-VERIFIED_AT = (96, 96)
+VERIFIED_AT = (64, 64)
 """Resolution at which a report verifies its plans."""
+
+QUICK = {"resolution": (64, 64), "spp": 16}
+"""What ``--quick`` stands for where nothing else is asked for."""
+
+QUICKLY_VERIFIED_AT = (32, 32)
 
 
 @click.command()
@@ -18,51 +24,63 @@ VERIFIED_AT = (96, 96)
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.timeout_option
-@jobs.workers_option
+@jobs.all_workers_option
 @jobs.scheduler_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-def report(output, figures, fresh, timeout, workers, scheduler, **rendering):
+@click.option("--quick", is_flag=True, help="Everything at a small size, in a minute or two.")
+@opening.option
+def report(output, figures, fresh, timeout, workers, scheduler, quick, is_opened, **rendering):
     """Compare all built-in scenes, price their effects, and write one report.
 
     Writes what `compare` does, and in the page the plans verified, the hard cases and the
-    index of equations.
+    index of equations. The page is there after some seconds, with all scenes at a small size, and
+    is written again as they are refined.
 
     \b
     Examples:
       fotismos report
+      fotismos report --quick --open
       fotismos report --resolution 128x128 -o small --figures
     """  # noqa: D301 click reads the \b as: keep these lines
     from comparisons.gallery.builtin import SCENES
 
+    if quick:
+        rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
 
-    def more(pool, run):
+    def more(pool, run, bar):
         from heuristic import equations
 
-        with run.timing("verification"):
-            verifications = [] if request.everything else _verified(pool, SCENES, request)
-        with run.timing("hard cases"):
-            cases = pool.do(Task("hard cases", tasks.hard_cases, ()))
+        names = [] if request.everything else list(SCENES)
+        with run.timing("verification and hard cases"):
+            cases, verifications = _verified(pool, bar, names, request, quick)
         return {
             "verifications": verifications,
             "hard_cases": cases,
             "equations": equations.index(),
         }
 
-    wanted = batch.Wanted(request, figures, with_cost=True, fresh=fresh)
-    batch.run(tuple(SCENES), output, wanted, jobs.pool(timeout, workers, scheduler), more)
+    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh)
+    rendered = jobs.pool(timeout, workers, scheduler)
+    batch.run(tuple(SCENES), output, wanted, rendered, more, opening.seen(is_opened))
 
 
-def _verified(pool, names, request):
-    """Hold the plan of each scene against everything simulated, at a small size."""
+def _verified(pool, bar, names, request, quick):
+    """Evaluate the hard cases, and compare the plan of each scene with everything simulated."""
     from comparisons.check.moved import level_of_each
     from comparisons.verification import LEVEL
-    from reports.terminal import progress
 
-    small = replace(request, resolution=VERIFIED_AT, spp=None)
-    level = level_of_each(LEVEL, len(names))
-    with progress.shown() as bar:
-        wanted = [Task(name, tasks.verified, (name, small, level), bar.of(name)) for name in names]
-        return [outcome.result() for _, outcome in pool.each(wanted)]
+    size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
+    small = replace(request, resolution=size, spp=None)
+    level = level_of_each(LEVEL, len(names)) if names else None
+    verified = (
+        Task(name, tasks.verified, (name, small, level, not quick), bar.of(name)) for name in names
+    )
+    found = {}
+    bar.begin("verification and hard cases", 1 + len(names), batch.MORE)
+    for task, outcome in pool.each(chain([Task("hard cases", tasks.hard_cases, ())], verified)):
+        found[task.name] = outcome.result()
+        bar.over(task.progress)
+    return found["hard cases"], [found[name] for name in names]

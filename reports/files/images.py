@@ -95,12 +95,8 @@ def png(picture: Image.Image, longest: int | None = None) -> bytes:
     return buffer.getvalue()
 
 
-def pictures(shown: Images, exposure: float = 1.0, longest: int | None = None) -> dict[str, bytes]:
-    """The PNG files of a comparison by name, each map over the fixed range of its metric.
-
-    longest
-        As for `png`: None for files, about 1600 for pictures inside a page.
-    """
+def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
+    """The PNG files of a comparison by name, each map over the fixed range of its metric."""
     made = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
@@ -109,7 +105,7 @@ def pictures(shown: Images, exposure: float = 1.0, longest: int | None = None) -
     }
     for name, metric in drawn().items():
         made[name] = error_map(shown.maps[name], metric.map_range[1])
-    return {name: png(picture, longest) for name, picture in made.items()}
+    return {name: png(picture) for name, picture in made.items()}
 
 
 def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:

@@ -5,8 +5,9 @@ but how to print a number.
 Names and messages come from users' files, so everything is escaped, and the page may load nothing:
 a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
 
-The page is whole without JavaScript: pictures, numbers and charts, one scene after another. With
-it, ``templates/viewer`` shows one scene at a time, by its embedded numbers.
+Without JavaScript the page has small pictures, numbers and charts, one scene after another. With
+it, ``templates/viewer`` shows one scene at a time, by its embedded numbers, and the others wait as
+text.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import overview, verdict_view
 from reports.page.legends import legends
-from reports.page.scene_view import SceneView
+from reports.page.scene_view import Making, SceneView
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import (
     NOTICEABLE,
@@ -70,11 +71,14 @@ STYLES = ("base", "verdict", "overview", "scene", "viewer", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "main",
+    "verdict", "lazy", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
 EARLY = 'document.documentElement.className = "js";'
+
+#: Tells the page that the module before it has run, of which inline ones say nothing.
+LOADED = '\nwindow.dispatchEvent(new Event("vega"));'
 
 
 class Scene(SceneView, kw_only=True):
@@ -98,12 +102,13 @@ def render(
     hard_cases: HardCases | None = None,
     failures: Sequence[Failure] = (),
     run: Run | None = None,
+    making: Making | None = None,
 ) -> str:
     """One HTML page of all scenes, in the order given.
 
     `equations` is the index of `heuristic.equations`; it, `verifications` and `hard_cases` are
     sections of their own, left out where they are empty. `failures` are the scenes that could not
-    be compared. `run` says where the time went.
+    be compared. `run` says where the time went, `making` how far a run is that has not ended.
     """
     taken: set[str] = set()
     scenes = [_scene(view, taken) for view in views]
@@ -113,7 +118,7 @@ def render(
     ]
     charted = any(scene.histograms or scene.charts for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
-    scripts = [EARLY, *([vega.bundle()] if charted else []), '"use strict";\n' + code]
+    scripts = [EARLY, *([vega.bundle() + LOADED] if charted else []), '"use strict";\n' + code]
     return (
         _environment()
         .get_template("page.html.j2")
@@ -133,6 +138,7 @@ def render(
             verifications=verifications,
             **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
             run=run,
+            making=making,
         )
     )
 

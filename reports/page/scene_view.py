@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
@@ -39,25 +41,34 @@ class SceneView(Record):
 
     record
         The content of ``comparison.json``.
-    images
-        PNG bytes by name, as `reports.files.images.pictures` makes them. A missing one is left out.
     thumbnails
         Small PNG bytes by name, of both halves and of the map by which scenes are judged.
     embedded
-        The images as numbers, without which the scene has no viewer.
+        The images as numbers, without which the scene has no pictures but the thumbnails.
     files
         Paths relative to the page by label, shown as links.
     charts, cost
         Of what accuracy costs, where that was studied.
+    is_coarse
+        Whether it is a small preview, which a later writing of the page replaces.
     """
 
     record: ComparisonRecord
-    images: dict[str, bytes] = field(default_factory=dict)
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     embedded: Embedded | None = None
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
+    is_coarse: bool = False
+
+
+@dataclass(frozen=True)
+class Making:
+    """How many of the scenes of a run are refined, where the page is not finished yet."""
+
+    done: int
+    total: int
+    is_interrupted: bool = False
 
 
 def picture_name(kind, name):

@@ -2,7 +2,7 @@
 
 A scene that cannot be compared does not keep the others from it: the page names it with its error,
 and the command ends with that error's exit code. Scenes are compared in a process apart, which one
-of them may kill.
+of them may kill. The page is written as soon as there is a picture, and again as the run goes on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from comparisons.processes.pool import Pool
 from comparisons.processes.worker import Task
-from heuristic.errors import FotismosError, InstallationError
+from heuristic.errors import FotismosError, InstallationError, LostProcessError
 from reports import jobs
 from reports.run import single
 from reports.run.single import Wanted
@@ -22,12 +22,21 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from reports.run.stages import Run
+    from reports.terminal.progress import Bar
 
-More = Callable[[Pool, "Run"], dict[str, Any]]
+More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
+
+SKETCH, WHOLE, MORE = 1.0, 8.0, 3.0
+"""About how long a scene takes in each part of a run, for the time that is left."""
 
 
 def run(
-    names: Iterable[str], folder: Path, wanted: Wanted, pool: Pool, more: More | None = None
+    names: Iterable[str],
+    folder: Path,
+    wanted: Wanted,
+    pool: Pool,
+    more: More | None = None,
+    seen: Callable[[Path], object] = lambda _: None,
 ) -> None:
     """Compare scenes, and write the results of each, then page and tables of all.
 
@@ -43,6 +52,8 @@ def run(
         Where they are compared; it is ended.
     more
         Does what else the page shows in the pool, counts its time, and returns it in a dictionary.
+    seen
+        Called with the page's path when it is there for the first time.
 
     Raises
     ------
@@ -53,7 +64,9 @@ def run(
         pool.start()
         from reports.files import ownership
         from reports.run import output, stages
+        from reports.run.growing import Growing
         from reports.run.places import places
+        from reports.terminal import progress
 
         scenes = jobs.expand(names, wanted.with_scripts)
         requests = dict(zip(scenes, jobs.requests(wanted.request, scenes), strict=True))
@@ -62,20 +75,38 @@ def run(
             found = places(folder, scenes)
             output.require_free(folder, found, wanted.figures)
             record = stages.Run(command)
-            shown = more(pool, record) if more else {}
-            views, failures = {}, {}
+            growing = Growing(folder, found, seen)
+            each = {
+                place: (name, folder, place, replace(wanted, request=requests[name]))
+                for place, name in found.items()
+            }
+            shown, error = {}, None
+            weight = SKETCH * wanted.sketched + WHOLE + MORE * bool(more)
             try:
-                _compare(pool, record, found, folder, wanted, requests, views, failures)
+                with progress.shown(total=weight * len(found)) as bar:
+                    if wanted.sketched:
+                        with record.timing("first pictures"):
+                            _sketch(pool, growing, each, bar)
+                    _compare(pool, record, growing, each, bar)
+                    if more and growing.views:
+                        growing.offer(at_once=True)
+                        shown = more(pool, record, bar)
             except KeyboardInterrupt:
                 pool.end()  # before its half written files are cleared away
                 ownership.recover(folder)
-                if views or failures:
-                    _write(record, folder, found, views, failures, wanted.figures, shown)
+                if growing.has_begun:
+                    _write(record, growing, wanted.figures, shown, is_interrupted=True)
                 raise
-            _write(record, folder, found, views, failures, wanted.figures, shown)
-    if failures:
-        error = max(failures.values(), key=lambda error: error.exit_code)
-        count = f"{len(failures)} of {len(found)} scenes failed, "
+            except FotismosError as raised:
+                if not growing.views:
+                    raise
+                error = raised
+            _write(record, growing, wanted.figures, shown)
+    if error:
+        raise error
+    if growing.failures:
+        error = max(growing.failures.values(), key=lambda error: error.exit_code)
+        count = f"{len(growing.failures)} of {len(found)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
 
 
@@ -87,52 +118,69 @@ def _verdict(views):
     return ["", *verdict.sentences(found), *verdict.advice(found)]
 
 
-def _compare(pool, record, places, folder, wanted, requests, views, failures):
-    """Collect the views of the scenes that are compared, and the errors of the others."""
+def _tasks(function, each, bar):
     from comparisons.case import name_of
+
+    return (
+        Task(place, function, words, bar.of(name_of(words[0]))) for place, words in each.items()
+    )
+
+
+def _sketch(pool, growing, each, bar):
+    """Collect coarse views of the scenes; those that are finished already are taken as they are."""
+    bar.begin("first pictures", len(each), SKETCH)
+    for task, outcome in pool.each(_tasks(single.sketch, each, bar)):
+        try:
+            view = outcome.result()
+        except LostProcessError as error:  # it would be lost again
+            growing.failures[task.name] = error
+        except FotismosError:
+            continue  # at its own size it may be another matter
+        else:
+            (growing.coarse if view.is_coarse else growing.views)[task.name] = view
+        finally:
+            bar.over(task.progress)
+        growing.offer()
+
+
+def _compare(pool, record, growing, each, bar):
+    """Collect the views of the scenes that are compared, and the errors of the others."""
     from reports.terminal import progress
 
-    alone = len(places) == 1
-    with progress.shown() as bar:
-        tasks = (
-            Task(
-                place,
-                single.compare,
-                (name, folder, place, replace(wanted, request=requests[name])),
-                bar.of(name_of(name)),
-            )
-            for place, name in places.items()
-        )
-        for task, outcome in pool.each(tasks):
-            try:
-                view, spent = outcome.result()
-            except InstallationError:
+    left = {p: w for p, w in each.items() if p not in growing.views and p not in growing.failures}
+    bar.begin("scenes", len(left), WHOLE, skipped=len(each) - len(left))
+    for task, outcome in pool.each(_tasks(single.compare, left, bar)):
+        try:
+            view, spent = outcome.result()
+        except InstallationError:
+            raise
+        except FotismosError as error:
+            if len(each) == 1:
                 raise
-            except FotismosError as error:
-                if alone:
-                    raise
-                failures[task.name] = error
-                continue
-            views[task.name] = view
-            for stage, seconds in spent.seconds.items():
-                record.add(stage, seconds)
-            verbosity.remark(progress.details(view.record))
+            growing.failures[task.name] = error
+            growing.coarse.pop(task.name, None)
+            continue
+        finally:
+            bar.over(task.progress)
+        growing.views[task.name] = view
+        for stage, seconds in spent.seconds.items():
+            record.add(stage, seconds)
+        verbosity.remark(progress.details(view.record))
+        growing.offer()
 
 
-def _write(run, folder, places, views, failures, with_figures, shown):
+def _write(run, growing, with_figures, shown, is_interrupted=False):
     """Write what is about all scenes, in the order of their places, and say what came of them."""
     from reports.run import output
-    from reports.run.stages import Failure
     from reports.terminal import progress, tables
 
-    # Of several processes the one with the shorter scene is ready first.
-    views = [views[place] for place in places if place in views]
-    failed = [place for place in places if place in failures]
-    run.failures = [Failure(scene=place, error=str(failures[place])) for place in failed]
+    folder, run.failures = growing.folder, growing.failed()
     run.begin_page()
+    views = [view for view in growing.shown() if not view.is_coarse]
     records = [view.record for view in views]
+    making = growing.making(is_interrupted) if is_interrupted or not growing.is_whole else None
     steps = [
-        lambda: output.write_page(folder, views, failures=run.failures, run=run, **shown),
+        lambda: growing.write(failures=run.failures, run=run, making=making, **shown),
         lambda: output.write_run(folder, run.record()),
     ]
     if views:

@@ -1,11 +1,15 @@
 """Writing the results of a run atomically, and never at the cost of an earlier result."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
+
+from msgspec import structs
 
 from comparisons import atomic
 from comparisons.departure.metrics import drawn
+from comparisons.record import Comparison
 from comparisons.records import to_json
 from heuristic.errors import OutputError
 from reports.files import exr, holding, images, ownership
@@ -13,9 +17,6 @@ from reports.page import embedding, page
 from reports.page.scene_view import SceneView
 from reports.run import finished
 from reports.run.places import FIGURES, PAGE, RUN, TABLES
-
-LONGEST_IN_PAGE = 1024
-"""Pixels; longer pictures are reduced inside the page, never in the files."""
 
 
 @contextmanager
@@ -110,17 +111,12 @@ def write_scene(folder, name, comparison, study=None, key=None):
     record, shown = comparison.record, comparison.images
     if study:
         from reports.run import cost_files
-    exposure = record.viewing.exposure
     layers = _layers(shown)
-    pictured = images.pictures(shown, exposure)
-    reduced = max(record.resolution) > LONGEST_IN_PAGE
+    pictured = images.pictures(shown, record.viewing.exposure)
     priced = cost_files.documents(study) if study else {}
     links = ("comparison.json", "comparison.exr", *(("cost.json",) if study else ()))
-    view = SceneView(
-        record=record,
-        images=images.pictures(shown, exposure, LONGEST_IN_PAGE) if reduced else pictured,
-        thumbnails=images.thumbnails(shown, exposure),
-        embedded=embedding.embed(exr.channels(layers), shown.counted),
+    view = structs.replace(
+        view_of(comparison, layers),
         files={file: f"{name}/{file}" for file in links},
         charts=tuple(cost_files.figures(study.record)) if study else (),
         cost=cost_files.view(study, priced) if study else None,
@@ -135,6 +131,16 @@ def write_scene(folder, name, comparison, study=None, key=None):
         if key is not None:
             finished.save(place, key, view)
     return view
+
+
+def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> SceneView:
+    """Return what the page shows of a comparison without its files; ``layers`` are its images."""
+    shown = comparison.images
+    return SceneView(
+        record=comparison.record,
+        thumbnails=images.thumbnails(shown, comparison.record.viewing.exposure),
+        embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
+    )
 
 
 def write_page(folder, views, **shown):

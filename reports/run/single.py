@@ -15,16 +15,21 @@ if TYPE_CHECKING:
     from reports.run.stages import Stages
 
 
+SKETCH_WIDTH, SKETCH_SPP = 64, 8
+"""Pixels and samples per pixel of a scene's first, coarse pictures."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What a command wants of each of its scenes.
 
-    ``request`` says how; ``fresh`` renders what is finished, too; ``with_scripts`` runs the scripts
-    that are found in folders.
+    ``request`` says how; ``sketched`` begins with all scenes at a small size; ``fresh`` renders
+    what is finished, too; ``with_scripts`` runs the scripts that are found in folders.
     """
 
     request: Request
     figures: bool = False
+    sketched: bool = False
     with_cost: bool = False
     fresh: bool = False
     with_scripts: bool = False
@@ -48,15 +53,13 @@ def compare(
     """
     from comparisons.case import open_case
     from comparisons.compare import compare
-    from reports.run import finished, kept, output
+    from reports.run import output
     from reports.run.stages import Stages
 
     spent = Stages()
     case = open_case(name, wanted.request)
     with spent.timing("finished scenes"):
-        passes = kept.of_scene(folder, place, case)
-        key = finished.key_of(passes.key, case.options, wanted.with_cost, wanted.figures)
-        found = None if wanted.fresh else finished.load(folder / place, key)
+        passes, key, found = _finished(case, folder, place, wanted)
     if found is not None:
         return found, spent
     begin = perf_counter()
@@ -74,6 +77,32 @@ def compare(
         view = output.write_scene(folder, place, result, study, key)
     passes.remove()
     return view, spent
+
+
+def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress) -> SceneView:
+    """Return the view of a finished scene, or else a coarse one, without causes and files."""
+    from comparisons.case import open_case
+    from comparisons.compare import compare
+    from comparisons.cost.effort import reduced
+    from reports.run import output
+
+    case = open_case(name, wanted.request)
+    *_, found = _finished(case, folder, place, wanted)
+    if found is not None:
+        return found
+    size = reduced(case.source, case.options, SKETCH_WIDTH)
+    small = replace(case.options, resolution=size, spp=SKETCH_SPP, noise=None)
+    made = compare(case.source, small, progress, case.command())
+    return structs.replace(output.view_of(made), is_coarse=True)
+
+
+def _finished(case, folder, place, wanted):
+    """Return the kept passes of a scene, the key of its result, and that if it is finished."""
+    from reports.run import finished, kept
+
+    passes = kept.of_scene(folder, place, case)
+    key = finished.key_of(passes.key, case.options, wanted.with_cost, wanted.figures)
+    return passes, key, None if wanted.fresh else finished.load(folder / place, key)
 
 
 def _explained(case, progress, comparison):

@@ -29,7 +29,8 @@ class RunRecord(Record, kw_only=True):
 
     command: str
     stages: Annotated[
-        dict[str, float], Meta(description="Wall time in seconds; together they are the run's.")
+        dict[str, float],
+        Meta(description="Wall time in seconds, added up over processes at the same time."),
     ]
     failures: tuple[Failure, ...]
     machine: Machine
@@ -38,7 +39,7 @@ class RunRecord(Record, kw_only=True):
 
 
 class Stages:
-    """Wall time by stage, in seconds."""
+    """Wall time by stage, in seconds, added up over processes at the same time."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

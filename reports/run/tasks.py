@@ -28,16 +28,20 @@ def planned(name: str, request: Request) -> PlanReport:
     return plan_lines.report(case.name, prepare(case.source, case.options), case.variant)
 
 
-def verified(name: str, request: Request, level: float | None, progress: Any) -> Verification:
-    """Hold the plan of a scene against everything simulated.
+def verified(
+    name: str, request: Request, level: float | None, steps: bool, progress: Any
+) -> Verification:
+    """Compare the plan of a scene with everything simulated.
 
-    ``level`` is the chance that a right plan is marked; None takes the usual one.
+    ``level`` is the chance that a right plan is marked; None takes the usual one. ``steps`` also
+    measures what each step of planning gives.
     """
     from comparisons.case import open_case
     from comparisons.verification import LEVEL, verify
 
     case = open_case(name, request)
-    return verify(case.source, case.options, progress, LEVEL if level is None else level)
+    usual = LEVEL if level is None else level
+    return verify(case.source, case.options, progress, usual, steps)
 
 
 def chosen(name: str, request: Request, within: float, metric: str, progress: Any) -> Choice:

@@ -1,9 +1,11 @@
 """What a person sees while a command runs and when it has ended."""
 
 from contextlib import contextmanager
+from functools import partial
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
@@ -11,38 +13,81 @@ from reports.terminal import verbosity
 from reports.terminal.printing import seconds
 from reports.terminal.tables import printed
 
+SPEED_OVER_S = 600.0
+"""Seconds over which the speed is taken that the time left follows from: scenes differ."""
+
 
 class Bar:
-    """A progress bar on standard error, one task a scene; silent where no person is watching."""
+    """Progress bars on standard error, one per scene; silent where no person is watching.
 
-    def __init__(self, progress):
-        self._progress = progress
+    Parameters
+    ----------
+    progress : rich.progress.Progress
+        Which shows them.
+    unit
+        What a scene's bar counts.
+    total
+        Of the line for the whole run, in the weights that :meth:`begin` names; None for none.
+    """
+
+    def __init__(self, progress, unit="passes", total=None):
+        self._progress, self._unit = progress, unit
+        self._whole = total and progress.add_task("", total=total, unit="", is_whole=True)
+        self._stage, self._done, self._count, self._weight = "", 0, 0, 0.0
 
     def of(self, scene):
         """Return the callback ``(stage, done, total)`` for one scene."""
-        task = self._progress.add_task(scene, total=None)
+        task = self._progress.add_task(scene, total=None, unit=self._unit, is_whole=False)
+        return partial(self._update, task)
 
-        def update(stage, done, total):
-            self._progress.update(task, completed=done, total=total)
+    def begin(self, stage, count, weight, skipped=0):
+        """Begin a stage of the run: how many tasks it has, of which weight; others are skipped."""
+        self._stage, self._done, self._count, self._weight = stage, 0, count, weight
+        if self._whole is not None:
+            total = self._progress.tasks[0].total - skipped * weight
+            self._progress.update(self._whole, total=total, description=self._words())
 
-        return update
+    def over(self, update):
+        """End the task whose callback is ``update``: its bar goes, and that of the run goes on."""
+        if update is not None:
+            self._progress.remove_task(update.args[0])
+        self._done += 1
+        if self._whole is not None:
+            self._progress.update(self._whole, advance=self._weight, description=self._words())
+
+    def _words(self):
+        return f"{self._stage}, {self._done} of {self._count}"
+
+    def _update(self, task, stage, done, total):
+        self._progress.update(task, completed=done, total=total)
+
+
+class _Count(MofNCompleteColumn):
+    """How much of a task is done: of the whole run in percent."""
+
+    def render(self, task):
+        return Text(f"{task.percentage:.0f} %") if task.fields["is_whole"] else super().render(task)
 
 
 @contextmanager
-def shown(unit="passes"):
-    """Show progress on standard error while the block runs, if that is a terminal."""
+def shown(unit="passes", total=None):
+    """Show progress on standard error while the block runs, if that is a terminal.
+
+    ``unit`` and ``total`` are those of :class:`Bar`.
+    """
     console = Console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),  # a name may hold brackets
         BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(unit),
+        _Count(),
+        TextColumn("{task.fields[unit]}"),
         TimeRemainingColumn(),
         console=console,
         transient=True,
+        speed_estimate_period=SPEED_OVER_S,
         disable=not console.is_terminal or verbosity.level() < 0,
     ) as progress:
-        yield Bar(progress)
+        yield Bar(progress, unit, total)
 
 
 def summary(records):

@@ -163,6 +163,11 @@ class Visitor:
         )
         self.settle()
 
+    def see_charts(self):
+        """Scroll to the charts of the open scene, and wait until Vega has drawn one."""
+        self.page.locator(".scene.open .charts").last.scroll_into_view_if_needed()
+        self.page.wait_for_function("() => document.querySelector('.scene.open .vega-embed svg')")
+
     def settle(self):
         """Wait for two frames: drawing is asked for in one and done in the next."""
         self.page.evaluate(

@@ -14,6 +14,8 @@ SCENE = f"#scene={NOISY_ID}"
 
 def enlivened(visitor):
     page = visitor.open(SCENE)
+    for charts in page.locator(".scene.open .charts").all():
+        charts.scroll_into_view_if_needed()
     page.wait_for_function(
         "() => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === 5"
     )

@@ -20,7 +20,7 @@ def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
     assert page.url.startswith("file:")
     page.get_by_role("link", name="exact").first.click()
     visitor.wait_for_viewer("exact")
-    page.wait_for_function("() => document.querySelector('.scene.open .chart.vega-embed svg')")
+    visitor.see_charts()
     assert [url for url in visitor.requests if not url.startswith(("data:", "about:"))] == [
         visitor.report.url
     ]
@@ -56,9 +56,7 @@ def test_axe_finds_no_violation(visitor):
     for fragment in VIEWS:
         page = visitor.open(fragment)
         if "scene=" in fragment:
-            page.wait_for_function(
-                "() => document.querySelector('.scene.open .chart.vega-embed svg')"
-            )
+            visitor.see_charts()
         assert not violations(page), fragment
 
 
@@ -91,22 +89,48 @@ def test_side_by_side_is_stacked_on_a_phone(visitor):
 
 
 @pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
-def test_without_scripts_all_scenes_have_pictures_numbers_and_charts(visitor):
+def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visitor):
     page = visitor.page
     page.goto(visitor.report.url)
     assert page.locator(".scene:visible").count() == 2
-    assert page.locator(".scene .pictures img:visible").count() == 14
+    assert page.locator(".card img:visible").count() == 6
+    assert page.locator("canvas:visible").count() == 0
     assert page.locator(".scene .chart svg:visible").count() == 8
     assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0
 
 
-def test_paper_gets_the_static_pictures(visitor):
+COLOURS = """canvases => canvases.map((canvas) => {
+  const { width, height } = canvas;
+  const copy = Object.assign(document.createElement("canvas"), { width, height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
+  return new Set(new Uint32Array(data.buffer)).size;
+})"""
+
+
+def test_paper_gets_the_pictures_of_the_open_scene(visitor):
     page = visitor.open(f"#scene={NOISY_ID}")
+    pictures = page.locator(".scene .pictures canvas")
+    assert max(pictures.evaluate_all(COLOURS)) == 1
     page.emulate_media(media="print")
     assert not page.locator("#viewer").is_visible()
     assert page.locator(".scene:visible").count() == 1
-    assert page.locator(".scene .pictures img:visible").count() == 7
+    assert pictures.and_(page.locator(":visible")).count() == 7
+    assert min(pictures.evaluate_all(COLOURS)) > 2
     visitor.open()
-    assert page.locator(".scene:visible").count() == 2
+    assert page.locator(".scene:visible").count() == 0
     assert page.locator(".overview").is_visible()
+    assert page.locator(".card img:visible").count() == 6
+
+
+def test_scenes_are_made_when_they_are_opened(visitor):
+    page = visitor.open()
+    assert page.locator(".scene").count() == 0
+    for scene in (NOISY_ID, "exact", NOISY_ID):
+        visitor.open(f"#scene={scene}")
+        assert page.locator(".scene:visible h2").count() == 1
+    assert page.locator(".scene").count() == 2
+    assert page.evaluate("window.vegaEmbed") is None
+    visitor.see_charts()

@@ -1,14 +1,37 @@
-// Charts: the pictures in the page made live by Vega, where the page holds it.
+// Charts: the pictures in the page made live by Vega, once they are seen.
 
-/** @param {HTMLElement} section */
-async function enliven(section) {
-  const embed = /** @type {any} */ (window).vegaEmbed;
-  if (!embed) return;
-  for (const chart of section.querySelectorAll(".chart:not(.live)")) {
-    chart.classList.add("live");
-    const spec = JSON.parse(chart.closest("figure")?.querySelector("script")?.textContent ?? "{}");
-    // Expressions are interpreted: the page's policy forbids code made of text.
-    await embed(chart, spec, { ast: true, renderer: "svg", actions: false, mode: "vega-lite" });
-    chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart's label says it
+/** Vega is text until the first chart needs it. @type {Promise<any> | undefined} */
+let vega;
+
+/** @returns {Promise<any>} */
+function loadVega() {
+  return (vega ??= new Promise((done) => {
+    const textContent = document.getElementById("vega")?.textContent;
+    window.addEventListener("vega", () => done(/** @type {any} */ (window).vegaEmbed));
+    document.body.append(Object.assign(document.createElement("script"), { type: "module", textContent }));
+  }));
+}
+
+const seen = new IntersectionObserver((entries) => {
+  for (const { target, isIntersecting } of entries) {
+    if (!isIntersecting) continue;
+    seen.unobserve(target);
+    void enliven(target);
   }
+}, { rootMargin: "200px" });
+
+/** @param {Element} section */
+function watchCharts(section) {
+  if (!document.getElementById("vega")) return;
+  for (const chart of section.querySelectorAll(".chart:not(.live)")) seen.observe(chart);
+}
+
+/** @param {Element} chart */
+async function enliven(chart) {
+  const embed = await loadVega();
+  chart.classList.add("live");
+  const spec = JSON.parse(chart.closest("figure")?.querySelector("script")?.textContent ?? "{}");
+  // Expressions are interpreted: the page's policy forbids code made of text.
+  await embed(chart, spec, { ast: true, renderer: "svg", actions: false, mode: "vega-lite" });
+  chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart's label says it
 }

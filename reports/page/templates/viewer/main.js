@@ -34,9 +34,8 @@ function begin() {
 function show() {
   const scene = page.scenes.find((/** @type {any} */ one) => one.id === view.scene);
   document.documentElement.dataset.view = scene ? "scene" : "overview";
-  for (const section of document.querySelectorAll(".scene")) {
-    section.classList.toggle("open", section.id === `scene=${view.scene}`);
-  }
+  const open = scene && sectionOf(scene.id);
+  for (const section of document.querySelectorAll(".scene")) section.classList.toggle("open", section === open);
   if (!scene) overview.show(view);
   if (!scene?.images) return;
   if (viewer.scene !== scene) openScene(scene);
@@ -47,7 +46,7 @@ function show() {
 function openScene(scene) {
   const section = byId(`scene=${scene.id}`);
   void viewer.open(scene, section);
-  void enliven(section);
+  watchCharts(section);
 }
 
 /** @param {string} id @returns {HTMLElement} */
@@ -74,6 +73,7 @@ function turn(step) {
   address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, scene: next.id }));
 }
 
+listenToPrinting(viewer);
 listenToKeys(viewer, turn, () => address.go("#"));
 address.listen(follow);
 begin();

@@ -1,0 +1,27 @@
+// Scenes wait as text, in <noscript>, until they are opened: a page of many scenes is soon there, and
+// a browser without scripts shows them all.
+
+/** The section of a scene, made when it is first asked for; null if there is none. @param {string} id */
+function sectionOf(id) {
+  const waiting = document.querySelector(`noscript[data-scene="${CSS.escape(id)}"]`);
+  if (waiting) waiting.outerHTML = waiting.textContent ?? "";
+  return document.getElementById(`scene=${id}`);
+}
+
+/** On paper a scene has its pictures, each drawn from the numbers in the page. @param {Viewer} viewer */
+function listenToPrinting(viewer) {
+  const draw = () => drawPictures(viewer);
+  window.addEventListener("beforeprint", draw);
+  matchMedia("print").addEventListener("change", draw);
+}
+
+/** @param {Viewer} viewer */
+function drawPictures({ painter }) {
+  if (!painter) return;
+  for (const canvas of document.querySelectorAll(".scene.open canvas[data-picture]")) {
+    const picture = /** @type {HTMLCanvasElement} */ (canvas);
+    const name = picture.dataset.picture ?? "";
+    const isMap = painter.page.maps.some((/** @type {any} */ map) => map.name === name);
+    picture.getContext("2d")?.drawImage(isMap ? painter.map(name) : painter.rendering(name, "clip", 0), 0, 0);
+  }
+}
