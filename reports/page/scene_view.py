@@ -9,6 +9,7 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded
+from reports.page.terms_view import TermsView
 
 
 class EffectMap(Record):
@@ -49,6 +50,8 @@ class SceneView(Record):
         Paths relative to the page by label, shown as links.
     charts, cost
         Of what accuracy costs, where that was studied.
+    terms
+        Of equation 8.10 at a grid of pixels.
     """
 
     record: ComparisonRecord
@@ -58,6 +61,7 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
+    terms: TermsView | None = None
 
 
 def picture_name(kind, name):
