@@ -19,7 +19,8 @@ from heuristic.convention import IRRADIANCE_PER_INTENSITY
 INCIDENCES = np.linspace(0.0, 82.5, 12)
 """Degrees from the normal to the light."""
 
-VIEWS = np.linspace(-1, 1, 49) * abs(np.linspace(-1, 1, 49))
+_EVEN = np.linspace(-1, 1, 73)
+VIEWS = _EVEN * abs(_EVEN)
 """Directions of view: 0 is the mirror direction, -1 and 1 are the horizon on the light's side and
 on the other. Lobes keep their place between incidences, and are finest where they are highest."""
 

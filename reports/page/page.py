@@ -70,7 +70,7 @@ STYLES = ("base", "verdict", "overview", "scene", "viewer", "terms", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "vectors", "terms", "main",
+    "verdict", "vectors", "termrows", "terms", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
