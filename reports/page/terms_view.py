@@ -71,10 +71,10 @@ class TermsView(Record):
         }
 
 
-def view(grid: TermGrid | None, missing: str = "") -> TermsView:
-    """Return what the page holds of a grid of terms, or of there being none."""
+def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
+    """Return what the page holds of a grid of terms, or of why there is none."""
     if grid is None:
-        return TermsView(missing=missing)
+        return TermsView(missing=missing) if missing else None
     tops: dict[str, float] = {}
     seen = grid.material >= 0
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
