@@ -1,4 +1,4 @@
-"""Equation 8.10 term by term: what is read of the kernel is the kernel's, and the page's codes too."""
+"""Equation 8.10 term by term: what the records and the page hold is what the kernel has."""
 
 import base64
 import zlib
@@ -11,8 +11,8 @@ from comparisons.case import Request, open_case
 from comparisons.compare import prepare
 from comparisons.gallery.builtin import SCENES
 from comparisons.terms import polar, tracing
-from comparisons.terms.camera_rays import rays
 from heuristic.errors import InputError
+from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
 from reports.page import terms_view
 
@@ -39,7 +39,7 @@ def kernel(ready, grid):
     """Return what the heuristic half's integrator has at the grid's points, (H, W, 3)."""
     half = ready.heuristic
     with variant(half.variant):
-        ray = rays(half.scene, grid.resolution, *np.meshgrid(grid.columns, grid.rows))
+        ray = pixel_rays(half.scene, grid.resolution, *np.meshgrid(grid.columns, grid.rows))
         sampler = mi.load_dict({"type": "independent"})
         sampler.seed(0, grid.material.size)
         colour, valid, _ = half.integrator.sample(half.scene, sampler, ray)
@@ -48,7 +48,7 @@ def kernel(ready, grid):
 
 
 @pytest.mark.guarantee(
-    "Terms",
+    "kernel",
     "The terms of 8.10 that a page shows add up to the kernel's value, in every built-in scene that"
     " is shaded by it.",
 )
@@ -143,9 +143,18 @@ def test_each_factor_is_that_of_the_formula():
 
 
 def sphere(material, *lights, **more):
-    sensor = {"type": "perspective", "fov": 30, "film": {"type": "hdrfilm", "width": 16, "height": 16},
-              "to_world": mi.ScalarTransform4f().look_at((0, -4, 1), (0, 0, 0), (0, 0, 1))}  # fmt: skip
-    scene = {"type": "scene", "sensor": sensor, "ball": {"type": "sphere", "bsdf": material}, **more}
+    sensor = {
+        "type": "perspective",
+        "fov": 30,
+        "film": {"type": "hdrfilm", "width": 16, "height": 16},
+        "to_world": mi.ScalarTransform4f().look_at((0, -4, 1), (0, 0, 0), (0, 0, 1)),
+    }
+    scene = {
+        "type": "scene",
+        "sensor": sensor,
+        "ball": {"type": "sphere", "bsdf": material},
+        **more,
+    }
     return scene | {f"lamp {number}": light for number, light in enumerate(lights)}
 
 
@@ -169,7 +178,11 @@ def test_lights_beyond_four_are_one_term(rgb):
 
 
 def test_textures_make_a_material_of_each_colour(rgb):
-    board = {"type": "checkerboard", "color0": 0.1, "color1": {"type": "rgb", "value": [0.8, 0.4, 0.2]}}
+    board = {
+        "type": "checkerboard",
+        "color0": 0.1,
+        "color1": {"type": "rgb", "value": [0.8, 0.4, 0.2]},
+    }
     grid, ready = traced(sphere({"type": "diffuse", "reflectance": board}, lamp(2)))
     assert sorted(round(m.k_d[0], 3) for m in grid.materials) == [0.1, 0.8]
     assert abs(grid.total() - kernel(ready, grid)).max() <= KERNEL
@@ -181,7 +194,9 @@ def test_the_physical_lobe_of_a_diffuse_surface_is_lamberts(chosen):
     grid, _ = traced(lambda: sphere(grey, lamp(1)), variant=chosen, heuristic_variant="llvm_ad_rgb")
     (material,) = grid.materials
     expected = 0.6 * np.cos(np.radians(polar.INCIDENCES))[:, None]
-    assert material.physical == pytest.approx(np.broadcast_to(expected, material.physical.shape), rel=2e-3)
+    assert material.physical == pytest.approx(
+        np.broadcast_to(expected, material.physical.shape), rel=2e-3
+    )
 
 
 def test_the_physical_lobe_of_a_mirror_like_surface_is_about_the_mirror_direction(rgb):

@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.terms.camera_rays import rays
 from comparisons.terms.term_grid import TermGrid
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from reference.rendering.gbuffer import pixel_rays
 
 INCIDENCES = np.linspace(0.0, 82.5, 12)
 """Degrees from the normal to the light."""
@@ -54,7 +54,7 @@ def _table(scene: Any, resolution: tuple[int, int], x: NDArray, y: NDArray) -> N
     view = np.concatenate([view_angles(each) for each in INCIDENCES])
     directions = len(view)
     pixels = np.repeat(x, directions), np.repeat(y, directions)
-    si = scene.ray_intersect(rays(scene, resolution, *pixels))
+    si = scene.ray_intersect(pixel_rays(scene, resolution, *pixels))
     si.wi = _in_plane(np.tile(view, len(x)))
     toward = _in_plane(np.tile(-incidence, len(x)))
     value = IRRADIANCE_PER_INTENSITY * _luminance(si, toward)

@@ -137,7 +137,9 @@ class TermGrid:
         """
         width, height = self.resolution
         if not (0 <= x < width and 0 <= y < height):
-            raise InputError(f"pixel {x}, {y} is outside the image: give one below {width}, {height}.")
+            raise InputError(
+                f"pixel {x}, {y} is outside the image: give one below {width}, {height}."
+            )
         place = y * len(self.rows) // height, x * len(self.columns) // width
         if self.material[place] < 0:
             return None

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.terms import polar
-from comparisons.terms.camera_rays import rays
 from comparisons.terms.term_grid import GridLight, TermGrid, TermMaterial
 from heuristic import arguments, colours, lobes, terms, vectors
 from heuristic.interpolation import Interpolation
 from heuristic.materials import COEFFICIENTS, FORMS, Material
-from reference.rendering.gbuffer import image_size
+from reference.rendering.gbuffer import image_size, pixel_rays
 from reference.rendering.renderer import variant
 
 SIDE = 64
@@ -61,7 +60,9 @@ def _without(half: Any, options: Any) -> str:
     if options.heuristic not in ("phong", "blinn"):
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if options.interpolation is not Interpolation.PHONG:
-        return f"{options.interpolation.value.capitalize()} shading does not evaluate 8.10 at pixels."
+        return (
+            f"{options.interpolation.value.capitalize()} shading does not evaluate 8.10 at pixels."
+        )
     if mi.is_spectral:
         return "The heuristic half is rendered wavelength by wavelength, and its terms are not RGB."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -75,7 +76,7 @@ def _traced(scene: Any, integrator: Any) -> TermGrid | None:
     emitters = [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
-    points = _Points(scene, integrator, rays(scene, resolution, *np.meshgrid(columns, rows)))
+    points = _Points(scene, integrator, pixel_rays(scene, resolution, *np.meshgrid(columns, rows)))
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return None
@@ -102,7 +103,7 @@ def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]
 class _Points:
     """What the kernel is given at the points that rays see."""
 
-    def __init__(self, scene: Any, integrator: Any, ray: mi.Ray3f) -> None:
+    def __init__(self, scene: Any, integrator: Any, ray: mi.RayDifferential3f) -> None:
         self.si = scene.ray_intersect(ray)
         normal, is_shaded = integrator.seen_side(scene, self.si, self.si.is_valid())
         self.hit = np.array(self.si.is_valid() & is_shaded)
@@ -169,7 +170,7 @@ class _Points:
         scale = arriving[:, brightest] / (intensity[brightest] or 1.0)
         each = (scale, self.floats(cos_incidence), self.floats(dr.dot(toward, self.view)))
         arrays = (*each, self.select(lobe))
-        return GridLight(emitter.id(), tuple(intensity), *(a.reshape(shape) for a in arrays))
+        return GridLight(emitter.id(), tuple(intensity.tolist()), *(a.reshape(shape) for a in arrays))
 
 
 def _strongest(grid: TermGrid) -> TermGrid:

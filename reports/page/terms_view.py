@@ -1,7 +1,7 @@
 """The terms of a scene for the page: 16-bit codes of what the kernel's terms are products of.
 
-A cosine ``c`` has the code ``65535 (1 + c) / 2``; what is 0 or more has ``65535 sqrt(v / top)``, with
-the plane's ``top``, so that its error is at most ``top`` / 65000. The planes are packed as those of
+A cosine ``c`` has the code ``65535 (1 + c) / 2``; what is 0 or more has ``65535 sqrt(v / top)``,
+with the plane's ``top``, and is off by at most ``top`` / 65000. The planes are packed as those of
 images are (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from msgspec import field
 from numpy.typing import NDArray
 
 from comparisons.records import Record, plain
@@ -55,7 +56,7 @@ class TermsView(Record):
 
     grid: Embedded | None = None
     lobes: Embedded | None = None
-    tops: dict[str, float] = {}
+    tops: dict[str, float] = field(default_factory=dict)
     materials: tuple[MaterialView, ...] = ()
     lights: tuple[LightView, ...] = ()
     missing: str = ""
@@ -88,7 +89,9 @@ def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
             planes[f"{number}.{name}"] = _amounts(f"{number}.{name}", amount, tops)
     if grid.others is not None:
         for channel, colour in enumerate("RGB"):
-            planes[f"others.{colour}"] = _amounts(f"others.{colour}", grid.others[..., channel] * seen, tops)
+            planes[f"others.{colour}"] = _amounts(
+                f"others.{colour}", grid.others[..., channel] * seen, tops
+            )
     lobes = {
         f"physical.{number}": _amounts(f"physical.{number}", material.physical, tops)
         for number, material in enumerate(grid.materials)

@@ -98,7 +98,9 @@ def exact():
         warnings=(),
         unrepresentable=(),
     )
-    return Comparison(record, found.images, no_terms="Flat shading does not evaluate 8.10 at pixels.")
+    return Comparison(
+        record, found.images, no_terms="Flat shading does not evaluate 8.10 at pixels."
+    )
 
 
 def comparison(name, heuristic, reference, maps, significant):

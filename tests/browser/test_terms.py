@@ -19,7 +19,11 @@ def shown_rows(page):
     for line in page.locator("#terms tbody tr").all():
         cells = [text.strip() for text in line.locator("th, td").all_text_contents()]
         light = cells[0] if "light" in (line.get_attribute("class") or "") else light
-        name = cells[0] if cells[0] in ("ambient", "textbook", "physical", light) else f"{light} {cells[0]}"
+        name = (
+            cells[0]
+            if cells[0] in ("ambient", "textbook", "physical", light)
+            else f"{light} {cells[0]}"
+        )
         rows[name] = cells[1:]
     return rows
 
@@ -34,7 +38,9 @@ def pick(visitor, x, y, how):
     if how == "touch":
         visitor.canvas().tap(position=place)
     elif how == "keys":
-        visitor.canvas().click(position=dict(zip("xy", visitor.place_of(x - 3, y - 10), strict=True)))
+        visitor.canvas().click(
+            position=dict(zip("xy", visitor.place_of(x - 3, y - 10), strict=True))
+        )
         visitor.canvas().focus()
         for key in (*["ArrowRight"] * 3, "Shift+ArrowDown"):
             visitor.page.keyboard.press(key)
@@ -55,8 +61,10 @@ def test_the_terms_are_those_of_the_pixel(visitor, how):
     for x, y in ((9, 14), (37, 22)):
         pick(visitor, x, y, how)
         expected = GRID.at(x, y)
-        assert page.locator("#terms h3").text_content().endswith(
-            f"at {expected.pixel[0]}, {expected.pixel[1]}: {expected.material.name}"
+        assert (
+            page.locator("#terms h3")
+            .text_content()
+            .endswith(f"at {expected.pixel[0]}, {expected.pixel[1]}: {expected.material.name}")
         )
         rows = shown_rows(page)
         assert values(rows["textbook"]) == pytest.approx(expected.total, rel=6e-3)
@@ -91,7 +99,7 @@ def test_numbers_multiply_to_their_term(visitor):
 
 
 def angles(page):
-    """Return the degrees from N of the figure's vectors, by letter; those on the left are negative."""
+    """Return the degrees from N of the figure's vectors, by letter; negative on the left."""
     found = {}
     for line in page.locator("#terms line").all():
         x1, y1, x2, y2 = (float(line.get_attribute(name)) for name in ("x1", "y1", "x2", "y2"))
