@@ -2,6 +2,7 @@
 
 import base64
 import zlib
+from xml.etree import ElementTree
 
 import mitsuba as mi
 import numpy as np
@@ -14,12 +15,13 @@ from comparisons.terms import polar, tracing
 from heuristic.errors import InputError
 from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
+from reports.charts import term_figure
 from reports.page import terms_view
 
 KERNEL = 1e-5
 """Of the largest value: single precision, and ``n`` times its rounding of a cosine."""
 
-CODES = 1e-3
+CODES = 2e-4
 """Of the largest value: what 16 bits of each factor leave of a sum of products."""
 
 
@@ -230,3 +232,31 @@ def test_a_pixel_on_the_background_has_no_terms_and_one_outside_is_refused():
     assert grid.at(0, 0) is None
     with pytest.raises(InputError, match="outside the image"):
         grid.at(16, 0)
+
+
+def test_the_figure_of_a_point_has_its_angles_and_both_lobes():
+    grid, _ = traced("fig-8-9", resolution=(16, 16))
+    point = grid.at(8, 8)
+    (light,) = point.lights
+    shown = ElementTree.fromstring(term_figure.svg(point))
+    tag = "{http://www.w3.org/2000/svg}"
+    ends = {
+        text.text: (float(line.get("x2")), -float(line.get("y2")))
+        for line, text in zip(shown.iter(f"{tag}line"), shown.iter(f"{tag}text"), strict=True)
+    }
+    incidence = np.degrees(np.arccos(light.cos_incidence))
+    angles = {letter: np.degrees(np.arctan2(*end)) for letter, end in ends.items()}
+    assert angles == pytest.approx(
+        {"N": 0, "L": -incidence, "R": incidence, "V": angles["V"]}, abs=0.1
+    )
+    # V's two parts in the figure, and the one across its plane, make a unit vector.
+    across, along = (part / term_figure.VECTOR for part in ends["V"])
+    assert along == pytest.approx(point.cos_view, abs=1e-3)
+    toward = -across * np.sin(np.radians(incidence)) + along * light.cos_incidence
+    assert toward == pytest.approx(light.cos_view, abs=1e-3)
+    assert len(list(shown.iter(f"{tag}polygon"))) == 2
+    lobe = term_figure.textbook_lobe(point.material, incidence)
+    assert lobe.max() == pytest.approx(0.5 * light.cos_incidence + 0.7, rel=1e-3)
+    html = term_figure.html(point, (0.25, 0.5, 0.75), 0.001)
+    assert "0.750" in html
+    assert "± 1.0" in html or "± 0.001" in html
