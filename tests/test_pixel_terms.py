@@ -195,6 +195,8 @@ def test_the_physical_lobe_of_a_diffuse_surface_is_lamberts(chosen):
     grey = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.6}}
     grid, _ = traced(lambda: sphere(grey, lamp(1)), variant=chosen, heuristic_variant="llvm_ad_rgb")
     (material,) = grid.materials
+    between = term_figure.physical_lobe(material.physical, 87.0)
+    assert between == pytest.approx(np.full(len(polar.VIEWS), 0.6 * 0.0523), abs=1e-3)
     expected = 0.6 * np.cos(np.radians(polar.INCIDENCES))[:, None]
     assert material.physical == pytest.approx(
         np.broadcast_to(expected, material.physical.shape), rel=2e-3

@@ -16,16 +16,16 @@ from comparisons.terms.term_grid import TermGrid
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from reference.rendering.gbuffer import pixel_rays
 
-INCIDENCES = np.linspace(0.0, 82.5, 12)
-"""Degrees from the normal to the light."""
+GRAZING = 89.9
+"""Degrees, in place of the horizon."""
+
+INCIDENCES = np.linspace(0.0, GRAZING, 19)
+"""Degrees from the normal to the light, at even steps."""
 
 _EVEN = np.linspace(-1, 1, 73)
 VIEWS = _EVEN * abs(_EVEN)
 """Directions of view: 0 is the mirror direction, -1 and 1 are the horizon on the light's side and
 on the other. Lobes keep their place between incidences, and are finest where they are highest."""
-
-GRAZING = 89.9
-"""Degrees, in place of the horizon."""
 
 SPECTRA = 16
 """Sets of wavelengths over which luminance is summed in spectral variants."""

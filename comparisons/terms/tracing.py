@@ -170,7 +170,9 @@ class _Points:
         scale = arriving[:, brightest] / (intensity[brightest] or 1.0)
         each = (scale, self.floats(cos_incidence), self.floats(dr.dot(toward, self.view)))
         arrays = (*each, self.select(lobe))
-        return GridLight(emitter.id(), tuple(intensity.tolist()), *(a.reshape(shape) for a in arrays))
+        return GridLight(
+            emitter.id(), tuple(intensity.tolist()), *(a.reshape(shape) for a in arrays)
+        )
 
 
 def _strongest(grid: TermGrid) -> TermGrid:

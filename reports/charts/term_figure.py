@@ -46,7 +46,7 @@ def physical_lobe(table: NDArray[np.float64], incidence: float) -> NDArray[np.fl
 def svg(point: PixelTerms) -> str:
     """Return N, L, R and V in the plane of incidence, and both lobes on one scale."""
     light = strongest(point)
-    parts = ['<rect x="-240" y="-195" width="480" height="245" fill="#fcfcfb"/>']
+    parts = ['<rect x="-240" y="-205" width="480" height="255" fill="#fcfcfb"/>']
     parts += ['<path d="M-180 32Q0 -32 180 32Z" fill="#f3f4f5" stroke="#585f67"/>']
     vectors = {"N": (0.0, 1.0)}
     if light is None:
@@ -58,7 +58,7 @@ def svg(point: PixelTerms) -> str:
         parts += _lobes(point.material, float(np.degrees(np.arccos(min(cosine, 1.0)))))
     parts += [_vector(letter, *place) for letter, place in vectors.items()]
     return (
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-240 -195 480 245" width="480"'
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-240 -205 480 255" width="480"'
         ' role="img" aria-label="Vectors and lobes">' + "".join(parts) + "</svg>"
     )
 
@@ -110,7 +110,8 @@ def _lobe(kind: str, degrees: NDArray, radius: NDArray) -> str:
 def _vector(letter: str, x: float, y: float) -> str:
     size = np.hypot(x, y) or 1.0
     to = VECTOR * x, -VECTOR * y
-    at = to[0] + 16 * x / size, to[1] - 16 * y / size + 5
+    away = 31 if letter == "V" else 16  # V often lies next to R or N
+    at = to[0] + away * x / size, to[1] - away * y / size + 5
     colour = COLOURS[letter]
     return (
         f'<line x2="{to[0]:.1f}" y2="{to[1]:.1f}" stroke="{colour}" stroke-width="2.5"/>'

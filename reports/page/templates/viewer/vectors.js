@@ -1,7 +1,7 @@
 // The figure of a point: N, L, R and V in the plane of incidence, and both lobes about it.
 
 /** The point in the figure, the length of a vector and of the longest lobe. */
-const ORIGIN = [240, 218], VECTOR = 150, LOBE = 165;
+const ORIGIN = [240, 226], VECTOR = 150, LOBE = 165;
 
 /** Lobes that differ by more than this factor are cut off, or the smaller would be a dot. */
 const CUT = 3;
@@ -88,7 +88,8 @@ function drawnVector(letter, x, y) {
   const length = VECTOR * (y < 0 ? 0.25 : 1);
   const end = [ORIGIN[0] + length * x, ORIGIN[1] - length * y];
   const size = Math.hypot(x, y) || 1;
-  const label = [end[0] + (16 * x) / size, end[1] - (16 * y) / size + 5];
+  const away = letter === "V" ? 31 : 16; // V often lies next to R or N
+  const label = [end[0] + (away * x) / size, end[1] - (away * y) / size + 5];
   return [
     drawn("line", { class: `vector ${letter}`, x1: ORIGIN[0], y1: ORIGIN[1], x2: end[0], y2: end[1] }),
     drawn("text", { class: letter, x: label[0], y: label[1] }, letter),
@@ -111,7 +112,8 @@ function projectedView(light, cosView) {
  * @returns {{top: number, cut: boolean}} the value of the longest radius, and whether a lobe is longer
  */
 function drawVectors(svg, light, cosView, lobes) {
-  const ground = `M 60 250 Q ${ORIGIN[0]} ${2 * ORIGIN[1] - 250} 420 250 Z`;
+  const [x, y] = ORIGIN;
+  const ground = `M ${x - 180} ${y + 32} Q ${x} ${y - 32} ${x + 180} ${y + 32} Z`;
   const [a, b] = lobes ? [highest(lobes.textbook), highest(lobes.physical)] : [0, 0];
   const top = Math.min(Math.max(a, b), CUT * (Math.min(a, b) || Math.max(a, b))) || 1;
   const sine = light ? Math.sqrt(Math.max(0, 1 - light.cosIncidence ** 2)) : 0;
