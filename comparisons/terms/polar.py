@@ -19,8 +19,8 @@ from reference.rendering.gbuffer import pixel_rays
 GRAZING = 89.9
 """Degrees, in place of the horizon."""
 
-INCIDENCES = np.linspace(0.0, GRAZING, 19)
-"""Degrees from the normal to the light, at even steps."""
+INCIDENCES = GRAZING * (1 - np.linspace(1, 0, 25) ** 2.5)
+"""Degrees from the normal to the light, closest at the horizon, where lobes change most."""
 
 _EVEN = np.linspace(-1, 1, 73)
 VIEWS = _EVEN * abs(_EVEN)

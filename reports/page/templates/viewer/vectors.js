@@ -47,10 +47,9 @@ function textbookLobe(material, incidence, weights) {
  */
 function physicalLobe(terms, table, incidence) {
   const { incidences, views, grazing } = terms;
-  const step = incidences[1] - incidences[0];
-  const place = clamp(incidence / step, 0, incidences.length - 1);
-  const low = Math.min(Math.floor(place), incidences.length - 2);
-  const part = place - low;
+  const above = incidences.findIndex((/** @type {number} */ each) => each > incidence);
+  const low = (above < 0 ? incidences.length - 1 : above) - 1;
+  const part = clamp((incidence - incidences[low]) / (incidences[low + 1] - incidences[low]), 0, 1);
   return views.map((/** @type {number} */ side, /** @type {number} */ column) => {
     const [before, after] = [low, low + 1].map((row) => table[row * views.length + column]);
     const view = incidence + side * (side < 0 ? grazing + incidence : grazing - incidence);
