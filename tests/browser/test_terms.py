@@ -153,3 +153,16 @@ def test_a_scene_opens_at_a_point_that_has_terms(visitor):
     visitor.settle()
     assert "textbook" in shown_rows(page)
     assert page.locator("#terms figure > svg").get_attribute("aria-label").startswith("L is ")
+
+
+def test_a_scene_that_is_opened_again_does_not_keep_the_pixel_of_before(visitor):
+    page = visitor.open(SCENE)
+    visitor.settle()
+    title = page.locator("#terms h3")
+    first = title.text_content()
+    pick(visitor, 9, 30, "click")
+    assert title.text_content() != first
+    visitor.open(f"#scene={EXACT}")
+    visitor.open(SCENE)
+    visitor.settle()
+    assert title.text_content() == first

@@ -20,6 +20,8 @@ class TermsPanel {
   async open(scene, section) {
     this.scene = scene;
     this.data = null;
+    /** @type {number[] | null} */
+    this.asked = null;
     this.panel.hidden = !scene.terms;
     if (!scene.terms) return;
     section.querySelector(".stage")?.after(this.panel);
@@ -70,9 +72,10 @@ class TermsPanel {
   /** @param {any} point */
   listTerms(point) {
     const [list, sums] = this.panel.querySelectorAll("tbody");
+    const { scene } = this;
     list.replaceChildren(...(point.material ? termRows(point) : []));
-    void imagesOf(this.scene.id, this.scene.images).then((images) => {
-      if (this.asked && images) sums.replaceChildren(...sumRows(point, images));
+    void imagesOf(scene.id, scene.images).then((images) => {
+      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
     });
   }
 
