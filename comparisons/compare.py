@@ -24,6 +24,7 @@ from comparisons.departure.statistics import histogram
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.records import Pixels
+from comparisons.terms import tracing
 from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
@@ -190,6 +191,8 @@ def _compare(source, options, progress, command, kept):
         images.counted,
     )
     stages.done("limits of the reference")
+    terms, no_terms = tracing.trace(ready, options)
+    stages.done("terms")
     made = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
@@ -225,7 +228,7 @@ def _compare(source, options, progress, command, kept):
         picture=picture,
         **numbers,
     )
-    return Comparison(made, images)
+    return Comparison(made, images, terms, no_terms)
 
 
 def _heuristic_renderer(source, pair, chosen, spp, options):

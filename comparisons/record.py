@@ -24,6 +24,7 @@ from comparisons.comparison import (
     Unrepresentable,
 )
 from comparisons.processes.pool import cores
+from comparisons.terms.term_grid import TermGrid
 from heuristic import __version__
 from heuristic.heuristics import named
 from reference.planning.light_by_light import loses_light
@@ -51,10 +52,15 @@ class Images:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison returns: the content of ``comparison.json``, and the images."""
+    """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
+
+    ``no_terms`` says why there are no terms.
+    """
 
     record: ComparisonRecord
     images: Images
+    terms: TermGrid | None = None
+    no_terms: str = ""
 
 
 def versions():

@@ -24,7 +24,7 @@ from heuristic.interpolation import Interpolation
 from reference.planning.plan import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant
-from reports.charts import figures, vega
+from reports.charts import figures, term_figure, vega
 from reports.charts.albedo_chart import albedo_chart
 from reports.files import images
 from reports.terminal import tables
@@ -41,6 +41,9 @@ SHEETS = {
     "spots": ("fig-6-5-m1", "fig-6-5-m40"),
 }
 """Pictures of docs/models.md: heuristic above, reference below."""
+
+LOBES = {"sharp": (31, 88), "dull": (157, 94)}
+"""Pixels of the plastic spheres, in the highlights of the first and of the last."""
 
 POLYGONS = (
     ("fig-6-10", Interpolation.FLAT),
@@ -65,6 +68,7 @@ def main(words):
                                               [p.reference for p in pairs]])  # fmt: skip
     shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
     _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
+    _lobes()
     _architecture()
     _example()
     _witnesses()
@@ -144,6 +148,14 @@ def _sheet(name, titles, rows):
     for place, title in zip(axes[0], titles, strict=True):
         place.set_title(title, fontsize=8, pad=3)
     atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
+
+
+def _lobes():
+    """Draw the vectors and the lobes in the highlights of two of the plastic spheres."""
+    options = Options(spp=SAMPLES, resolution=(SIDE, SIDE))
+    grid = compare(builtin("plastic-spheres").source(), options).terms
+    for name, place in LOBES.items():
+        atomic.write(DOCS / f"models-lobes-{name}.svg", term_figure.svg(grid.at(*place)) + "\n")
 
 
 def _measurements():

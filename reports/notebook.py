@@ -20,6 +20,9 @@ from msgspec import structs
 import comparisons.compare
 from comparisons.case import Request, Scene, open_case
 from comparisons.record import Comparison
+from comparisons.terms.term_grid import PixelTerms
+from heuristic.errors import InputError
+from reports.charts import term_figure
 from reports.page import page
 from reports.run import output
 
@@ -43,6 +46,44 @@ class Shown:
             f'<iframe sandbox="allow-scripts" style="width: 100%; height: {HEIGHT}px; border: 0"'
             f' title="Comparison" srcdoc="{escape(self.page)}"></iframe>'
         )
+
+    def at(self, x: int, y: int) -> "ShownTerms":
+        """Return the terms of 8.10 at a pixel, or at the nearest one that has them.
+
+        Parameters
+        ----------
+        x, y
+            Column and row, from 0 at the upper left.
+
+        Raises
+        ------
+        InputError
+            For a pixel outside the image or on the background, and where the heuristic half is not
+            shaded by 8.10.
+        """
+        if self.comparison.terms is None:
+            raise InputError(f"there are no terms. {self.comparison.no_terms}")
+        found = self.comparison.terms.at(x, y)
+        if found is None:
+            raise InputError(f"pixel {x}, {y} sees no surface: give one that does.")
+        place, images = found.pixel[::-1], self.comparison.images
+        error = float(images.reference_stderr[place].max())
+        return ShownTerms(found, tuple(images.reference[place].tolist()), error)
+
+
+@dataclass(frozen=True)
+class ShownTerms:
+    """The terms at a pixel as numbers, and as a figure and a table.
+
+    `reference` is the physical reference there, `standard_error` that of its noisiest channel.
+    """
+
+    terms: PixelTerms
+    reference: tuple[float, ...]
+    standard_error: float
+
+    def _repr_html_(self) -> str:
+        return term_figure.html(self.terms, self.reference, self.standard_error)
 
 
 def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:

@@ -110,12 +110,17 @@ def define() -> None:
 
         def surface_colour(self, scene, si, view, active):
             """Return the value that is seen at what a ray hits: the normal of 6.37 and 6.38."""
+            normal, is_shaded = self.seen_side(scene, si, active)
+            colour = self.shaded(scene, si, view, normal, active)
+            return dr.select(active & is_shaded, colour, 0)
+
+        def seen_side(self, scene, si, active):
+            """Return the normal of the side that is seen, and whether that side is shaded."""
             twosided = self.twosided(scene, si, active)
             normal = self.known(scene).materials.normal(si, active)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
-            colour = self.shaded(scene, si, view, normal, active)
-            return dr.select(active & (twosided | (si.wi.z > 0)), colour, 0)
+            return normal, twosided | (si.wi.z > 0)
 
         def shaded(self, scene, si, view, normal, active):
             """Shade at a surface interaction, whose material is one of several."""

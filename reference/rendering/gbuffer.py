@@ -84,10 +84,8 @@ def resize(scene: Scene, size: tuple[int, int]) -> None:
 
 def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0) -> GBuffer:
     """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
-    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    position = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
-    ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
-    si = scene.ray_intersect(ray)
+    places = np.meshgrid(np.arange(width), np.arange(height))
+    si = scene.ray_intersect(pixel_rays(scene, (width, height), *places, sensor))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points, normals = (
@@ -95,3 +93,14 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
         for vector in (mi.Vector3f(si.p), normal)
     )
     return GBuffer(points, normals, np.array(hit).reshape(height, width))
+
+
+def pixel_rays(scene, size, x, y, sensor=0):
+    """Return the camera rays through the centres of the cells in columns ``x`` and rows ``y``.
+
+    ``size`` is the width and height of the film in cells.
+    """
+    places = (np.ravel(place) + 0.5 for place in (x, y))
+    across, down = (mi.Float(place / side) for place, side in zip(places, size, strict=True))
+    film = mi.Point2f(across, down)
+    return scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, film, mi.Point2f(0.5))[0]

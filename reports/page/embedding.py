@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -108,11 +108,15 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     flags = flags + UNDETERMINED * undetermined
     add("flags", flags.astype(np.uint16), 0)
 
-    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)
     height, width = flags.shape
+    return Embedded(width, height, block, tuple(planes), packed(planes, codes))
+
+
+def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
+    """The codes of planes, by name, as `Embedded.data` has them."""
+    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)
     # Level 4: a third of the time of 6, for 1 % more.
-    data = base64.b64encode(zlib.compress(raw, 4)).decode("ascii")
-    return Embedded(width, height, block, tuple(planes), data)
+    return base64.b64encode(zlib.compress(raw, 4)).decode("ascii")
 
 
 def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:

@@ -67,11 +67,11 @@ FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent"
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
-STYLES = ("base", "verdict", "overview", "scene", "viewer", "print")
+STYLES = ("base", "verdict", "overview", "scene", "viewer", "terms", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "lazy", "main",
+    "verdict", "vectors", "termrows", "terms", "lazy", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
@@ -202,6 +202,7 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "regions": plain(record.regions),
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(scene.cost.effects) if scene.cost else None,
+        "terms": scene.terms.manifest() if scene.terms else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
     }

@@ -11,6 +11,7 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page.embedding import Embedded
+from reports.page.terms_view import TermsView
 
 
 class EffectMap(Record):
@@ -51,6 +52,8 @@ class SceneView(Record):
         Of what accuracy costs, where that was studied.
     is_coarse
         Whether it is a small preview, which a later writing of the page replaces.
+    terms
+        Of equation 8.10 at a grid of pixels.
     """
 
     record: ComparisonRecord
@@ -60,6 +63,7 @@ class SceneView(Record):
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
     is_coarse: bool = False
+    terms: TermsView | None = None
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from comparisons.record import Comparison
 from comparisons.records import Pixels, plain
 from reports.run import output, places
 from reports.run.stages import Failure, Run
-from tests import cost_records, records
+from tests import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32
 
@@ -80,7 +80,8 @@ def noisy():
     beyond = {"1": 0.6, "2": 0.3, "5": 0.04}
     metrics = found.record.metrics
     metrics = metrics | {"dE2000": structs.replace(metrics["dE2000"], visible=beyond)}
-    return Comparison(structs.replace(found.record, metrics=metrics), found.images)
+    record = structs.replace(found.record, metrics=metrics)
+    return Comparison(record, found.images, term_grids.grid((WIDTH, HEIGHT)))
 
 
 def exact():
@@ -97,7 +98,9 @@ def exact():
         warnings=(),
         unrepresentable=(),
     )
-    return Comparison(record, found.images)
+    return Comparison(
+        record, found.images, no_terms="Flat shading does not evaluate 8.10 at pixels."
+    )
 
 
 def comparison(name, heuristic, reference, maps, significant):

@@ -5,6 +5,7 @@ const overview = makeOverview(byId("overview-section"), page.scenes, change);
 const verdict = document.getElementById("verdict-section");
 if (verdict) makeVerdict(verdict);
 const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);
+const terms = new TermsPanel(byId("terms"), page);
 /** @type {View} */
 let view = DEFAULT_VIEW;
 
@@ -45,6 +46,7 @@ function show() {
 /** @param {any} scene */
 function openScene(scene) {
   const section = byId(`scene=${scene.id}`);
+  void terms.open(scene, section);
   void viewer.open(scene, section);
   watchCharts(section);
 }

@@ -1,0 +1,106 @@
+// The rows of the table of terms, and the words below its figure.
+
+/** @param {string} name @param {string} words @param {string[]} values @param {string} kind */
+function row(name, words, values, kind = "") {
+  const line = Object.assign(document.createElement("tr"), { className: kind });
+  const head = Object.assign(document.createElement("th"), { scope: "row" });
+  head.append(...rich(name));
+  const text = Object.assign(document.createElement("td"), { className: "text" });
+  text.append(...rich(words));
+  const cells = values.map((value) => Object.assign(document.createElement("td"), { textContent: value }));
+  line.append(head, text, ...cells);
+  return line;
+}
+
+/** Text in which _{…} is a subscript and ^{…} an exponent. @param {string} words */
+function rich(words) {
+  return words.split(/([_^]\{[^}]*\})/).map((part) => {
+    const found = /^([_^])\{(.*)\}$/.exec(part);
+    return found ? Object.assign(document.createElement(found[1] === "_" ? "sub" : "sup"), { textContent: found[2] }) : part;
+  });
+}
+
+/** A number of a term: below what the page keeps, "< 0.0001". @param {number} value */
+function amount(value) {
+  return value > 0 && value < 1e-4 ? "< 0.0001" : significant(value, 3);
+}
+
+/** A factor of a term, without zeros at its end. @param {number} value */
+function factor(value, digits = 3) {
+  const text = significant(value, digits);
+  return /[×]/.test(text) ? text : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+}
+
+/** @param {number[]} colour */
+function colourText(colour) {
+  const texts = colour.map((value) => factor(value));
+  return texts.every((text) => text === texts[0]) ? texts[0] : `(${texts.join(", ")})`;
+}
+
+/** @param {any} point */
+function termRows(point) {
+  const { material } = point;
+  const rows = [];
+  if (material.k_i.some(Boolean)) rows.push(row("emission", `k_{i} = ${colourText(material.k_i)}`, material.k_i.map(amount)));
+  rows.push(row("ambient", `I_{a} k_{a} = ${colourText(material.ambient)} × ${colourText(material.k_a)}`, point.ambient.map(amount)));
+  for (const light of point.lights) rows.push(...lightRows(light, material));
+  if (point.others) rows.push(row("other lights", "diffuse and specular", point.others.map(amount)));
+  return rows;
+}
+
+/** @param {any} light @param {any} material */
+function lightRows(light, material) {
+  const arriving = `${colourText(light.intensity)} × ${factor(light.attenuation)}`;
+  const isLit = light.cosIncidence > 0;
+  const cosine = Math.max(material.form === "blinn" ? light.lobe ** (1 / material.n) : light.cosReflection, 0);
+  const base = material.form === "blinn" ? "N·H" : "R·V";
+  const behind = `N·L = ${factor(light.cosIncidence)}: the light is behind the surface`;
+  const power = `${factor(cosine, 4)}^{${factor(material.n)}}`;
+  return [
+    row(light.name, `I_{p0} f_{att} = ${arriving}`, ["", "", ""], "light"),
+    row("diffuse", isLit ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}` : behind, light.diffuse.map(amount)),
+    row("specular", isLit ? `× k_{s} (${base})^{n} = × ${colourText(material.k_s)} × ${power}` : "", light.specular.map(amount)),
+  ];
+}
+
+/** The sum of the terms, and what the reference has there. @param {any} point @param {Images} images */
+function sumRows(point, images) {
+  const [x, y] = point.pixel;
+  const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
+  const shown = (/** @type {string} */ name) => valueText(images, name, place);
+  const rows = point.material ? [row("textbook", "the sum of the terms", point.total.map(amount), "total")] : [];
+  rows.push(row("physical", `± ${shown("standard_error")} in its noisiest channel`, ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)), "reference"));
+  return rows;
+}
+
+/** @param {any} light @param {number} cosView */
+function vectorsInWords(light, cosView) {
+  const angle = (/** @type {number} */ cosine) => `${degreesOf(cosine).toFixed(0)}°`;
+  if (!light) return `The viewer is ${angle(cosView)} from the normal; there is no light.`;
+  const between = light.cosIncidence > 0 ? `, and V ${angle(light.cosReflection)} from R` : "";
+  return `L is ${angle(light.cosIncidence)} from N, V ${angle(cosView)}${between}.`;
+}
+
+/** @param {any} light @param {any} point @param {number} top of the lobes, 0 without them @param {boolean} cut */
+function captionOf(light, point, top, cut) {
+  const words = document.createElement("p");
+  words.textContent = vectorsInWords(light, point.cosView);
+  if (light && point.lights.length > 1) words.textContent += ` Of ${point.lights.length} lights, ${light.name} gives most.`;
+  if (light) words.textContent += " Seen across the plane of N and L; V is projected onto it.";
+  if (!top) return [words];
+  const keys = document.createElement("p");
+  keys.append(key("textbook", "textbook lobe"), key("partner", "physical lobe"));
+  const scale = document.createElement("p");
+  scale.textContent = "Lobes: the luminance that each direction sees in this plane, for a light of intensity 1, "
+    + `both on one scale. The longest radius is ${significant(top, 3)}${cut ? ", where the longer lobe is cut off" : ""}.`;
+  return [keys, words, scale];
+}
+
+/** @param {string} kind @param {string} words */
+function key(kind, words) {
+  const svg = drawn("svg", { viewBox: "0 0 26 12", "aria-hidden": "true" });
+  svg.append(drawn("rect", { class: kind, x: 1, y: 1, width: 24, height: 10 }));
+  const found = Object.assign(document.createElement("span"), { className: "key" });
+  found.append(svg, words);
+  return found;
+}

@@ -1,0 +1,163 @@
+// Equation 8.10 at the pixel that is picked, with its numbers, from the grid that the page holds.
+
+/** Codes of the grid are decoded as those of images; see reports/page/terms_view.py. */
+const LARGEST_CODE = 65535;
+
+class TermsPanel {
+  /** @param {HTMLElement} panel @param {any} page */
+  constructor(panel, page) {
+    this.panel = panel;
+    this.weights = page.luminance;
+    /** @type {any} */
+    this.scene = null;
+    document.addEventListener("pick", (event) => {
+      const { scene, pixel } = /** @type {CustomEvent} */ (event).detail;
+      if (pixel && scene === this.scene?.id) this.show(pixel);
+    });
+  }
+
+  /** Move into a scene's section, and show its most telling point. @param {any} scene @param {HTMLElement} section */
+  async open(scene, section) {
+    this.scene = scene;
+    this.data = null;
+    /** @type {number[] | null} */
+    this.asked = null;
+    this.panel.hidden = !scene.terms;
+    if (!scene.terms) return;
+    section.querySelector(".stage")?.after(this.panel);
+    this.part("missing").hidden = !scene.terms.missing;
+    this.part("missing").textContent = `There are no terms to show. ${scene.terms.missing}`;
+    this.part("whole").hidden = Boolean(scene.terms.missing);
+    this.part("place").textContent = "";
+    if (scene.terms.missing) return;
+    const data = await termsOf(scene);
+    if (this.scene !== scene) return; // another one was opened meanwhile
+    this.data = data;
+    this.show(this.asked ?? firstPixel(scene, data));
+  }
+
+  /** @param {number[]} pixel */
+  show(pixel) {
+    this.asked = pixel;
+    if (!this.data) return;
+    const point = termsAt(this.scene, this.data, pixel);
+    const [x, y] = point.pixel;
+    this.part("place").textContent = `at ${x}, ${y}${point.material ? `: ${point.material.name}` : ""}`;
+    this.drawFigure(point);
+    this.listTerms(point);
+  }
+
+  /** @param {any} point */
+  drawFigure(point) {
+    const svg = /** @type {SVGElement} */ (this.panel.querySelector("svg"));
+    const caption = /** @type {HTMLElement} */ (this.panel.querySelector("figcaption"));
+    if (!point.material) {
+      svg.replaceChildren();
+      caption.textContent = "No surface is seen there.";
+      return;
+    }
+    const light = strongest(point.lights, this.weights);
+    const isLit = light && light.cosIncidence > 0;
+    const incidence = light ? degreesOf(light.cosIncidence) : 0;
+    const table = this.data?.lobes[point.number];
+    const lobes = isLit && table && {
+      textbook: textbookLobe(point.material, incidence, this.weights),
+      physical: physicalLobe(this.scene.terms, table, incidence),
+    };
+    const { top, cut } = drawVectors(svg, light, point.cosView, lobes || null);
+    svg.setAttribute("aria-label", vectorsInWords(light, point.cosView));
+    caption.replaceChildren(...captionOf(light, point, lobes ? top : 0, cut));
+  }
+
+  /** @param {any} point */
+  listTerms(point) {
+    const [list, sums] = this.panel.querySelectorAll("tbody");
+    const { scene } = this;
+    list.replaceChildren(...(point.material ? termRows(point) : []));
+    void imagesOf(scene.id, scene.images).then((images) => {
+      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
+    });
+  }
+
+  /** @param {string} name @returns {HTMLElement} */
+  part(name) {
+    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part=${name}]`));
+  }
+}
+
+/** Planes of a scene's grid as numbers, and the lobes of its materials. @param {any} scene */
+async function termsOf(scene) {
+  const { grid, lobes, tops } = scene.terms;
+  const { codes } = await imagesOf(`terms-${scene.id}`, grid);
+  const table = lobes ? (await decode(lobes, lobes.data)).codes : {};
+  const values = (/** @type {string} */ name, /** @type {Uint16Array} */ plane) =>
+    Float64Array.from(plane, (code) =>
+      name in tops ? tops[name] * (code / LARGEST_CODE) ** 2 : (2 * code) / LARGEST_CODE - 1);
+  /** @type {Record<string, Float64Array>} */
+  const planes = Object.fromEntries(Object.entries(codes).map(([name, plane]) => [name, values(name, plane)]));
+  return {
+    material: codes.material,
+    planes,
+    lobes: scene.terms.materials.map((/** @type {any} */ _, /** @type {number} */ number) =>
+      values(`physical.${number}`, table[`physical.${number}`] ?? new Uint16Array())),
+  };
+}
+
+/** The middle of the greatest region if a surface is there, or else of the picture. @param {any} scene @param {any} data */
+function firstPixel(scene, data) {
+  const [region] = scene.regions;
+  const inside = region && [region.x + (region.width >> 1), region.y + (region.height >> 1)];
+  const places = [...(inside ? [inside] : []), [scene.width >> 1, scene.height >> 1]];
+  return places.find((pixel) => termsAt(scene, data, pixel).material) ?? places[0];
+}
+
+/**
+ * The terms at the point of the grid nearest to a pixel; `material` is null on the background.
+ * @param {any} scene
+ * @param {any} data
+ * @param {number[]} pixel
+ */
+function termsAt(scene, data, [x, y]) {
+  const { terms } = scene;
+  const { width, height } = terms.grid;
+  const column = Math.floor((x * width) / scene.width), row = Math.floor((y * height) / scene.height);
+  const middle = (/** @type {number} */ cell, /** @type {number} */ count, /** @type {number} */ side) =>
+    Math.floor(((2 * cell + 1) * side) / (2 * count));
+  const place = row * width + column;
+  const number = data.material[place] - 1;
+  const at = (/** @type {string} */ name) => data.planes[name][place];
+  const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
+  const material = terms.materials[number] ?? null;
+  if (!material) return { pixel, material, number, cosView: 0, lights: [], total: [0, 0, 0] };
+  const lights = terms.lights.map((/** @type {any} */ light, /** @type {number} */ index) =>
+    lightTerms(light, material, at("cos_view"), (name) => at(`${index}.${name}`)));
+  const ambient = product(material.ambient, material.k_a);
+  const others = "others.R" in data.planes ? ["R", "G", "B"].map((colour) => at(`others.${colour}`)) : null;
+  const parts = [material.k_i, ambient, ...(others ? [others] : []), ...lights.flatMap((/** @type {any} */ light) => [light.diffuse, light.specular])];
+  const total = parts.reduce((sum, part) => sum.map((/** @type {number} */ value, /** @type {number} */ channel) => value + part[channel]));
+  return { pixel, material, number, cosView: at("cos_view"), ambient, lights, others, total };
+}
+
+/** @param {any} light @param {any} material @param {number} normalView @param {(name: string) => number} at */
+function lightTerms(light, material, normalView, at) {
+  const [attenuation, cosIncidence, cosView, lobe] = ["attenuation", "cos_incidence", "cos_view", "lobe"].map(at);
+  const arriving = light.intensity.map((/** @type {number} */ value) => value * attenuation);
+  return {
+    ...light, attenuation, cosIncidence, cosView, lobe,
+    cosReflection: 2 * cosIncidence * normalView - cosView,
+    diffuse: product(arriving, material.k_d).map((value) => value * Math.max(cosIncidence, 0)),
+    specular: product(arriving, material.k_s).map((value) => value * lobe),
+  };
+}
+
+/** @param {number[]} a @param {number[]} b */
+function product(a, b) {
+  return a.map((value, channel) => value * b[channel]);
+}
+
+/** The light that gives most, or else faces the point most; null without lights. @param {any[]} lights @param {number[]} weights */
+function strongest(lights, weights) {
+  const worth = (/** @type {any} */ light) =>
+    luminanceOf(light.diffuse, weights) + luminanceOf(light.specular, weights) + 1e-9 * light.cosIncidence;
+  return lights.reduce((best, light) => (best && worth(best) >= worth(light) ? best : light), null);
+}

@@ -1,0 +1,127 @@
+"""The terms of a scene for the page: 16-bit codes of what the kernel's terms are products of.
+
+A cosine ``c`` has the code ``65535 (1 + c) / 2``; what is 0 or more has ``65535 sqrt(v / top)``,
+with the plane's ``top``, and is off by at most ``top`` / 65000. The planes are packed as those of
+images are (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from msgspec import field
+from numpy.typing import NDArray
+
+from comparisons.records import Record, plain
+from comparisons.terms import polar
+from comparisons.terms.term_grid import TermGrid
+from reports.page.embedding import Embedded, Plane, packed
+
+LARGEST = 65535
+
+
+class MaterialView(Record):
+    """A material of the grid; see :class:`comparisons.terms.term_grid.TermMaterial`."""
+
+    name: str
+    k_i: tuple[float, ...]
+    k_a: tuple[float, ...]
+    k_d: tuple[float, ...]
+    k_s: tuple[float, ...]
+    n: float
+    form: str
+    ambient: tuple[float, ...]
+
+
+class LightView(Record):
+    """A light of the grid, and its ``I_p0``."""
+
+    name: str
+    intensity: tuple[float, ...]
+
+
+class TermsView(Record):
+    """What the page holds of the terms of a scene.
+
+    grid
+        Planes over the grid of pixels; None where there are no terms.
+    tops
+        Of the planes that are 0 or more, by name.
+    lobes
+        Planes over incidences and directions of view, by the number of the material.
+    missing
+        Why there are no terms.
+    """
+
+    grid: Embedded | None = None
+    lobes: Embedded | None = None
+    tops: dict[str, float] = field(default_factory=dict)
+    materials: tuple[MaterialView, ...] = ()
+    lights: tuple[LightView, ...] = ()
+    missing: str = ""
+
+    def manifest(self) -> dict[str, Any]:
+        """What the page's script needs beside the data of the grid, as plain data."""
+        found = plain(self)
+        return found | {
+            "grid": self.grid.manifest() if self.grid else None,
+            "incidences": polar.INCIDENCES.tolist(),
+            "views": polar.VIEWS.tolist(),
+            "grazing": polar.GRAZING,
+        }
+
+
+def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
+    """Return what the page holds of a grid of terms, or of why there is none."""
+    if grid is None:
+        return TermsView(missing=missing) if missing else None
+    tops: dict[str, float] = {}
+    seen = grid.material >= 0
+    shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
+    planes = {"material": (grid.material + 1).astype(np.uint16)}
+    planes["cos_view"] = _cosines(grid.cos_view, seen)
+    for number, light in enumerate(grid.lights):
+        for name in ("cos_incidence", "cos_view"):
+            planes[f"{number}.{name}"] = _cosines(getattr(light, name), seen)
+        amounts = {"attenuation": light.attenuation * seen, "lobe": light.lobe * shiny}
+        for name, amount in amounts.items():
+            planes[f"{number}.{name}"] = _amounts(f"{number}.{name}", amount, tops)
+    if grid.others is not None:
+        for channel, colour in enumerate("RGB"):
+            planes[f"others.{colour}"] = _amounts(
+                f"others.{colour}", grid.others[..., channel] * seen, tops
+            )
+    lobes = {
+        f"physical.{number}": _amounts(f"physical.{number}", material.physical, tops)
+        for number, material in enumerate(grid.materials)
+        if material.physical is not None
+    }
+    return TermsView(
+        grid=_embedded(planes),
+        lobes=_embedded(lobes) if lobes else None,
+        tops=tops,
+        materials=tuple(_of(MaterialView, material) for material in grid.materials),
+        lights=tuple(_of(LightView, light) for light in grid.lights),
+    )
+
+
+def _of(kind: type, source: object) -> Any:
+    return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
+
+
+def _cosines(values: NDArray, seen: NDArray) -> NDArray[np.uint16]:
+    codes = np.rint(LARGEST * (1 + np.clip(values, -1, 1)) / 2)
+    return np.where(seen, codes, 0).astype(np.uint16)
+
+
+def _amounts(name: str, values: NDArray, tops: dict[str, float]) -> NDArray[np.uint16]:
+    values = np.maximum(values, 0)
+    tops[name] = float(values.max(initial=0)) or 1.0
+    return np.rint(LARGEST * np.sqrt(values / tops[name])).astype(np.uint16)
+
+
+def _embedded(codes: dict[str, NDArray[np.uint16]]) -> Embedded:
+    planes = tuple(Plane(name, 0) for name in codes)
+    height, width = next(iter(codes.values())).shape
+    return Embedded(width, height, 1, planes, packed(planes, codes))

@@ -1,0 +1,168 @@
+"""Term by term: the numbers and the figure at the pixel that is picked."""
+
+import math
+import re
+
+import pytest
+
+from tests import term_grids
+from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
+
+SCENE = f"#scene={NOISY_ID}&mode=error&boxes=0"
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
+GRID = term_grids.grid((WIDTH, HEIGHT))
+
+
+def shown_rows(page):
+    """Return the table's rows by name, as texts of their cells, in order; a light's go by it."""
+    rows, light = {}, ""
+    for line in page.locator("#terms tbody tr").all():
+        cells = [text.strip() for text in line.locator("th, td").all_text_contents()]
+        light = cells[0] if "light" in (line.get_attribute("class") or "") else light
+        name = (
+            cells[0]
+            if cells[0] in ("ambient", "textbook", "physical", light)
+            else f"{light} {cells[0]}"
+        )
+        rows[name] = cells[1:]
+    return rows
+
+
+def values(cells):
+    return [float(text.replace("< ", "")) for text in cells[1:]]
+
+
+def pick(visitor, x, y, how):
+    left, top = visitor.place_of(x, y)
+    place = {"x": left, "y": top}
+    if how == "touch":
+        visitor.canvas().tap(position=place)
+    elif how == "keys":
+        visitor.canvas().click(
+            position=dict(zip("xy", visitor.place_of(x - 3, y - 10), strict=True))
+        )
+        visitor.canvas().focus()
+        for key in (*["ArrowRight"] * 3, "Shift+ArrowDown"):
+            visitor.page.keyboard.press(key)
+    elif how == "pointer":
+        visitor.canvas().hover(position=place)
+    else:
+        visitor.canvas().click(position=place)
+    visitor.settle()
+
+
+@pytest.mark.parametrize(
+    ("visitor", "how"),
+    [({}, "click"), ({}, "pointer"), ({}, "keys"), (PHONE, "touch"), (PHONE, "keys")],
+    indirect=["visitor"],
+)
+def test_the_terms_are_those_of_the_pixel(visitor, how):
+    page = visitor.open(SCENE)
+    for x, y in ((9, 14), (37, 22)):
+        pick(visitor, x, y, how)
+        expected = GRID.at(x, y)
+        assert (
+            page.locator("#terms h3")
+            .text_content()
+            .endswith(f"at {expected.pixel[0]}, {expected.pixel[1]}: {expected.material.name}")
+        )
+        rows = shown_rows(page)
+        assert values(rows["textbook"]) == pytest.approx(expected.total, rel=6e-3)
+        assert values(rows["ambient"]) == pytest.approx(expected.ambient, rel=6e-3)
+        for light in expected.lights:
+            assert values(rows[f"{light.name} diffuse"]) == pytest.approx(light.diffuse, rel=6e-3)
+            specular = values(rows[f"{light.name} specular"])
+            assert specular == pytest.approx(light.specular, rel=1e-2, abs=1.1e-4)
+
+
+def test_the_reference_is_that_of_the_pixel_of_the_terms(visitor, report):
+    page = visitor.open(SCENE)
+    pick(visitor, 37, 22, "click")
+    x, y = GRID.at(37, 22).pixel
+    pick(visitor, x, y, "pointer")
+    texts = visitor.inspected()
+    physical = shown_rows(page)["physical"]
+    assert physical[1:] == [texts[f"reference.{channel}"] for channel in range(3)]
+    assert texts["standard_error"] in physical[0]
+
+
+def test_numbers_multiply_to_their_term(visitor):
+    page = visitor.open(SCENE)
+    pick(visitor, 37, 22, "click")
+    rows = shown_rows(page)
+    arriving = [float(n) for n in re.findall(r"[\d.]+", rows["key"][0].split("=")[1])]
+    *colours, f_att = arriving
+    factors = rows["key diffuse"][0].split("=")[1]
+    *k_d, cosine = map(float, re.findall(r"[\d.]+", factors))
+    product = [i * f_att * k * cosine for i, k in zip(colours, k_d, strict=True)]
+    assert product == pytest.approx(values(rows["key diffuse"]), rel=0.02)
+
+
+def angles(page):
+    """Return the degrees from N of the figure's vectors, by letter; negative on the left."""
+    found = {}
+    for line in page.locator("#terms line").all():
+        x1, y1, x2, y2 = (float(line.get_attribute(name)) for name in ("x1", "y1", "x2", "y2"))
+        letter = line.get_attribute("class").split()[1]
+        found[letter] = math.degrees(math.atan2(x2 - x1, y1 - y2))
+    return found
+
+
+@pytest.mark.parametrize("visitor", [{}, PHONE], indirect=True)
+def test_the_figure_has_the_angles_of_the_strongest_light(visitor):
+    page = visitor.open(SCENE)
+    pick(visitor, 37, 22, "touch" if page.viewport_size["width"] == 390 else "click")
+    expected = GRID.at(37, 22)
+    light = max(expected.lights, key=lambda one: sum(one.diffuse))
+    seen = angles(page)
+    incidence = math.degrees(math.acos(light.cos_incidence))
+    assert seen["N"] == 0
+    assert seen["L"] == pytest.approx(-incidence, abs=0.1)
+    assert seen["R"] == pytest.approx(incidence, abs=0.1)
+    assert light.name in page.locator("#terms figcaption").text_content()
+    for lobe in ("textbook", "partner"):
+        assert page.locator(f"#terms figure > svg .{lobe}").count() == 1
+    box = page.locator("#terms figure > svg").bounding_box()
+    assert box["width"] > 300
+    overflow = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+    assert overflow <= 0
+
+
+def test_a_light_behind_the_surface_has_neither_lobe_nor_term(visitor):
+    page = visitor.open(SCENE)
+    pick(visitor, 30, 30, "click")
+    expected = GRID.at(30, 30)
+    behind = expected.lights[1]
+    assert behind.cos_incidence < 0
+    assert "behind the surface" in shown_rows(page)["fill diffuse"][0]
+    assert values(shown_rows(page)["fill diffuse"]) == [0, 0, 0]
+
+
+def test_the_background_and_other_shading_say_that_there_are_no_terms(visitor):
+    page = visitor.open(SCENE)
+    pick(visitor, 20, 1, "click")
+    assert page.locator("#terms figcaption").text_content() == "No surface is seen there."
+    assert list(shown_rows(page)) == ["physical"]
+    visitor.open(f"#scene={EXACT}")
+    assert "Flat shading" in page.locator("#terms .note").text_content()
+    assert not page.locator("#terms table").is_visible()
+
+
+def test_a_scene_opens_at_a_point_that_has_terms(visitor):
+    page = visitor.open(SCENE)
+    visitor.settle()
+    assert "textbook" in shown_rows(page)
+    assert page.locator("#terms figure > svg").get_attribute("aria-label").startswith("L is ")
+
+
+def test_a_scene_that_is_opened_again_does_not_keep_the_pixel_of_before(visitor):
+    page = visitor.open(SCENE)
+    visitor.settle()
+    title = page.locator("#terms h3")
+    first = title.text_content()
+    pick(visitor, 9, 30, "click")
+    assert title.text_content() != first
+    visitor.open(f"#scene={EXACT}")
+    visitor.open(SCENE)
+    visitor.settle()
+    assert title.text_content() == first

@@ -1,0 +1,45 @@
+"""A grid of terms with made-up numbers: a slope under two lamps, and nothing in its first row."""
+
+import numpy as np
+
+from comparisons.terms import polar
+from comparisons.terms.term_grid import GridLight, TermGrid, TermMaterial
+
+CELL = 4
+"""Pixels along the sides of a cell."""
+
+
+def grid(resolution):
+    """Return a grid of half a cell's offset for an image of a width and a height."""
+    columns, rows = (np.arange(CELL // 2, side, CELL) for side in resolution)
+    across, down = np.meshgrid(np.linspace(0, 1, len(columns)), np.linspace(0, 1, len(rows)))
+    material = np.where(down > 0.5, 1, 0)
+    material[0] = -1
+    view = np.cos(0.2 + 0.8 * down)
+    return TermGrid(
+        resolution,
+        columns,
+        rows,
+        (_material("matt <b>", 0.0, 1.0), _material("shiny", 0.5, 12.0)),
+        material,
+        view,
+        (
+            _light("key", (2.0, 1.5, 1.0), 1.2 * across, view, 0.3 * across, 12.0),
+            _light("fill", (0.2, 0.3, 0.5), 1.0 + down, view, 0.8 * down, 12.0),
+        ),
+    )
+
+
+def _material(name, k_s, n):
+    cosines = np.cos(np.radians(polar.INCIDENCES))[:, None]
+    lobe = 0.4 * cosines + 2 * k_s * np.exp(-30 * polar.VIEWS**2)
+    k_d = (0.6, 0.4, 0.2)
+    return TermMaterial(name, (0.0,) * 3, (0.3,) * 3, k_d, (k_s,) * 3, n, "phong", (0.1,) * 3, lobe)
+
+
+def _light(name, intensity, angle, view, azimuth, n):
+    """Return a light at an angle from N, turned by an azimuth out of the plane of N and V."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cos_view = cosine * view - sine * np.sqrt(1 - view**2) * np.cos(azimuth)
+    lobe = np.where(cosine > 0, np.maximum(2 * cosine * view - cos_view, 0) ** n, 0)
+    return GridLight(name, intensity, 0.5 + 0.2 * azimuth, cosine, cos_view, lobe)

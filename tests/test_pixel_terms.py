@@ -1,0 +1,264 @@
+"""Equation 8.10 term by term: what the records and the page hold is what the kernel has."""
+
+import base64
+import zlib
+from xml.etree import ElementTree
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.case import Request, open_case
+from comparisons.compare import prepare
+from comparisons.gallery.builtin import SCENES
+from comparisons.terms import polar, tracing
+from heuristic.errors import InputError
+from reference.rendering.gbuffer import pixel_rays
+from reference.rendering.renderer import variant
+from reports.charts import term_figure
+from reports.page import terms_view
+
+KERNEL = 1e-5
+"""Of the largest value: single precision, and ``n`` times its rounding of a cosine."""
+
+CODES = 2e-4
+"""Of the largest value: what 16 bits of each factor leave of a sum of products."""
+
+
+def prepared(scene, **options):
+    case = open_case(scene, Request.of({"spp": 4, **options}))
+    return prepare(case.source, case.options), case.options
+
+
+def traced(scene, **options):
+    ready, given = prepared(scene, **options)
+    grid, missing = tracing.trace(ready, given)
+    assert grid is not None, missing
+    return grid, ready
+
+
+def kernel(ready, grid):
+    """Return what the heuristic half's integrator has at the grid's points, (H, W, 3)."""
+    half = ready.heuristic
+    with variant(half.variant):
+        ray = pixel_rays(half.scene, grid.resolution, *np.meshgrid(grid.columns, grid.rows))
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(0, grid.material.size)
+        colour, valid, _ = half.integrator.sample(half.scene, sampler, ray)
+        image = np.array(mi.Color3f(colour) & valid, np.float64).T.reshape(*grid.material.shape, 3)
+    return np.where(grid.material[..., None] < 0, 0, image)
+
+
+@pytest.mark.guarantee(
+    "kernel",
+    "The terms of 8.10 that a page shows add up to the kernel's value, in every built-in scene that"
+    " is shaded by it.",
+)
+@pytest.mark.parametrize("name", [n for n, s in SCENES.items() if s.interpolation == "phong"])
+def test_the_terms_add_up_to_what_the_kernel_has(name):
+    grid, ready = traced(name, resolution=(24, 16))
+    expected = kernel(ready, grid)
+    assert expected.max() > 0.1
+    assert abs(grid.total() - expected).max() <= KERNEL * expected.max()
+    assert abs(total_of(terms_view.view(grid)) - expected).max() <= CODES * expected.max()
+
+
+def total_of(view):
+    """Add up the terms that the page holds, as its script does."""
+    planes = unpacked(view.grid, view.tops)
+    material = planes["material"]
+    image = np.zeros((*material.shape, 3))
+    for number, found in enumerate(view.materials, 1):
+        here = (material == number)[..., None]
+        k_d, k_s = map(np.array, (found.k_d, found.k_s))
+        value = np.add(found.k_i, np.multiply(found.ambient, found.k_a))
+        for place, light in enumerate(view.lights):
+            of = {name: planes[f"{place}.{name}"][..., None] for name in
+                  ("attenuation", "cos_incidence", "lobe")}  # fmt: skip
+            reflected = k_d * np.maximum(of["cos_incidence"], 0) + k_s * of["lobe"]
+            value = value + np.array(light.intensity) * of["attenuation"] * reflected
+        image = np.where(here, value, image)
+    if "others.R" in planes:
+        image += np.stack([planes[f"others.{colour}"] for colour in "RGB"], axis=-1)
+    return image
+
+
+def unpacked(embedded, tops):
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(embedded.data)), np.uint8)
+    raw = raw.reshape(len(embedded.planes), 2, embedded.height, embedded.width).astype(np.int64)
+    zigzag = raw[:, 0] + 256 * raw[:, 1]
+    codes = np.cumsum((zigzag >> 1) ^ -(zigzag & 1), axis=-1) & 0xFFFF
+    found = {}
+    for plane, code in zip(embedded.planes, codes, strict=True):
+        if plane.name == "material":
+            found[plane.name] = code
+        elif plane.name in tops:
+            found[plane.name] = tops[plane.name] * (code / 65535) ** 2
+        else:
+            found[plane.name] = 2 * code / 65535 - 1
+    return found
+
+
+def seen_on_the_unit_sphere(x, y, side, viewer):
+    """Return where the ray through a pixel's centre meets the figures' sphere, in float64."""
+    viewer = np.array(viewer, float)
+    forward = -viewer / np.linalg.norm(viewer)
+    right = np.cross(forward, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    reach = np.tan(np.radians(20))
+    across, down = (2 * (place + 0.5) / side - 1 for place in (x, y))
+    ray = forward + reach * (across * right - down * up)
+    ray /= np.linalg.norm(ray)
+    half = ray @ viewer
+    return viewer - ray * (half + np.sqrt(half**2 - viewer @ viewer + 1))
+
+
+def test_each_factor_is_that_of_the_formula():
+    """Figure 8.11: three lights about a unit sphere, in closed form."""
+    grid, _ = traced("fig-8-11-n9", resolution=(32, 32))
+    viewer = np.array((-3.0, 0.0, 1.0))
+    lamps = {"light 1": (-4.24, 0, 0), "light 2": (-3.5, -3.5, 0), "light 3": (0, -4.24, 0)}
+    lit = 0
+    for x, y in ((9, 14), (16, 16), (24, 18), (20, 9)):
+        found = grid.at(x, y)
+        assert found.pixel == (x, y)
+        normal = seen_on_the_unit_sphere(x, y, 32, viewer)
+        view = (viewer - normal) / np.linalg.norm(viewer - normal)
+        assert found.cos_view == pytest.approx(normal @ view, abs=1e-5)
+        assert found.ambient == pytest.approx((0.3, 0.3, 0.3))
+        for number, (name, lamp) in enumerate(lamps.items()):
+            light = found.lights[number]
+            toward = (np.array(lamp) - normal) / np.linalg.norm(np.array(lamp) - normal)
+            cosine = normal @ toward
+            mirrored = 2 * cosine * normal - toward
+            lobe = max(mirrored @ view, 0) ** 9 if cosine > 0 else 0
+            assert (light.name, light.attenuation) == (name, pytest.approx(1))
+            assert light.cos_incidence == pytest.approx(cosine, abs=1e-5)
+            assert light.cos_reflection == pytest.approx(mirrored @ view, abs=1e-5)
+            assert light.lobe == pytest.approx(lobe, abs=1e-4)
+            assert light.diffuse[number] == pytest.approx(0.5 * max(cosine, 0), abs=1e-5)
+            assert light.specular[number] == pytest.approx(0.7 * lobe, abs=1e-4)
+            assert sum(light.diffuse) == light.diffuse[number]
+            lit += cosine > 0 and lobe > 0.01
+    assert lit >= 4
+
+
+def sphere(material, *lights, **more):
+    sensor = {
+        "type": "perspective",
+        "fov": 30,
+        "film": {"type": "hdrfilm", "width": 16, "height": 16},
+        "to_world": mi.ScalarTransform4f().look_at((0, -4, 1), (0, 0, 0), (0, 0, 1)),
+    }
+    scene = {
+        "type": "scene",
+        "sensor": sensor,
+        "ball": {"type": "sphere", "bsdf": material},
+        **more,
+    }
+    return scene | {f"lamp {number}": light for number, light in enumerate(lights)}
+
+
+def lamp(x, strength=30.0):
+    return {"type": "point", "position": [x, -4, 3], "intensity": strength}
+
+
+PLASTIC = {"type": "roughplastic", "alpha": 0.2}
+
+
+def test_lights_beyond_four_are_one_term(rgb):
+    scene = sphere(PLASTIC, *(lamp(x, 10.0 + 3 * x) for x in range(-3, 4)))
+    grid, ready = traced(scene)
+    expected = kernel(ready, grid)
+    assert [light.name for light in grid.lights] == [f"lamp {n}" for n in range(3, 7)]
+    assert grid.others.max() > 0.01
+    assert abs(grid.total() - expected).max() <= KERNEL * expected.max()
+    assert abs(total_of(terms_view.view(grid)) - expected).max() <= CODES * expected.max()
+    there = grid.at(8, 8)
+    assert there.total == pytest.approx(tuple(grid.total()[8, 8]))
+
+
+def test_textures_make_a_material_of_each_colour(rgb):
+    board = {
+        "type": "checkerboard",
+        "color0": 0.1,
+        "color1": {"type": "rgb", "value": [0.8, 0.4, 0.2]},
+    }
+    grid, ready = traced(sphere({"type": "diffuse", "reflectance": board}, lamp(2)))
+    assert sorted(round(m.k_d[0], 3) for m in grid.materials) == [0.1, 0.8]
+    assert abs(grid.total() - kernel(ready, grid)).max() <= KERNEL
+
+
+@pytest.mark.parametrize("chosen", ["llvm_ad_rgb", "llvm_ad_spectral"])
+def test_the_physical_lobe_of_a_diffuse_surface_is_lamberts(chosen):
+    grey = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.6}}
+    grid, _ = traced(lambda: sphere(grey, lamp(1)), variant=chosen, heuristic_variant="llvm_ad_rgb")
+    (material,) = grid.materials
+    between = term_figure.physical_lobe(material.physical, 87.0)
+    assert between == pytest.approx(np.full(len(polar.VIEWS), 0.6 * 0.0523), abs=1e-3)
+    expected = 0.6 * np.cos(np.radians(polar.INCIDENCES))[:, None]
+    assert material.physical == pytest.approx(
+        np.broadcast_to(expected, material.physical.shape), rel=2e-3
+    )
+
+
+def test_the_physical_lobe_of_a_mirror_like_surface_is_about_the_mirror_direction(rgb):
+    grid, _ = traced(sphere({"type": "roughconductor", "alpha": 0.05}, lamp(1)))
+    (material,) = grid.materials
+    middle = len(polar.VIEWS) // 2
+    for row, incidence in zip(material.physical, polar.INCIDENCES, strict=True):
+        assert polar.view_angles(incidence)[middle] == pytest.approx(incidence)
+        if incidence < 70:  # where microfacets do not yet lean to the horizon
+            assert abs(polar.view_angles(incidence)[np.argmax(row)] - incidence) < 1
+        assert row[middle] > 5 * row[0]
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "reason"),
+    [
+        ("fig-6-10", {}, "Flat shading"),
+        ("fig-8-9", {"heuristic": "mean-ambient"}, "mean-ambient"),
+        ("fig-8-9", {"variant": "llvm_ad_spectral"}, "wavelength by wavelength"),
+    ],
+)
+def test_other_shading_has_no_terms_and_says_why(scene, options, reason):
+    ready, given = prepared(scene, resolution=(8, 8), **options)
+    grid, missing = tracing.trace(ready, given)
+    assert grid is None
+    assert reason in missing
+
+
+def test_a_pixel_on_the_background_has_no_terms_and_one_outside_is_refused():
+    grid, _ = traced("fig-8-9", resolution=(16, 16))
+    assert grid.at(0, 0) is None
+    with pytest.raises(InputError, match="outside the image"):
+        grid.at(16, 0)
+
+
+def test_the_figure_of_a_point_has_its_angles_and_both_lobes():
+    grid, _ = traced("fig-8-9", resolution=(16, 16))
+    point = grid.at(8, 8)
+    (light,) = point.lights
+    shown = ElementTree.fromstring(term_figure.svg(point))
+    tag = "{http://www.w3.org/2000/svg}"
+    ends = {
+        text.text: (float(line.get("x2")), -float(line.get("y2")))
+        for line, text in zip(shown.iter(f"{tag}line"), shown.iter(f"{tag}text"), strict=True)
+    }
+    incidence = np.degrees(np.arccos(light.cos_incidence))
+    angles = {letter: np.degrees(np.arctan2(*end)) for letter, end in ends.items()}
+    assert angles == pytest.approx(
+        {"N": 0, "L": -incidence, "R": incidence, "V": angles["V"]}, abs=0.1
+    )
+    # V's two parts in the figure, and the one across its plane, make a unit vector.
+    across, along = (part / term_figure.VECTOR for part in ends["V"])
+    assert along == pytest.approx(point.cos_view, abs=1e-3)
+    toward = -across * np.sin(np.radians(incidence)) + along * light.cos_incidence
+    assert toward == pytest.approx(light.cos_view, abs=1e-3)
+    assert len(list(shown.iter(f"{tag}polygon"))) == 2
+    lobe = term_figure.textbook_lobe(point.material, incidence)
+    assert lobe.max() == pytest.approx(0.5 * light.cos_incidence + 0.7, rel=1e-3)
+    html = term_figure.html(point, (0.25, 0.5, 0.75), 0.001)
+    assert "0.750" in html
+    assert "± 1.0" in html or "± 0.001" in html
