@@ -64,6 +64,25 @@ def test_the_inspector_follows_the_pointer_and_names_a_regions_effect(visitor, r
     assert not page.locator("#inspector .effect").is_visible()
 
 
+def test_other_parts_of_the_page_are_told_of_the_pixel(visitor):
+    page = visitor.open(f"{SCENE}&mode=error")
+    page.evaluate("""() => {
+      window.picks = [];
+      document.addEventListener("pick", (event) => window.picks.push(event.detail));
+    }""")
+    for x in (10, 20):
+        left, top = visitor.place_of(x, 20)
+        visitor.canvas().hover(position={"x": left, "y": top})
+    visitor.canvas().click(position={"x": left, "y": top})
+    page.mouse.move(0, 0)
+    visitor.settle()
+    picks = page.evaluate("window.picks")
+    assert {pick["scene"] for pick in picks} == {NOISY_ID}
+    seen = [(pick["pixel"], pick["marked"]) for pick in picks]
+    assert seen[0] == ([10, 20], False)
+    assert seen[-2:] == [([20, 20], False), ([20, 20], True)]
+
+
 @pytest.mark.parametrize(
     ("tone", "curve"),
     [

@@ -23,6 +23,8 @@ class Viewer {
     this.hovered = null;
     this.swapped = false;
     this.pending = false;
+    /** What was told last, by the event's name. @type {Map<string, string>} */
+    this.told = new Map();
     listenToPointers(this);
     this.listenToControls();
     new ResizeObserver(() => this.redraw()).observe(element);
@@ -98,8 +100,23 @@ class Viewer {
   /** Show the numbers of the pixel under the pointer, else of the marked one. */
   inspectPixel() {
     const pixel = this.hovered ?? this.view.pixel;
-    const known = pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height;
-    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, pixel) : null);
+    const known = this.painter && pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height ? pixel : null;
+    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, known) : null);
+    this.tell("pick", { scene: this.scene.id, pixel: known, marked: Boolean(known && !this.hovered) });
+  }
+
+  /**
+   * Tell other parts of the page, once for each change, by a CustomEvent on the viewer's element:
+   * "pick" has `{scene, pixel, marked}` as its detail: the scene's id, `[x, y]` in pixels of the image
+   * or null, and whether the pixel is marked (by a click or the keys) or only under the pointer.
+   * @param {string} name
+   * @param {object} detail
+   */
+  tell(name, detail) {
+    const text = JSON.stringify(detail);
+    if (this.told.get(name) === text) return;
+    this.told.set(name, text);
+    this.element.dispatchEvent(new CustomEvent(name, { detail, bubbles: true }));
   }
 
   /** @param {number[] | null} place */
