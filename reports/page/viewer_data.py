@@ -17,7 +17,7 @@ REGION_SIZE = 420
 
 
 def drawing() -> dict[str, Any]:
-    """Maps, their colours, and the conversion from linear RGB to XYZ, by their names in the script."""
+    """Maps, their colours, and the matrix from linear RGB to XYZ, as the script calls them."""
     keys = ("name", "title", "kind", "top")
     maps = [{key: getattr(item, key) for key in keys} for item in legends()]
     effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}

@@ -262,7 +262,8 @@ def test_every_key_does_what_the_help_says(visitor):
     keyboard = page.keyboard
     changes = [
         ("4", "mode", "error"), ("m", "map", "dE_ITP"), ("c", "top", "3"), ("3", "mode", "side"),
-        ("t", "tone", "reinhard"), ("b", "best", "1"), ("b", "best", None), ("]", "ev", "0.5"), ("[", "ev", None), ("]", "ev", "0.5"),
+        ("t", "tone", "reinhard"), ("b", "best", "1"), ("b", "best", None),
+        ("]", "ev", "0.5"), ("[", "ev", None), ("]", "ev", "0.5"),
         ("\\", "ev", None), ("r", "boxes", "0"), ("1", "mode", None), (".", "split", "0.52"),
         (",", "split", None),
     ]  # fmt: skip
