@@ -35,6 +35,7 @@ from reports.terminal.printing import (
     NOTICEABLE,
     about_noise,
     code_spans,
+    difference,
     may_be_none,
     number,
     parameter,
@@ -55,7 +56,7 @@ TITLE = "Textbook shading against physically based rendering"
 PIXELATED_BELOW = 400
 
 #: How a value is printed, by the name of its form.
-FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent": percent}
+FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
 
 TEMPLATES = Path(__file__).parent / "templates"
 

@@ -43,8 +43,17 @@ class Controls {
     for (const field of this.fields()) field.value = String(view[/** @type {keyof View} */ (field.dataset.control)] ?? "");
     const output = this.element.querySelector("output");
     if (output) output.textContent = `${view.ev > 0 ? "+" : ""}${view.ev}`.replace("-", "−");
+    this.showGain();
     this.showLegend();
     this.disable();
+  }
+
+  /** What the best exposure does to the mean. */
+  showGain() {
+    const { view, scene } = this.viewer;
+    const { factor, mean, after } = bestOf(scene, view.map);
+    const text = `Textbook × ${plainly(Number(factor.toPrecision(3)))}: mean ${this.viewer.measure().title} ${significant(mean)} → ${significant(after)}`;
+    /** @type {HTMLElement} */ (this.element.querySelector(".gain")).textContent = view.best && view.mode !== "error" ? text : "";
   }
 
   /** What does nothing in this mode, for this scene, or at this zoom. */

@@ -69,6 +69,7 @@ function showInspection(panel, lines) {
     cell.textContent = (index && value ? value[Number(index)] : /** @type {string} */ (value)) ?? "–";
     if (name.endsWith("_hex")) /** @type {HTMLElement} */ (cell).style.borderColor = lines ? String(value) : "";
   }
+  panel.classList.toggle("empty", !lines);
   const effect = /** @type {HTMLElement | null} */ (panel.querySelector(".effect"));
   if (effect) effect.hidden = !lines?.effect;
 }

@@ -1,7 +1,7 @@
 // What a metric is over a part of the image: the numbers behind brushing.
 
 /** Ends of a map's colours, as parts of the metric's own; the automatic one holds this part of the pixels. */
-const RANGES = [0.05, 0.1, 0.25, 0.5, 1, 2, 5], HELD = 0.99;
+const RANGES = [0.05, 0.1, 0.25, 0.5, 1, 2, 5], HELD = 0.95;
 
 /** Bars of the histogram, from one end of the colours to the other. */
 const BARS = 40;
@@ -13,7 +13,7 @@ function rangesOf(map) {
   return RANGES.map((factor) => Number((factor * map.top).toPrecision(3)));
 }
 
-/** The least range that holds nearly all counted pixels. @param {Painter} painter @param {any} map */
+/** The least range that holds 95 % of the counted pixels. @param {Painter} painter @param {any} map */
 function automaticRange(painter, map) {
   const sizes = painter.values(map.name).map(Math.abs).filter((_, place) => painter.counts(place)).sort();
   const held = sizes[Math.floor(HELD * (sizes.length - 1))] ?? 0;
