@@ -35,12 +35,12 @@ class Distribution {
     if (this.shown === key) return;
     this.shown = key;
     const all = this.whole(map, top);
-    const some = box ? summarise(painter, map, top, box) : all;
+    const some = box ? summarise(painter, map, top, box, all) : all;
     this.part("title").textContent = `${map.title} in ${box ? "the selection" : "the whole image"}`;
     this.showChart(map, top, all, some);
     const lines = box ? [...linesOf(map, some), ["Cause", causeText(causesIn(painter, scene, map, box))]] : linesOf(map, some).slice(0, 2);
     this.part("numbers").replaceChildren(...lines.map(([name, text]) => row(name, text)));
-    this.showBand(map, box);
+    this.showBand(map, box, all.size);
     this.part("hint").hidden = Boolean(box && view.band);
     this.part("actions").hidden = !box && !view.band;
   }
@@ -68,16 +68,16 @@ class Distribution {
     for (const bar of /** @type {NodeListOf<HTMLElement>} */ (this.panel.querySelectorAll("[data-bar]"))) bar.hidden = bar.dataset.bar !== map.kind;
   }
 
-  /** @param {any} map @param {number[] | null} box */
-  showBand(map, box) {
+  /** @param {any} map @param {number[] | null} box @param {number} whole the sum over the image */
+  showBand(map, box, whole) {
     const { band } = this.viewer.view;
     this.fields().forEach((field, place) => {
       field.value = band && Number.isFinite(band[place]) ? String(band[place]) : "";
     });
     this.part("lit").hidden = !band;
     if (!band) return;
-    const { count, share } = withinBand(/** @type {Painter} */ (this.viewer.painter), map, box, band);
-    this.part("lit").textContent = `Lit up: ${count.toLocaleString("en")} pixels with ${percentText(share)} of the departure.`;
+    const { count, size } = withinBand(/** @type {Painter} */ (this.viewer.painter), map, box, band);
+    this.part("lit").textContent = `Lit up: ${count.toLocaleString("en")} pixels with ${percentText(whole ? size / whole : 0)} of the departure.`;
   }
 
   /** Whole bars are lit up; the outer ones hold all that is beyond. */

@@ -38,6 +38,8 @@ class Painter {
     this.pictures = new Map();
     /** @type {Map<string, Float64Array>} */
     this.numbers = new Map();
+    /** Automatic ranges of maps. @type {Map<string, number>} */
+    this.ranges = new Map();
   }
 
   /** "heuristic" or "reference" through a tone map. @param {string} half @param {string} tone @param {number} gain × the comparison's exposure */

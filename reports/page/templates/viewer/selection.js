@@ -13,12 +13,16 @@ function rangesOf(map) {
   return RANGES.map((factor) => Number((factor * map.top).toPrecision(3)));
 }
 
-/** The least range that holds 95 % of the counted pixels. @param {Painter} painter @param {any} map */
+/** The least range that holds 95 % of the counted pixels, found once for each map. @param {Painter} painter @param {any} map */
 function automaticRange(painter, map) {
+  const known = painter.ranges.get(map.name);
+  if (known) return known;
   const sizes = painter.values(map.name).map(Math.abs).filter((_, place) => painter.counts(place)).sort();
   const held = sizes[Math.floor(HELD * (sizes.length - 1))] ?? 0;
   const ranges = rangesOf(map);
-  return ranges.find((range) => range >= held) ?? ranges[ranges.length - 1];
+  const range = ranges.find((one) => one >= held) ?? ranges[ranges.length - 1];
+  painter.ranges.set(map.name, range);
+  return range;
 }
 
 /** The values at the ends of a map's colours. @param {any} map @param {number} top */
@@ -34,9 +38,10 @@ function endsOf(map, top) {
  * @param {any} map
  * @param {number} top
  * @param {number[] | null} box
+ * @param {{count: number, size: number}} [all] the whole image's, where the rectangle is not that
  * @returns {Summary}
  */
-function summarise(painter, map, top, box) {
+function summarise(painter, map, top, box, all) {
   const values = painter.values(map.name);
   const [low, high] = endsOf(map, top);
   const bars = new Array(BARS).fill(0);
@@ -48,7 +53,7 @@ function summarise(painter, map, top, box) {
     size += Math.abs(value);
     bars[clamp(Math.floor((BARS * (value - low)) / (high - low)), 0, BARS - 1)] += 1;
   });
-  const whole = box ? summarise(painter, map, top, null) : { count, size };
+  const whole = all ?? { count, size };
   return {
     count, size, mean: count ? total / count : 0, part: whole.count ? count / whole.count : 0,
     share: whole.size ? size / whole.size : 0, bars: bars.map((bar) => (count ? bar / count : 0)),
@@ -73,17 +78,16 @@ function boxBetween(from, to) {
   return [...start, ...from.map((value, axis) => Math.abs(value - to[axis]) + 1)];
 }
 
-/** Counted pixels of a rectangle within a band of values, and their part of the image's departure. @param {Painter} painter @param {any} map @param {number[] | null} box @param {number[]} band */
+/** Counted pixels of a rectangle within a band of values, and the sum of their sizes. @param {Painter} painter @param {any} map @param {number[] | null} box @param {number[]} band */
 function withinBand(painter, map, box, [low, high]) {
   const values = painter.values(map.name);
-  let count = 0, size = 0, whole = 0;
-  eachPlace(painter, null, (place) => { whole += Math.abs(values[place]); });
+  let count = 0, size = 0;
   eachPlace(painter, box, (place) => {
     if (values[place] < low || values[place] >= high) return;
     count += 1;
     size += Math.abs(values[place]);
   });
-  return { count, share: whole ? size / whole : 0 };
+  return { count, size };
 }
 
 /**
