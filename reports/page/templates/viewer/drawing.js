@@ -111,17 +111,17 @@ class Drawing {
     const { view, viewport, painter, context } = this;
     const { block, width } = painter.images;
     const [left, top, wide, high] = viewport.seen(view);
+    const size = block * viewport.zoom(view);
     context.font = "11px system-ui, sans-serif";
     context.textAlign = "center";
     context.textBaseline = "middle";
     context.lineWidth = 2.5;
     context.lineJoin = "round";
-    for (let y = top; y < top + high; y++) {
-      for (let x = left; x < left + wide; x++) {
-        const place = Math.floor(y / block) * width + Math.floor(x / block);
-        const [middle, centre] = viewport.toScreen(view, pane, x + 0.5, y + 0.5);
-        const lines = this.valuesAt(name, place);
-        lines.forEach((text, line) => this.outlined(text, middle, centre + 13 * (line - (lines.length - 1) / 2)));
+    for (let row = Math.floor(top / block); row * block < top + high; row++) {
+      for (let column = Math.floor(left / block); column * block < left + wide; column++) {
+        const [middle, centre] = viewport.toScreen(view, pane, (column + 0.5) * block, (row + 0.5) * block);
+        const lines = this.valuesAt(name, row * width + column);
+        lines.forEach((text, line) => this.outlined(text, middle, centre + 13 * (line - (lines.length - 1) / 2), size - 4));
       }
     }
     context.textAlign = "left";
@@ -134,12 +134,12 @@ class Drawing {
     return hasRange(extra.map) ? [differenceText(extra.map, painter.values(extra.map.name)[place], 2).replace(" stops", "")] : [];
   }
 
-  /** Text that is legible on any colour. @param {string} text @param {number} left @param {number} top */
-  outlined(text, left, top) {
+  /** Text that is legible on any colour, squeezed into a width. @param {string} text @param {number} left @param {number} top @param {number} width */
+  outlined(text, left, top, width) {
     this.context.strokeStyle = OVERLAY.label;
-    this.context.strokeText(text, left, top);
+    this.context.strokeText(text, left, top, width);
     this.context.fillStyle = OVERLAY.line;
-    this.context.fillText(text, left, top);
+    this.context.fillText(text, left, top, width);
   }
 
   /** Regions, the selection and the marked pixel. @param {Box} pane */
