@@ -228,6 +228,21 @@ def test_numbers_are_printed_to_three_digits(value, text):
 
 @pytest.mark.parametrize(
     ("value", "text"),
+    [
+        (1.8e-6, "< 0.01"),
+        (-1e-9, "> −0.01"),
+        (0, "0"),
+        (0.01, "0.0100"),
+        (2.5, "2.50"),
+        (None, "–"),
+    ],
+)
+def test_no_colour_difference_is_printed_below_a_hundredth(value, text):
+    assert printing.difference(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
     [(0.0, "0 s"), (2e-5, "20.0 µs"), (0.0042, "4.20 ms"), (75.0, "75.0 s"), (None, "–")],
 )
 def test_times_have_their_unit(value, text):

@@ -60,21 +60,21 @@ def specs(record: ComparisonRecord) -> dict[str, dict[str, Any]]:
 def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dict[str, Any]:
     """The Vega-Lite specification of a histogram of `comparison.json`.
 
-    The axis is logarithmic and the height is the share of pixels a decade, so that equal areas
-    are equal shares of pixels.
+    The axis is logarithmic, the bins are of equal ratio, and the height is the share of the pixels
+    in each: equal areas are equal shares.
 
     name
         One of `comparisons.departure.metrics.METRICS`.
     counted
         Pixels in all.
     """
-    bins = _densities(histogram, counted)
-    top = max(row["density"] for row in bins) or 1.0
+    bins = _shares(histogram, counted)
+    top = max(row["share"] for row in bins) or 1.0
     domain = [histogram.low, 4 * histogram.high]  # room for the last label
     x = {"field": "value", "type": "quantitative", "title": METRICS[name].label}
     x["scale"] = {"type": "log", "domain": domain, "nice": False, "clamp": True}
     x["axis"] = {"values": [0.01, 0.1, 1, 10, 100, 1000], "format": "~g", "grid": False}
-    y = {"field": "density", "type": "quantitative", "title": "pixels per decade"}
+    y = {"field": "share", "type": "quantitative", "title": "share of pixels"}
     y["scale"] = {"domain": [0, 1.45 * top], "nice": False}
     y["axis"] = {"format": ".0%", "tickCount": 3}
     area = {"type": "area", "interpolate": "step-after", "color": AREA, "tooltip": True}
@@ -97,12 +97,12 @@ def note(histogram: Histogram, counted: int) -> str:
     return "Not shown: " + ", ".join(parts) + "." if parts else ""
 
 
-def _densities(histogram, counted):
-    """Lower edge and share of pixels a decade of each bin, and a closing zero."""
+def _shares(histogram, counted):
+    """Lower edge and share of the pixels of each bin, and a closing zero."""
     low, counts = histogram.low, histogram.counts
     decades = math.log10(histogram.high / low) / len(counts)
     return [
-        {"value": low * 10.0 ** (place * decades), "density": count / max(counted, 1) / decades}
+        {"value": low * 10.0 ** (place * decades), "share": count / max(counted, 1)}
         for place, count in enumerate([*counts, 0])
     ]
 
@@ -115,6 +115,6 @@ def _marks(summary, low, top):
     marks = sorted((getattr(summary, name), *style) for name, style in MARKS.items())
     return [
         {"value": value, "label": f"{word} {number(value)}", "dash": dash}
-        | {"density": (1.45 - 0.14 * row) * top}
+        | {"share": (1.45 - 0.14 * row) * top}
         for row, (value, word, dash) in enumerate(mark for mark in marks if mark[0] >= low)
     ]

@@ -38,13 +38,27 @@ def columns() -> tuple[Column, ...]:
     """The columns of the overview after the scene's name, in order."""
     lead, name = LEADING.label, LEADING.name
     return (
-        Column(name, LEADING.heading, _mean(LEADING), style="strong", leading=True),
-        Column("shape", f"{lead}, best exposure", lambda r: r.metrics[name].after_exposure.mean),
+        Column(name, LEADING.heading, _mean(LEADING), "difference", "strong", leading=True),
         Column(
-            "noise", f"{lead}, noise floor", lambda r: r.metrics[name].noise_floor, style="quiet"
+            "shape",
+            f"{lead}, best exposure",
+            lambda r: r.metrics[name].after_exposure.mean,
+            "difference",
+        ),
+        Column(
+            "noise",
+            f"{lead}, noise floor",
+            lambda r: r.metrics[name].noise_floor,
+            "difference",
+            "quiet",
         ),
         *(
-            Column(metric.name, metric.heading, _mean(metric))
+            Column(
+                metric.name,
+                metric.heading,
+                _mean(metric),
+                "difference" if metric.visible else "number",
+            )
             for metric in METRICS.values()
             if metric is not LEADING
         ),

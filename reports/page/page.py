@@ -20,18 +20,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from msgspec import structs
 
-from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
-from comparisons.departure.regions import Region
-from comparisons.departure.spaces import luminance
+from comparisons.departure.metrics import LEADING, METRICS
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
-from reports.page import overview, verdict_view
+from reports.page import overview, verdict_view, viewer_data
 from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
 from reports.run.stages import Failure, Run
@@ -39,6 +36,7 @@ from reports.terminal.printing import (
     NOTICEABLE,
     about_noise,
     code_spans,
+    difference,
     may_be_none,
     number,
     parameter,
@@ -58,20 +56,18 @@ TITLE = "Textbook shading against physically based rendering"
 #: Pictures narrower than this are enlarged without smoothing.
 PIXELATED_BELOW = 400
 
-#: A region that is opened from its link gets about so many screen pixels.
-REGION_SIZE = 420
-
 #: How a value is printed, by the name of its form.
-FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent": percent}
+FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
 STYLES = ("base", "verdict", "overview", "scene", "viewer", "terms", "print")
 SCRIPTS = (
-    "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
-    "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "vectors", "termrows", "terms", "lazy", "main",
+    "page", "numbers", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
+    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving", "pointer",
+    "controls", "viewer", "keyboard", "overview", "charts", "verdict", "vectors", "termrows",
+    "terms", "lazy", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.
@@ -168,26 +164,12 @@ def _scene(view: SceneView, taken: set[str]) -> Scene:
 
 def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[str, Any]:
     """What the page's script needs: the scenes, and how maps are drawn."""
-    maps = [
-        {"name": item.name, "title": item.title, "kind": item.kind, "top": item.top}
-        for item in legends()
-    ]
-    effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}
     return {
         "scenes": [
             *map(_scene_data, scenes),
             *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
         ],
-        "maps": [*maps, effects],
-        "noEffect": theme.NO_EFFECT,
-        "colours": {
-            "error": images.colour_table(images.ERROR_COLOURS),
-            "signed": images.colour_table(images.SIGNED_COLOURS),
-            "value": images.colour_table(images.VALUE_COLOURS),
-        },
-        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED, images.UNDETERMINED],
-        "luminance": luminance(np.eye(3)).tolist(),
-        "epsilon": LOG2_EPSILON,
+        **viewer_data.drawing(),
     }
 
 
@@ -200,17 +182,13 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "height": record.resolution[1],
         "exposure": record.viewing.exposure,
         "regions": plain(record.regions),
+        "best": viewer_data.best_exposures(record.metrics),
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(scene.cost.effects) if scene.cost else None,
         "terms": scene.terms.manifest() if scene.terms else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
     }
-
-
-def _zoom_to(region: Region) -> float:
-    """Screen pixels for one of the image, where a region is looked at."""
-    return round(min(16.0, REGION_SIZE / max(region.width, region.height)), 2)
 
 
 def _data_uri(png: bytes) -> str:
@@ -238,7 +216,7 @@ def _environment() -> Environment:
     environment.filters.update(
         FORMS,
         code_spans=code_spans,
-        zoom_to=_zoom_to,
+        region_view=viewer_data.region_view,
         plain=plain,
         uri=_data_uri,
     )

@@ -26,6 +26,13 @@ def number(value: float | None) -> str:
     return _minus(f"{value:,.{decimals}f}")
 
 
+def difference(value: float | None) -> str:
+    """A colour difference as `number` does, but nobody sees a hundredth of one: "< 0.01"."""
+    if value and abs(value) < 0.01:
+        return "< 0.01" if value > 0 else "> −0.01"
+    return number(value)
+
+
 def parameter(value: float) -> str:
     """A value that was set, not measured: up to four significant digits, no trailing zeros."""
     return _minus(f"{value:,}" if isinstance(value, int) else f"{value:.4g}")

@@ -90,9 +90,11 @@ def exact():
     maps = dict.fromkeys(drawn(), np.zeros((HEIGHT, WIDTH)))
     found = comparison(EXACT, half, half, maps, np.zeros((HEIGHT, WIDTH), bool))
     box = Region(x=8, y=4, width=10, height=8, share=0.5, mean_dE2000=1.0, effect="extended lights")
+    none = records.summary(0.0)
+    none = structs.replace(none, after_exposure=structs.replace(none.after_exposure, exposure=1.0))
     record = structs.replace(
         found.record,
-        metrics=found.record.metrics | {name: records.summary(0.0) for name in drawn()},
+        metrics=found.record.metrics | dict.fromkeys(drawn(), none),
         significant=structs.replace(found.record.significant, fraction=0.0),
         regions=(box,),
         warnings=(),

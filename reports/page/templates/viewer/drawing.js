@@ -4,7 +4,15 @@
 const PANE_TITLES = { heuristic: "textbook", reference: "physical" };
 
 /** Colours of what lies over a picture, legible on any of them. */
-const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", label: "#000b" };
+const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", selection: "#ffd84a", label: "#000b" };
+
+/** From so many screen pixels on, a pixel of the image has its values printed in it. */
+const PRINTED_FROM = 40;
+
+/**
+ * Besides the view: `map` with its `end` and the `measure` that bands are of, `gain` on the textbook's image.
+ * @typedef {{swapped: boolean, regions: any[], box: number[] | null, map: any, gain: number}} Extra
+ */
 
 /** Draws a view of a scene; knows nothing of events. */
 class Drawing {
@@ -18,9 +26,10 @@ class Drawing {
    * @param {View} view
    * @param {Viewport} viewport
    * @param {Painter} painter
-   * @param {{swapped: boolean, regions: any[], title: string}} extra
+   * @param {Extra} extra
    */
   draw(view, viewport, painter, extra) {
+    this.extra = extra;
     this.view = view;
     this.viewport = viewport;
     this.painter = painter;
@@ -29,15 +38,16 @@ class Drawing {
     const height = viewport.arrange(panes.length, width);
     this.resize(width, height);
     panes.forEach((content, place) => this.pane(viewport.panes[place], content));
-    viewport.panes.forEach((pane) => this.clipped(pane, () => this.overlay(pane, extra.regions)));
+    viewport.panes.forEach((pane) => this.clipped(pane, () => this.overlay(pane)));
     if (view.mode === "split") this.divide(viewport.panes[0]);
     panes.forEach((content, place) => this.titles(viewport.panes[place], content));
   }
 
-  /** What each pane shows: one picture, or two divided. @param {{swapped: boolean, title: string}} extra */
-  contents({ swapped, title }) {
-    const error = { picture: "map", title };
+  /** What each pane shows: one picture, or two divided. @param {Extra} extra */
+  contents({ swapped, map, gain }) {
+    const error = { picture: "map", title: gain === 1 ? map.title : `${map.title}, without that exposure` };
     const halves = ["heuristic", "reference"].map((half) => ({ picture: half, title: PANE_TITLES[half] }));
+    if (gain !== 1) halves[0].title += ` × ${plainly(Number(gain.toPrecision(3)))}`;
     switch (this.view.mode) {
       case "side": return [...halves, error].map((one) => [one]);
       case "error": return [[error]];
@@ -77,8 +87,17 @@ class Drawing {
 
   /** @param {Box} pane @param {string} name */
   picture(pane, name) {
+    const { view, viewport, painter, extra } = this;
+    const gain = 2 ** view.ev * (name === "heuristic" ? extra.gain : 1);
+    const source = name === "map" ? painter.map(view.map, extra.map.end) : painter.rendering(name, view.tone, gain);
+    this.image(pane, source);
+    if (view.band) this.image(pane, painter.band(extra.map.measure, view.band, extra.box));
+    if (viewport.zoom(view) >= PRINTED_FROM) this.print(pane, name);
+  }
+
+  /** @param {Box} pane @param {HTMLCanvasElement} source */
+  image(pane, source) {
     const { view, viewport, painter } = this;
-    const source = name === "map" ? painter.map(view.map) : painter.rendering(name, view.tone, view.ev);
     const zoom = viewport.zoom(view) * (window.devicePixelRatio || 1);
     const [left, top] = viewport.toScreen(view, pane, 0, 0);
     const [right, bottom] = viewport.toScreen(view, pane, viewport.width, viewport.height);
@@ -87,18 +106,62 @@ class Drawing {
     this.context.drawImage(source, left, top, right - left, bottom - top);
   }
 
-  /** Regions and the marked pixel. @param {Box} pane @param {any[]} regions */
-  overlay(pane, regions) {
+  /** The values of each pixel in it: three of a rendering, one of a map. @param {Box} pane @param {string} name */
+  print(pane, name) {
+    const { view, viewport, painter, context } = this;
+    const { block, width } = painter.images;
+    const [left, top, wide, high] = viewport.seen(view);
+    const size = block * viewport.zoom(view);
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.lineWidth = 2.5;
+    context.lineJoin = "round";
+    for (let row = Math.floor(top / block); row * block < top + high; row++) {
+      for (let column = Math.floor(left / block); column * block < left + wide; column++) {
+        const [middle, centre] = viewport.toScreen(view, pane, (column + 0.5) * block, (row + 0.5) * block);
+        const lines = this.valuesAt(name, row * width + column);
+        lines.forEach((text, line) => this.outlined(text, middle, centre + 13 * (line - (lines.length - 1) / 2), size - 4));
+      }
+    }
+    context.textAlign = "left";
+  }
+
+  /** @param {string} name @param {number} place */
+  valuesAt(name, place) {
+    const { painter, extra } = this;
+    if (name !== "map") return painter.channels(name).map((codes) => significant(VALUES[codes[place]], 2));
+    return hasRange(extra.map) ? [differenceText(extra.map, painter.values(extra.map.name)[place], 2).replace(" stops", "")] : [];
+  }
+
+  /** Text that is legible on any colour, squeezed into a width. @param {string} text @param {number} left @param {number} top @param {number} width */
+  outlined(text, left, top, width) {
+    this.context.strokeStyle = OVERLAY.label;
+    this.context.strokeText(text, left, top, width);
+    this.context.fillStyle = OVERLAY.line;
+    this.context.fillText(text, left, top, width);
+  }
+
+  /** Regions, the selection and the marked pixel. @param {Box} pane */
+  overlay(pane) {
+    const { regions, box } = /** @type {Extra} */ (this.extra);
     if (this.view.boxes) regions.forEach((region, place) => this.region(pane, region, place + 1));
+    if (box) this.outline(...this.frame(pane, box), OVERLAY.selection);
     if (this.view.pixel) this.mark(pane, this.view.pixel);
   }
 
   /** @param {Box} pane @param {any} region @param {number} number */
   region(pane, region, number) {
-    const [left, top] = this.viewport.toScreen(this.view, pane, region.x, region.y);
-    const [right, bottom] = this.viewport.toScreen(this.view, pane, region.x + region.width, region.y + region.height);
-    this.outline(left, top, right - left, bottom - top, OVERLAY.box);
-    this.label(String(number), left + 1, top + 1, OVERLAY.box);
+    const frame = this.frame(pane, [region.x, region.y, region.width, region.height]);
+    this.outline(...frame, OVERLAY.box);
+    this.label(String(number), frame[0] + 1, frame[1] + 1, OVERLAY.box);
+  }
+
+  /** A rectangle of the image on the screen. @param {Box} pane @param {number[]} box @returns {[number, number, number, number]} */
+  frame(pane, [x, y, width, height]) {
+    const [left, top] = this.viewport.toScreen(this.view, pane, x, y);
+    const zoom = this.viewport.zoom(this.view);
+    return [left, top, width * zoom, height * zoom];
   }
 
   /** @param {Box} pane @param {number[]} pixel */

@@ -13,6 +13,10 @@
  * @property {number} split       place of the divide, 0 to 1
  * @property {number[] | null} pixel the marked pixel
  * @property {boolean} boxes      whether regions are boxed
+ * @property {number | null} top  where the map's colours end; null for the automatic range
+ * @property {boolean} best       whether the textbook is seen at its best exposure
+ * @property {number[] | null} box  the selected rectangle: left, top, width and height in pixels of the image
+ * @property {number[] | null} band the values that are lit up: from, and up to
  * @property {string} sort        the overview's order
  * @property {string} only        the overview's filter: "", significant or failed
  * @property {string} q           the overview's search
@@ -22,7 +26,7 @@
 /** @type {View} */
 const DEFAULT_VIEW = Object.freeze({
   scene: "", mode: "split", map: page.maps[0].name, tone: "clip", ev: 0, zoom: null, x: null, y: null, split: 0.5,
-  pixel: null, boxes: true, sort: "run", only: "", q: "", list: "cards",
+  pixel: null, boxes: true, top: null, best: false, box: null, band: null, sort: "run", only: "", q: "", list: "cards",
 });
 
 /** The values that a property with few of them may have. @type {Record<string, string[]>} */
@@ -36,7 +40,9 @@ const ALLOWED = {
 /** How each property is read; null where the text makes no sense. @type {Record<string, (text: string) => any>} */
 const READERS = {
   ev: numberIn(-16, 16), zoom: numberIn(1e-3, 1e3), x: numberIn(0, 1e6), y: numberIn(0, 1e6), split: numberIn(0, 1),
-  boxes: (text) => text !== "0",
+  boxes: (text) => text !== "0", best: (text) => text === "1", top: numberIn(1e-6, 1e6),
+  box: (text) => (/^\d+,\d+,[1-9]\d*,[1-9]\d*$/.test(text) ? text.split(",").map(Number) : null),
+  band: bandIn,
   pixel: (text) => (/^\d+,\d+$/.test(text) ? text.split(",").map(Number) : null),
 };
 
@@ -46,6 +52,12 @@ function numberIn(low, high) {
     const value = text.trim() ? Number(text) : NaN;
     return value >= low && value <= high ? value : null;
   };
+}
+
+/** Two values in order, of which either may be infinite. @param {string} text */
+function bandIn(text) {
+  const ends = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
+  return ends.length === 2 && ends[0] < ends[1] ? ends : null;
 }
 
 /** The view that a fragment stands for; what it does not say, or says wrongly, is as usual. @param {string} text @returns {View} */

@@ -5,22 +5,34 @@
  * @param {Painter} painter
  * @param {any} scene
  * @param {number[]} pixel in pixels of the image
+ * @param {View} view through whose exposure and tone map the pixel is seen
  */
-function inspect(painter, scene, [x, y]) {
+function inspect(painter, scene, [x, y], view) {
   const { images } = painter;
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
   const flags = images.codes.flags[place];
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
-  const mapText = (/** @type {{name: string, kind: string}} */ { name, kind }) =>
-    kind === "error" ? shown(name) : kind === "ratio" ? `${significant(painter.ratio(place), 2)} stops` : "";
+  const mapText = (/** @type {any} */ map) => (hasRange(map) ? differenceText(map, painter.values(map.name)[place]) : "");
   return {
     position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
-    heuristic: ["R", "G", "B"].map((colour) => shown(`heuristic.${colour}`)),
-    reference: ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)),
+    ...coloursOf(painter, scene, place, view, "heuristic"),
+    ...coloursOf(painter, scene, place, view, "reference"),
     ...Object.fromEntries(painter.page.maps.map((/** @type {any} */ map) => [map.name, mapText(map)])),
     standard_error: shown("standard_error"),
     significant: markText(flags),
     effect: effectAt(scene, x, y),
+  };
+}
+
+/** A half's colour in each space, by the half's name and the space's. @param {Painter} painter @param {any} scene @param {number} place @param {View} view @param {string} half */
+function coloursOf(painter, scene, place, view, half) {
+  const rgb = painter.channels(half).map((codes) => VALUES[codes[place]]);
+  const gain = half === "heuristic" ? gainOf(scene, view) : 1;
+  return {
+    [half]: rgb.map((value) => significant(value)),
+    [`${half}_xyz`]: xyzOf(rgb).map((value) => significant(value)),
+    [`${half}_lab`]: labOf(rgb, scene.exposure).map((value) => value.toFixed(1).replace("-", "−")),
+    [`${half}_hex`]: hexOf(rgb, view.tone, painter.exposure * 2 ** view.ev * gain),
   };
 }
 
@@ -55,7 +67,9 @@ function showInspection(panel, lines) {
     const [name, index] = /** @type {HTMLElement} */ (cell).dataset.value?.split(".") ?? [];
     const value = lines?.[/** @type {keyof typeof lines} */ (name)];
     cell.textContent = (index && value ? value[Number(index)] : /** @type {string} */ (value)) ?? "–";
+    if (name.endsWith("_hex")) /** @type {HTMLElement} */ (cell).style.borderColor = lines ? String(value) : "";
   }
+  panel.classList.toggle("empty", !lines);
   const effect = /** @type {HTMLElement | null} */ (panel.querySelector(".effect"));
   if (effect) effect.hidden = !lines?.effect;
 }

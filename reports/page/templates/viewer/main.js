@@ -4,15 +4,15 @@ const address = makeAddress();
 const overview = makeOverview(byId("overview-section"), page.scenes, change);
 const verdict = document.getElementById("verdict-section");
 if (verdict) makeVerdict(verdict);
-const viewer = new Viewer(byId("viewer"), byId("inspector"), page, change);
+const viewer = new Viewer(byId("viewer"), byId("inspector"), byId("distribution"), page, change);
 const terms = new TermsPanel(byId("terms"), page);
 /** @type {View} */
 let view = DEFAULT_VIEW;
 
-/** See something else, and say so in the address. @param {Partial<View>} changes */
-function change(changes) {
+/** See something else, and say so in the address unless it is passing: browsers bear few changes a second. @param {Partial<View>} changes */
+function change(changes, passing = false) {
   view = { ...view, ...changes };
-  address.replace(fragmentOf(view));
+  if (!passing) address.replace(fragmentOf(view));
   show();
 }
 
@@ -70,9 +70,9 @@ function arrive(id) {
 function turn(step) {
   const seen = page.scenes.filter((/** @type {any} */ scene) => scene.images);
   const place = seen.findIndex((/** @type {any} */ scene) => scene.id === view.scene);
-  const { mode, map, tone } = view;
+  const { mode, map, tone, top } = view;
   const next = seen[(place + step + seen.length) % seen.length];
-  address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, scene: next.id }));
+  address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, top, scene: next.id }));
 }
 
 listenToPrinting(viewer);

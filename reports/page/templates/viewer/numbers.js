@@ -37,6 +37,23 @@ function significant(value, digits = 3) {
   return text.replace("-", "−");
 }
 
+/** A set value without needless digits. @param {number} value */
+function plainly(value) {
+  return String(Number(value.toPrecision(4))).replace("-", "−");
+}
+
+/** @param {number} part of 1 */
+function percentText(part) {
+  const value = 100 * part;
+  return value > 0 && value < 0.1 ? "< 0.1 %" : `${value >= 99.95 ? "100" : value.toPrecision(value < 1 ? 1 : value < 10 ? 2 : 3)} %`;
+}
+
+/** A value of a map: nobody sees a hundredth of a colour difference. @param {{kind: string, top: number}} map @param {number} value */
+function differenceText(map, value, digits = 3) {
+  if (map.kind === "ratio") return `${significant(value, 2)} stops`;
+  return value > 0 && value < 0.01 && map.top >= 1 ? "< 0.01" : significant(value, digits);
+}
+
 /** @param {number} exponent */
 function superscript(exponent) {
   return [...String(exponent)].map((sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)])).join("");

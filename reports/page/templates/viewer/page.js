@@ -2,6 +2,16 @@
 
 const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
 
+/** The exposure of the textbook that lowers a map's mean most: its factor (1: as it is), and both means. @param {any} scene @param {string} map */
+function bestOf(scene, map) {
+  return scene.best[map] ?? scene.best[page.maps[0].name];
+}
+
+/** The factor on the textbook's image in a view. @param {any} scene @param {View} view */
+function gainOf(scene, view) {
+  return view.best ? bestOf(scene, view.map).factor : 1;
+}
+
 /** A map by its name; undefined where there is none. @param {any} page @param {string} name */
 function mapOf(page, name) {
   return page.maps.find((/** @type {any} */ map) => map.name === name);

@@ -7,6 +7,9 @@ const SIGNIFICANT = 1, COUNTED = 2, UNDETERMINED = 4;
 const rgba = (/** @type {number} */ r, /** @type {number} */ g, /** @type {number} */ b) =>
   (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
 
+/** What lies over pixels that are lit up, and over the others: colours with an opacity. */
+const LIT = ((0xa8 << 24) | (0xff << 16) | (0xf0 << 8) | 0x5e) >>> 0, DIMMED = (0x90 << 24) >>> 0;
+
 /** A table of 256 colours out of "rrggbb" after "rrggbb". @param {string} hexadecimal */
 function colourTable(hexadecimal) {
   return Uint32Array.from({ length: 256 }, (_, place) => {
@@ -33,21 +36,41 @@ class Painter {
     );
     /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
     this.pictures = new Map();
+    /** @type {Map<string, Float64Array>} */
+    this.numbers = new Map();
+    /** Automatic ranges of maps. @type {Map<string, number>} */
+    this.ranges = new Map();
   }
 
-  /** "heuristic" or "reference" through a tone map. @param {string} half @param {string} tone @param {number} stops */
-  rendering(half, tone, stops) {
-    const factor = this.exposure * 2 ** stops;
+  /** "heuristic" or "reference" through a tone map. @param {string} half @param {string} tone @param {number} gain × the comparison's exposure */
+  rendering(half, tone, gain) {
+    const factor = this.exposure * gain;
     return this.picture(half, `${tone} ${factor}`, (pixels) =>
       tone === "false" ? this.paintStops(pixels, half, factor) : this.paintLevels(pixels, half, levels(tone, factor)),
     );
   }
 
-  /** A map by its name. @param {string} name */
-  map(name) {
-    const { kind, top } = mapOf(this.page, name);
-    return this.picture("map", name, (pixels) => {
-      if (kind === "ratio") this.paintRatio(pixels, top);
+  /** Whether statistics are over a place. @param {number} place */
+  counts(place) {
+    return Boolean(this.images.codes.flags[place] & COUNTED);
+  }
+
+  /** The values of a map of kind error or ratio, by place. @param {string} name */
+  values(name) {
+    let values = this.numbers.get(name);
+    if (!values) {
+      const codes = this.images.codes[name];
+      values = codes ? Float64Array.from(codes, (code) => VALUES[code]) : Float64Array.from(this.images.codes.flags, (_, place) => this.ratio(place));
+      this.numbers.set(name, values);
+    }
+    return values;
+  }
+
+  /** A map by its name, its colours ending at a value. @param {string} name @param {number} top */
+  map(name, top) {
+    const { kind } = mapOf(this.page, name);
+    return this.picture("map", `${name} ${top}`, (pixels) => {
+      if (kind === "ratio") this.paintRatio(pixels, name, top);
       else if (kind === "mask") this.paintFlags(pixels);
       else if (kind === "effects") this.paintEffects(pixels);
       else this.paintError(pixels, name, top);
@@ -100,11 +123,23 @@ class Painter {
     for (let i = 0; i < pixels.length; i++) pixels[i] = colour[codes[i]];
   }
 
-  /** @param {Uint32Array} pixels @param {number} range half of it, in stops */
-  paintRatio(pixels, range) {
+  /** @param {Uint32Array} pixels @param {string} name @param {number} range half of it, in stops */
+  paintRatio(pixels, name, range) {
+    const values = this.values(name);
     for (let i = 0; i < pixels.length; i++) {
-      pixels[i] = this.tables.signed[clamp(Math.floor(128 + (128 * this.ratio(i)) / range), 0, 255)];
+      pixels[i] = this.tables.signed[clamp(Math.floor(128 + (128 * values[i]) / range), 0, 255)];
     }
+  }
+
+  /** Lights up the counted pixels of a box whose values are in a band, and dims the others. @param {string} name @param {number[]} band @param {number[] | null} box */
+  band(name, [low, high], box) {
+    return this.picture("band", `${name} ${low} ${high} ${box}`, (pixels) => {
+      const values = this.values(name);
+      pixels.fill(DIMMED);
+      eachPlace(this, box, (place) => {
+        if (values[place] >= low && values[place] < high) pixels[place] = LIT;
+      });
+    });
   }
 
   /** @param {Uint32Array} pixels */
@@ -129,7 +164,7 @@ class Painter {
 
   /** Relative luminance of a pixel. @param {string} half @param {number} place */
   luminance(half, place) {
-    return this.page.luminance.reduce(
+    return this.page.xyz[1].reduce(
       (/** @type {number} */ sum, /** @type {number} */ weight, /** @type {number} */ channel) =>
         sum + weight * VALUES[this.channels(half)[channel][place]],
       0,

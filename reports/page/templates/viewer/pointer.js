@@ -1,4 +1,4 @@
-// Mouse, pen and fingers on the canvas: the divide, pan, wheel and pinch, hover and tap.
+// Mouse, pen and fingers on the canvas: the divide, selection, pan, wheel and pinch, hover and tap.
 
 /** A press that moves less than this is a tap; the divide is caught from this far (CSS pixels). */
 const TAP = 5, REACH = 14;
@@ -10,6 +10,8 @@ function listenToPointers(viewer) {
   const down = new Map();
   let moved = 0;
   let dividing = false;
+  /** Where a selection begins. @type {number[] | null} */
+  let corner = null;
 
   const place = (/** @type {MouseEvent} */ event) => {
     const box = canvas.getBoundingClientRect();
@@ -22,7 +24,8 @@ function listenToPointers(viewer) {
     down.set(event.pointerId, at);
     if (down.size > 1) return;
     moved = 0;
-    dividing = viewer.dividesAt(at[0], REACH);
+    corner = viewer.selecting || event.shiftKey ? at : null;
+    dividing = !corner && viewer.dividesAt(at[0], REACH);
   });
 
   canvas.addEventListener("pointermove", (event) => {
@@ -34,13 +37,15 @@ function listenToPointers(viewer) {
     }
     moved += Math.hypot(at[0] - before[0], at[1] - before[1]);
     if (down.size > 1) pinch(viewer, [...down.values()], before, at);
-    else if (dividing) viewer.change({ split: viewer.divideAt(at[0]) });
-    else if (moved > TAP) viewer.change(viewer.viewport.panned(viewer.view, at[0] - before[0], at[1] - before[1]));
+    else if (dividing) viewer.change({ split: viewer.divideAt(at[0]) }, true);
+    else if (moved > TAP && corner) viewer.select(corner, at);
+    else if (moved > TAP) viewer.change(viewer.viewport.panned(viewer.view, at[0] - before[0], at[1] - before[1]), true);
     down.set(event.pointerId, at);
   });
 
   canvas.addEventListener("pointerup", (event) => {
     if (moved <= TAP && down.size === 1) viewer.tap(place(event));
+    else viewer.change({}); // what passed by as it was dragged is now kept in the address
   });
   for (const end of ["pointerup", "pointercancel"]) {
     canvas.addEventListener(end, (event) => down.delete(/** @type {PointerEvent} */ (event).pointerId));
@@ -48,6 +53,8 @@ function listenToPointers(viewer) {
   canvas.addEventListener("pointerleave", () => viewer.hover(null));
 
   canvas.addEventListener("wheel", (event) => {
+    // The wheel scrolls the page, unless somebody has clicked into the picture.
+    if (!event.ctrlKey && !event.metaKey && document.activeElement !== canvas) return;
     event.preventDefault();
     viewer.change(viewer.viewport.zoomed(viewer.view, 2 ** (-event.deltaY / 240), place(event)));
   }, { passive: false });
@@ -64,6 +71,6 @@ function pinch(viewer, fingers, before, after) {
   const other = fingers.find((finger) => finger !== before) ?? after;
   const distance = (/** @type {number[]} */ finger) => Math.hypot(finger[0] - other[0], finger[1] - other[1]);
   const middle = [(after[0] + other[0]) / 2, (after[1] + other[1]) / 2];
-  viewer.change(viewer.viewport.zoomed(viewer.view, distance(after) / Math.max(distance(before), 1), middle));
-  viewer.change(viewer.viewport.panned(viewer.view, (after[0] - before[0]) / 2, (after[1] - before[1]) / 2));
+  viewer.change(viewer.viewport.zoomed(viewer.view, distance(after) / Math.max(distance(before), 1), middle), true);
+  viewer.change(viewer.viewport.panned(viewer.view, (after[0] - before[0]) / 2, (after[1] - before[1]) / 2), true);
 }

@@ -4,10 +4,11 @@ class Viewer {
   /**
    * @param {HTMLElement} element the canvas and its controls
    * @param {HTMLElement} panel the pixel inspector
+   * @param {HTMLElement} brushing the panel of the selection
    * @param {any} page
-   * @param {(changes: Partial<View>) => void} change tells the page what is to be seen
+   * @param {(changes: Partial<View>, passing?: boolean) => void} change tells the page what is to be seen
    */
-  constructor(element, panel, page, change) {
+  constructor(element, panel, brushing, page, change) {
     this.element = element;
     this.panel = panel;
     this.page = page;
@@ -22,11 +23,13 @@ class Viewer {
     /** @type {number[] | null} */
     this.hovered = null;
     this.swapped = false;
+    this.selecting = false;
     this.pending = false;
     /** What was told last, by the event's name. @type {Map<string, string>} */
     this.told = new Map();
+    this.controls = new Controls(this);
+    this.distribution = new Distribution(brushing, this);
     listenToPointers(this);
-    this.listenToControls();
     new ResizeObserver(() => this.redraw()).observe(element);
   }
 
@@ -35,17 +38,18 @@ class Viewer {
     this.scene = scene;
     this.painter = null;
     this.hovered = null;
-    this.swapped = false;
+    this.swapped = this.selecting = false;
     this.viewport = new Viewport(scene.width, scene.height);
     section.querySelector(".viewer-slot")?.append(this.element);
-    section.querySelector(".side")?.prepend(this.panel);
-    this.element.hidden = this.panel.hidden = false;
+    section.querySelector(".side")?.prepend(this.panel, this.distribution.panel);
+    this.element.hidden = this.panel.hidden = this.distribution.panel.hidden = false;
     this.element.dataset.ready = "";
     this.offerEffects();
     const images = await imagesOf(scene.id, scene.images);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.painter = new Painter(images, scene.exposure, this.page, scene.effects);
     this.element.dataset.ready = scene.id;
+    this.controls.show();
     this.redraw();
   }
 
@@ -62,9 +66,31 @@ class Viewer {
     const known = mapOf(this.page, view.map) && (view.map !== "effects" || this.scene.effects);
     this.view = known ? view : { ...view, map: DEFAULT_VIEW.map };
     this.element.dataset.mode = view.mode;
-    this.showControls();
-    this.showLegend();
+    this.controls.show();
     this.redraw();
+  }
+
+  /** The map that numbers are of: the one that is chosen, or the first if that has no values. */
+  measure() {
+    const map = mapOf(this.page, this.view.map);
+    return hasRange(map) ? map : this.page.maps[0];
+  }
+
+  /** Where its colours end. */
+  top() {
+    return this.view.top ?? this.automatic();
+  }
+
+  automatic() {
+    const map = this.measure();
+    return this.painter ? automaticRange(this.painter, map) : map.top;
+  }
+
+  /** The selection, as far as it is in the image. @returns {number[] | null} */
+  box() {
+    const [x, y, w, h] = this.view.box ?? [0, 0, 0, 0];
+    const [width, height] = [Math.min(w, this.scene.width - x), Math.min(h, this.scene.height - y)];
+    return width > 0 && height > 0 ? [x, y, width, height] : null;
   }
 
   /** Draw once before the next frame, however often it is asked for. */
@@ -79,9 +105,13 @@ class Viewer {
 
   paint() {
     if (!this.painter || !this.canvas.clientWidth) return;
-    const extra = { swapped: this.swapped, regions: this.scene.regions, title: mapOf(this.page, this.view.map).title };
-    this.drawing.draw(this.view, this.viewport, this.painter, extra);
-    this.canvas.style.touchAction = this.view.zoom === null ? "pan-y" : "none";
+    const { swapped, scene } = this;
+    const map = { ...mapOf(this.page, this.view.map), end: this.top(), measure: this.measure().name };
+    const gain = gainOf(scene, this.view);
+    this.drawing.draw(this.view, this.viewport, this.painter, { swapped, regions: scene.regions, box: this.box(), map, gain });
+    this.canvas.style.touchAction = this.view.zoom === null && !this.selecting ? "pan-y" : "none";
+    this.controls.disable();
+    this.distribution.show();
     this.canvas.setAttribute("aria-label", this.description());
     this.inspectPixel();
   }
@@ -101,7 +131,7 @@ class Viewer {
   inspectPixel() {
     const pixel = this.hovered ?? this.view.pixel;
     const known = this.painter && pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height ? pixel : null;
-    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, known) : null);
+    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, known, this.view) : null);
     this.tell("pick", { scene: this.scene.id, pixel: known, marked: Boolean(known && !this.hovered) });
   }
 
@@ -125,10 +155,25 @@ class Viewer {
     if (this.painter) this.inspectPixel();
   }
 
-  /** Mark a pixel; swap the halves where they flicker. @param {number[]} place */
+  /** Select the rectangle between two places of the canvas. @param {number[]} from @param {number[]} to */
+  select(from, to) {
+    const ends = [from, to].map(([left, top]) => this.viewport.nearestPixel(this.view, left, top));
+    this.change({ box: boxBetween(ends[0], ends[1]) }, true);
+  }
+
+  /** Mark a pixel; swap the halves where they flicker. Where rectangles are selected, select none. @param {number[]} place */
   tap(place) {
+    if (this.selecting) return this.change({ box: null });
     if (this.view.mode === "flicker") this.swap();
     this.change({ pixel: this.viewport.pixelAt(this.view, place[0], place[1]) });
+  }
+
+  /** Whether a drag, or the arrows, select a rectangle. @param {boolean} selecting */
+  selectBy(selecting) {
+    this.selecting = selecting;
+    this.element.classList.toggle("selecting", selecting);
+    this.controls.show();
+    this.redraw();
   }
 
   swap() {
@@ -167,26 +212,19 @@ class Viewer {
     this.change({ pixel, ...this.following(pixel) });
   }
 
+  /** Move the far corner of the selection, which begins at the marked pixel. @param {number} right @param {number} down */
+  stretch(right, down) {
+    const { width, height } = this.viewport;
+    const [x, y] = this.view.pixel ?? this.viewport.centre(this.view).map(Math.floor);
+    const [left, top, w, h] = this.box() ?? [x, y, 1, 1];
+    this.change({ box: [left, top, clamp(w + right, 1, width - left), clamp(h + down, 1, height - top)] });
+  }
+
   /** @param {number[]} pixel */
   following([x, y]) {
     if (this.view.zoom === null) return {};
     const at = this.viewport.toScreen(this.view, this.viewport.panes[0], x + 0.5, y + 0.5);
     return this.viewport.sees(at) ? {} : { x: x + 0.5, y: y + 0.5 };
-  }
-
-  /** The controls tell the page what they are set to; `showControls` does the reverse. */
-  listenToControls() {
-    this.element.addEventListener("click", (event) => {
-      const button = /** @type {HTMLElement} */ (event.target).closest("button");
-      if (button?.dataset.mode) this.change({ mode: button.dataset.mode });
-      if (button?.dataset.action) this.act(button.dataset.action);
-    });
-    for (const control of this.element.querySelectorAll("[data-control]")) {
-      control.addEventListener("input", () => {
-        const { value, dataset } = /** @type {HTMLInputElement & {dataset: {control: string}}} */ (control);
-        this.change({ [dataset.control]: dataset.control === "ev" ? Number(value) : value });
-      });
-    }
   }
 
   /** What buttons and keys do. @param {string} action */
@@ -197,34 +235,13 @@ class Viewer {
       "zoom-out": () => this.zoomBy(0.5),
       fit: () => this.change({ zoom: null, x: null, y: null }),
       pixels: () => this.zoomBy(1 / this.viewport.zoom(this.view)),
+      best: () => this.change({ best: !this.view.best }),
+      select: () => this.selectBy(!this.selecting),
+      save: () => savePicture(this),
       boxes: () => this.change({ boxes: !this.view.boxes }),
-      "ev-reset": () => this.change({ ev: 0 }),
       swap: () => this.swap(),
       help: () => openHelp(),
     };
     actions[action]?.();
-  }
-
-  showControls() {
-    for (const button of this.element.querySelectorAll("button[data-mode]")) {
-      button.setAttribute("aria-pressed", String(/** @type {HTMLElement} */ (button).dataset.mode === this.view.mode));
-    }
-    this.element.querySelector("[data-action=boxes]")?.setAttribute("aria-pressed", String(this.view.boxes));
-    for (const control of this.element.querySelectorAll("[data-control]")) {
-      const field = /** @type {HTMLInputElement} */ (control);
-      field.value = String(this.view[/** @type {keyof View} */ (field.dataset.control)]);
-    }
-    const output = this.element.querySelector("output");
-    if (output) output.textContent = `${this.view.ev > 0 ? "+" : ""}${this.view.ev}`.replace("-", "−");
-  }
-
-  /** The colour bar of what is seen. */
-  showLegend() {
-    const seen = { error: [this.view.map], side: [this.view.map] }[this.view.mode] ?? [];
-    if (this.view.tone === "false" && this.view.mode !== "error") seen.push("false");
-    for (const legend of this.element.querySelectorAll("[data-legend]")) {
-      const element = /** @type {HTMLElement} */ (legend);
-      element.hidden = !seen.includes(element.dataset.legend ?? "");
-    }
   }
 }

@@ -3,6 +3,9 @@
 /** Narrower canvases show side by side as one above the other (CSS pixels). */
 const STACKED_BELOW = 620;
 
+/** Screen pixels for one of the image, at most. */
+const GREATEST_ZOOM = 64;
+
 /** The least height of a view, and the greatest as a part of the window's. */
 const LEAST_HEIGHT = 180, GREATEST_PART = 0.74;
 
@@ -43,7 +46,7 @@ class Viewport {
 
   /** @param {View} view */
   zoom(view) {
-    return view.zoom ?? this.fit;
+    return Math.max(view.zoom ?? this.fit, this.fit); // a link never shrinks the picture
   }
 
   /** The point of the image at the centre of each pane. @param {View} view */
@@ -63,6 +66,16 @@ class Viewport {
   sees([left, top]) {
     const pane = this.panes[0];
     return left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
+  }
+
+  /** What panes show of the image: left, top, width and height in whole pixels. @param {View} view */
+  seen(view) {
+    const centre = this.centre(view);
+    const zoom = this.zoom(view);
+    const halves = [this.panes[0].width / 2 / zoom, this.panes[0].height / 2 / zoom];
+    const [x, y] = centre.map((at, axis) => Math.max(Math.floor(at - halves[axis]), 0));
+    const [right, bottom] = centre.map((at, axis) => Math.ceil(at + halves[axis]));
+    return [x, y, Math.min(right, this.width) - x, Math.min(bottom, this.height) - y];
   }
 
   /** From the canvas to the image. @param {View} view @param {number} left @param {number} top */
@@ -85,6 +98,12 @@ class Viewport {
     return x >= 0 && y >= 0 && x < this.width && y < this.height ? [x, y] : null;
   }
 
+  /** The pixel under a place of the canvas, or the nearest of the image. @param {View} view @param {number} left @param {number} top */
+  nearestPixel(view, left, top) {
+    const [x, y] = this.toImage(view, left, top).map(Math.floor);
+    return [clamp(x, 0, this.width - 1), clamp(y, 0, this.height - 1)];
+  }
+
   /**
    * Zoom by a factor, keeping the image's point under a place of the canvas where it is.
    * @param {View} view
@@ -95,7 +114,7 @@ class Viewport {
     const [x, y] = this.toImage(view, left, top);
     const [cx, cy] = this.centre(view);
     const before = this.zoom(view);
-    const zoom = clamp(before * factor, this.fit, 64);
+    const zoom = clamp(before * factor, this.fit, Math.max(GREATEST_ZOOM, this.fit));
     if (zoom <= this.fit) return { zoom: null, x: null, y: null };
     const kept = before / zoom;
     return { zoom, ...this.within(x + (cx - x) * kept, y + (cy - y) * kept) };

@@ -1,0 +1,20 @@
+// The picture as it is seen, as a PNG file that says in its name what it shows.
+
+/** @param {Viewer} viewer */
+function savePicture({ canvas, view, viewport, scene }) {
+  canvas.toBlob((blob) => {
+    if (!blob) return;
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: `${pictureName(view, viewport, scene)}.png` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  });
+}
+
+/** Scene, mode, map where one is seen, and region: the selection, else what is seen of a zoomed image. @param {View} view @param {Viewport} viewport @param {any} scene */
+function pictureName(view, viewport, scene) {
+  const parts = [scene.id, view.mode];
+  if (view.mode === "side" || view.mode === "error") parts.push(view.map);
+  const box = view.box ?? (view.zoom === null ? null : viewport.seen(view));
+  if (box) parts.push(`${box[0]},${box[1]}+${box[2]}x${box[3]}`);
+  return parts.join("-");
+}

@@ -1,0 +1,55 @@
+"""What the viewer needs besides a scene's images: how maps are drawn, and where regions are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from comparisons.departure.colorimetry import BT709, rgb_to_xyz
+from comparisons.departure.metrics import LOG2_EPSILON
+from comparisons.departure.regions import Region
+from comparisons.departure.statistics import Summary
+from reports.charts import theme
+from reports.files import images
+from reports.page.legends import legends
+
+#: A region that is opened from its link gets about so many screen pixels.
+REGION_SIZE = 420
+
+
+def drawing() -> dict[str, Any]:
+    """Maps, their colours, and the matrix from linear RGB to XYZ, as the script calls them."""
+    keys = ("name", "title", "kind", "top")
+    maps = [{key: getattr(item, key) for key in keys} for item in legends()]
+    effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}
+    return {
+        "maps": [*maps, effects],
+        "noEffect": theme.NO_EFFECT,
+        "colours": {
+            "error": images.colour_table(images.ERROR_COLOURS),
+            "signed": images.colour_table(images.SIGNED_COLOURS),
+            "value": images.colour_table(images.VALUE_COLOURS),
+        },
+        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED, images.UNDETERMINED],
+        "xyz": rgb_to_xyz(BT709).tolist(),
+        "epsilon": LOG2_EPSILON,
+    }
+
+
+def best_exposures(metrics: dict[str, Summary]) -> dict[str, dict[str, float]]:
+    """By metric: the factor on the textbook's image that lowers the mean most, and both means."""
+    return {
+        name: {
+            "factor": found.after_exposure.exposure,
+            "mean": found.mean,
+            "after": found.after_exposure.mean,
+        }
+        for name, found in metrics.items()
+    }
+
+
+def region_view(region: Region) -> str:
+    """The part of the address that shows and selects a region."""
+    zoom = round(min(16.0, REGION_SIZE / max(region.width, region.height)), 2)
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    box = f"{region.x},{region.y},{region.width},{region.height}"
+    return f"mode=error&zoom={zoom}&x={x}&y={y}&box={box}"
