@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.cost.front import cheapest
 from comparisons.departure.metrics import LEADING
 from reports.charts.theme import EFFECT_COLOURS
 from reports.terminal.printing import seconds
@@ -113,9 +114,8 @@ def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
 
 
 def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
-    reached = [r for r in cost.equal_error if r.error == tolerance and r.seconds is not None]
-    best = min(reached, key=lambda row: row.seconds, default=None)
-    return best and Remedy(best.method, best.seconds)
+    best = cheapest(cost.points, tolerance)
+    return best and Remedy(best.rung, best.seconds.median)
 
 
 def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:

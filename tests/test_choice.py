@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from comparisons.cost import choice
-from comparisons.cost.choice import Choice, Offer, cheapest, choose
+from comparisons.cost.choice import Choice, Offer, choose
+from comparisons.cost.front import cheapest
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError

@@ -9,9 +9,11 @@ import pytest
 from comparisons.case import Request, open_case
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Forecast, Range
-from comparisons.cost.curves import LEVEL, ErrorCurve, TimeCurve, across_sizes
 from comparisons.cost.effort import Effort
-from comparisons.cost.prediction import cheapest, require_shape, sizes
+from comparisons.cost.prediction.error_curve import ErrorCurve, across_sizes
+from comparisons.cost.prediction.forecasting import cheapest
+from comparisons.cost.prediction.target import require, sizes
+from comparisons.cost.prediction.time_curve import LEVEL, TimeCurve
 from comparisons.records import to_json
 from heuristic.errors import InputError
 from reports.terminal import cost_tables
@@ -91,9 +93,19 @@ def test_fitted_sizes_have_the_shape_asked_for():
 
 
 def test_a_size_of_another_shape_is_rejected():
-    require_shape((128, 72), (1920, 1080))
+    require("room", (1920, 1080), (128, 72), False)
     with pytest.raises(InputError, match="128x128 and 1920x1080 are not of one shape"):
-        require_shape((128, 128), (1920, 1080))
+        require("room", (1920, 1080), (128, 128), False)
+
+
+def test_a_size_that_cannot_be_is_refused_before_anything_is_rendered():
+    case = open_case("fig-8-9", Request())
+    told = []
+    for at, words in (((12, 12), "too small"), ((4096, 3072), "too large to be measured")):
+        with pytest.raises(InputError, match=words):
+            cost(case.source, case.options, progress=lambda *all: told.append(all), at=at,
+                 is_measured=True)  # fmt: skip
+    assert not told
 
 
 def forecast(method, spp, seconds, error):

@@ -7,10 +7,11 @@ from msgspec import structs
 
 from comparisons import record
 from comparisons.cost.climbing import climb
-from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Point, Rung, Split
+from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Rung, Split
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
-from comparisons.cost.prediction import predict
+from comparisons.cost.prediction.forecasting import predict
+from comparisons.cost.prediction.target import require
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -87,12 +88,16 @@ def cost(
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface.
+        When the scene cannot be read or paired, or no pixel of it sees a surface; for a size ``at``
+        that is too small, of another shape than ``options.resolution``, or too large.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
     progress = progress or (lambda *_: None)
-    found = climb(source, options or Options(), effort or Effort(), progress, at=at)
+    options = options or Options()
+    if at:
+        require(source.name, at, options.resolution, is_measured)
+    found = climb(source, options, effort or Effort(), progress, at=at)
     options, effort, ready, judge = found.options, found.effort, found.ready, found.judge
     methods, reference, counted = found.methods, found.reference, ready.counted
     width, height = image_size(ready.scene)
@@ -159,13 +164,10 @@ def quick(source, options=None, progress=None, command=""):
 
 def _compared(measured):
     """Return the points, with the front marked, and what they reach within times and errors."""
-    points = [Point(m.rung, m.spp, m.seconds.median, m.error) for m in measured]
-    front = pareto(points)
+    front = pareto(measured)
+    points = tuple(structs.replace(point, pareto=point in front) for point in measured)
     return {
-        "points": tuple(
-            structs.replace(one, pareto=point in front)
-            for one, point in zip(measured, points, strict=True)
-        ),
+        "points": points,
         "equal_time": equal_time(points),
         "equal_error": equal_error(points),
     }

@@ -105,32 +105,32 @@ class Measured(Record):
     prepare_s: Amount = 0.0
 
 
-class Point(Record):
-    """A method at one sample count: median time in seconds, and mean ΔE2000."""
-
-    method: str
-    spp: int
-    seconds: Positive
-    error: Amount
-
-
 class Within(Record):
     """The best point within a time, None where none is as fast."""
 
     seconds: Positive
-    best: Point | None
+    best: Measured | None
+
+
+class Range(Record):
+    """A value that was not measured itself, and the ends of its interval."""
+
+    value: Amount
+    low: Amount
+    high: Amount
 
 
 class Reached(Record):
     """When a method reaches an error.
 
     ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
-    ``at_most``, where the fewest samples measured reach it already.
+    ``at_most``, where the fewest samples measured reach it already. Its interval, of about 95 %,
+    holds what times and errors vary by, and ends with the measured counts.
     """
 
     method: str
     error: Positive
-    seconds: float | None
+    seconds: Range | None
     at_most: bool = False
 
 
@@ -196,14 +196,6 @@ class Prices(Record):
     spp: int
     replicates: int
     orders: int
-
-
-class Range(Record):
-    """A predicted value, and the ends of its interval."""
-
-    value: Amount
-    low: Amount
-    high: Amount
 
 
 class Seen(Record):

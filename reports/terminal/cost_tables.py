@@ -110,11 +110,18 @@ def _first(point):
 
 
 def _equal_time(record):
-    yield "within", "method", "samples", "mean ΔE2000", "takes"
+    yield "within", "method", "samples", "mean ΔE2000", "takes", "interval"
     for row in record.equal_time:
         best = row.best
-        shown = best and (best.method, f"{best.spp}", f"{best.error:.3f}", _time(best.seconds))
-        yield _time(row.seconds), *(shown or ("none is as fast", "", "", ""))
+        yield (
+            _time(row.seconds),
+            *(_point(best) if best else ("none is as fast", "", "", "", "")),
+        )
+
+
+def _point(point):
+    error = f"{point.error:.3f} ± {point.error_stderr:.3f}"
+    return point.rung, f"{point.spp}", error, *_timed(point.seconds.median, point.seconds)
 
 
 def _equal_error(record):
@@ -127,7 +134,8 @@ def _equal_error(record):
 def _reached(row):
     if row.seconds is None:
         return "not reached"
-    return f"{'at most ' if row.at_most else ''}{_time(row.seconds)}"
+    time, interval = _timed(row.seconds.value, row.seconds)
+    return f"{'at most ' if row.at_most else ''}{time} ({interval})"
 
 
 def _prices(record):

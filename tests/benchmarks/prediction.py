@@ -15,7 +15,8 @@ from comparisons.case import Request, open_case  # isort: skip  it finds LLVM fi
 from comparisons.compare import guarded
 from comparisons.cost.effort import Effort
 from comparisons.cost.methods import Methods
-from comparisons.cost.prediction import predict, sizes
+from comparisons.cost.prediction.forecasting import predict
+from comparisons.cost.prediction.target import sizes
 
 SCENES = (
     "fig-8-7b",

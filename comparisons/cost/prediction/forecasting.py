@@ -1,14 +1,15 @@
 """What methods cost at a size that is too large to try them all: predicted from smaller ones.
 
-Each method is rendered at three smaller sizes of the same shape, in turns, and its curves
-(:mod:`comparisons.cost.curves`) are fitted. Where asked to, it is rendered at the size itself, too,
-in the same turns, with counts that were not fitted.
+Each method is rendered at three smaller sizes of the same shape, in turns, and curves are fitted to
+its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). Where asked to, it is rendered at
+the size itself, too, in the same turns, with counts that were not fitted.
 """
 
 from collections import defaultdict
 from collections.abc import Sequence
-from itertools import pairwise
-from math import exp, log, sqrt
+from itertools import groupby
+from math import log, sqrt
+from operator import attrgetter
 from statistics import NormalDist, median
 
 import numpy as np
@@ -21,62 +22,24 @@ from comparisons.cost.cost_record import (
     Seen,
     TimeLaw,
 )
-from comparisons.cost.curves import LEAST_DOUBT, LEVEL, ErrorCurve, TimeCurve, across_sizes
 from comparisons.cost.effort import DETERMINISTIC_SPP, Effort
-from comparisons.cost.front import ERRORS
+from comparisons.cost.front import ERRORS, reached
+from comparisons.cost.judging import Judge, converged
 from comparisons.cost.ladder import Distinct
 from comparisons.cost.methods import Methods
-from comparisons.cost.timing import Judge, interval
-from heuristic.errors import InputError
-from reference.rendering import memory
+from comparisons.cost.prediction.error_curve import LEAST_DOUBT, ErrorCurve, across_sizes
+from comparisons.cost.prediction.target import SEEN_SPP, Size, sizes
+from comparisons.cost.prediction.time_curve import LEVEL, TimeCurve
+from comparisons.cost.timing import interval
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.passes import Progress, Stream, passes
-from reference.rendering.renderer import LARGEST_PASS, Renderer
-from reference.rendering.sums import Accumulator, Estimate
+from reference.rendering.passes import Progress, passes
 
-LARGEST_FITTED = 256**2
-"""Pixels of the largest size that is fitted, where the asked one is at least four times that."""
-
-FITTED_SPP = {0: (4, 16, 64), 1: (4, 8, 16, 64), 2: (4, 16)}
+FITTED_SPP = (4, 16, 64), (4, 8, 16, 64), (4, 16)
 """Counts at each size, from the smallest; errors are drawn from the images of the middle one."""
-
-SEEN_SPP = (6, 32)
-"""Counts that are measured at the asked size: none of them is fitted."""
 
 FORECAST_SPP = tuple(2**power for power in range(13))
 
-Size = tuple[int, int]
 Key = tuple[str, Size, int]
-
-
-def sizes(target: Size) -> tuple[Size, Size, Size]:
-    """Return the sizes that are fitted for another one: smaller ones of its shape.
-
-    Raises
-    ------
-    InputError
-        Where the asked size is too small for that.
-    """
-    area = target[0] * target[1]
-    largest = min(LARGEST_FITTED, area / 4)
-    scales = [sqrt(largest / area) * factor for factor in (1 / 4, 1 / 2, 1)]
-    found = tuple((round(target[0] * s), round(target[1] * s)) for s in scales)
-    if min(found[0]) < 4:
-        raise InputError(
-            f"{target[0]}x{target[1]} is too small to predict anything for: measure it itself with"
-            " --resolution."
-        )
-    return found
-
-
-def require_shape(measured: Size, target: Size) -> None:
-    """Raise InputError where two sizes are not of one shape, to half a pixel of the smaller."""
-    (width, height), (wide, high) = sorted([measured, target])
-    if abs(high * width / wide - height) > 1:
-        raise InputError(
-            f"{measured[0]}x{measured[1]} and {target[0]}x{target[1]} are not of one shape: give"
-            " --resolution the shape of --at, or leave it out."
-        )
 
 
 def predict(
@@ -107,11 +70,9 @@ def predict(
     Raises
     ------
     InputError
-        For a size that is too small, or too large for the memory or one pass.
+        For a size that is too small.
     """
     fitted = sizes(target)
-    if is_measured:
-        _require_room(methods.ready.pair.name, target)
     everywhere = (*fitted, target) if is_measured else fitted
     judges = {size: _judge(methods, size, effort, seed, progress) for size in everywhere}
     renderers = _renderers(methods, fitted, target if is_measured else None)
@@ -153,90 +114,45 @@ def predict(
 
 def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
     """Return the method that reaches an error in the least time, as far as is predicted."""
-    ways = [_reached(forecasts, method, error) for method in _methods_of(forecasts)]
-    found = [way for way in ways if way is not None]
-    if not found:
+    ways = [
+        _way(list(own), error)
+        for _, own in groupby(forecasts, key=lambda forecast: forecast.method)
+    ]
+    found = [way for way in ways if way.seconds]
+    return min(found, key=lambda way: way.seconds.value, default=Cheapest(error))
+
+
+def _way(own, error):
+    """Return how a method reaches an error."""
+    place = reached([forecast.error.value for forecast in own], error)
+    if place is None:
         return Cheapest(error)
-    method, spp, seconds = min(found, key=lambda way: way[2].value)
-    return Cheapest(error, method, spp, seconds)
-
-
-def _methods_of(forecasts):
-    return list(dict.fromkeys(forecast.method for forecast in forecasts))
-
-
-def _reached(forecasts, method, error):
-    """Return the method, the samples and the seconds by which it reaches an error, or None."""
-    own = [forecast for forecast in forecasts if forecast.method == method]
-    if own[0].error.value <= error:
-        return method, own[0].spp, own[0].seconds
-    for before, after in pairwise(own):
-        if after.error.value <= error < before.error.value:
-            if after.error.value == 0:
-                return method, after.spp, after.seconds
-            share = log(before.error.value / error) / log(before.error.value / after.error.value)
-            return (
-                method,
-                round(_mixed(before.spp, after.spp, share)),
-                Range(
-                    *(
-                        _mixed(getattr(before.seconds, end), getattr(after.seconds, end), share)
-                        for end in ("value", "low", "high")
-                    )
-                ),
-            )
-    return None
-
-
-def _mixed(before, after, share):
-    return exp(log(before) * (1 - share) + log(after) * share)
-
-
-def _require_room(name, target):
-    width, height = target
-    most = LARGEST_PASS // max(*SEEN_SPP, DETERMINISTIC_SPP)
-    if width * height > most:
-        raise InputError(
-            f"{width}x{height} is too large to be measured: {most} pixels are allowed. Leave out"
-            " --measure to have it predicted."
-        )
-    memory.require(name, width, height)
+    spp = round(place.of([forecast.spp for forecast in own]))
+    ends = ([getattr(f.seconds, end) for f in own] for end in ("value", "low", "high"))
+    return Cheapest(error, own[0].method, spp, Range(*map(place.of, ends)))
 
 
 def _forecast_counts(rung: Distinct, is_measured: bool) -> Sequence[int]:
-    """Return the counts of a method; one without random numbers has one, and those measured."""
+    """Return the counts of a method; one without random numbers has few, and those measured."""
     seen = SEEN_SPP if is_measured else ()
-    return sorted({*(FORECAST_SPP if rung.monte_carlo else (DETERMINISTIC_SPP,)), *seen})
+    return sorted({*(FORECAST_SPP if rung.monte_carlo else DETERMINISTIC_SPP), *seen})
 
 
 def _renderers(methods, fitted, seen):
     """Return a renderer for each method, size and count; scenes are shared, and resized."""
-    wanted = [(size, FITTED_SPP[place]) for place, size in enumerate(fitted)]
-    if seen:
-        wanted.append((seen, SEEN_SPP))
-    return {
-        (rung.name, size, spp): methods.renderer(rung.method, spp, size)
-        for rung in methods.rungs
-        for size, spps in wanted
-        for spp in spps
-    }
+    wanted = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
+    made = {}
+    for rung in methods.rungs:
+        for size, (first, *others) in wanted:  # what a kernel prepares may have the film's size
+            own = made[rung.name, size, first] = methods.renderer(rung.method, first, size)
+            made |= {(rung.name, size, spp): own.sampled(spp) for spp in others}
+    return made
 
 
 def _judge(methods, size, effort, seed, progress):
     """Return what tells errors at a size: a converged reference of it."""
-    ready = methods.ready
-    counted = gbuffer(ready.scene, *size).hit
-    reference = Renderer(
-        ready.scene, ready.reference.integrator, effort.reference_spp, "reference image", size
-    )
-    total = Accumulator()
-    count, stream = max(ready.plan.passes, 2), Stream.OTHER_SIDE
-    for one in passes(
-        [reference], seed, count, stream=stream, progress=progress, stage="reference"
-    ):
-        total.add(one.images[0])
-    estimate: Estimate = total.estimate()
-    return Judge(estimate, counted, methods.viewing)
+    reference, _ = converged(methods.ready, effort, seed, progress, size)
+    return Judge(reference, gbuffer(methods.ready.scene, *size).hit, methods.viewing)
 
 
 def _measure(renderers, judges, kept_size, rounds, seed, progress):
@@ -265,7 +181,7 @@ def _growth(name, fitted, target, errors):
         error, doubt = across_sizes([size[0] for size in fitted[1:]], means, stderrs, target[0])
         if means[0] > 0 and error > 0:
             found[spp] = error / means[0], doubt / error
-    return found or {DETERMINISTIC_SPP: (1.0, 0.0)}
+    return found or {1: (1.0, 0.0)}
 
 
 def _error(curve, growth, spp, is_random):
