@@ -114,11 +114,8 @@ def predict(
 
 def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
     """Return the method that reaches an error in the least time, as far as is predicted."""
-    ways = [
-        _way(list(own), error)
-        for _, own in groupby(forecasts, key=lambda forecast: forecast.method)
-    ]
-    found = [way for way in ways if way.seconds]
+    by_method = groupby(forecasts, key=attrgetter("method"))
+    found = [way for way in (_way(list(own), error) for _, own in by_method) if way.seconds]
     return min(found, key=lambda way: way.seconds.value, default=Cheapest(error))
 
 
