@@ -1,4 +1,4 @@
-"""Mean distance of a method to the reference, as a curve over its samples and over sizes.
+"""Mean distance of a method to the reference, as a curve over its samples.
 
 A rendering is ``x = m + e``, with the method's own mean ``m``, wrong by its bias, and noise
 ``e``. Both are measured; the mean distance at ``s`` samples is that of ``m + λ e_r`` over the
@@ -7,20 +7,15 @@ a few bright pixels do not rule. So noise keeps its skew, and the distance its c
 power of ``s`` between measured squares and beyond them; other counts stratify worse, by a factor
 that one of them shows. Where ``m`` holds more noise than ``s`` samples do, ``E² = b² + c σ²(s)``
 continues from the last counts before.
-
-Between sizes the error follows a straight line in ``1 / width``: edges make it depend on the size,
-and so does their share of the pixels.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from math import isqrt, log, sqrt
+from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
-
-LEAST_DOUBT = 0.04
-"""Relative, of the error of a method that is random: what these curves do not know of noise."""
 
 FALLS = (-1.0, -0.25)
 """Powers of the samples by which noise may fall beyond the measured counts; plain Monte Carlo
@@ -72,27 +67,36 @@ class ErrorCurve:
         worse = 1.0 if _is_square(spp) or not others else float(np.mean(others))
         return worse * _power_law(squares, spp)
 
-    def at(self, spp: int) -> tuple[float, float]:
-        """Return the mean distance at a number of samples, and its standard error."""
+    @property
+    def bias(self) -> float:
+        """The distance of the mean image, which no number of samples removes."""
+        return self.distance(self.mean)
+
+    def without(self, spp: int) -> "ErrorCurve":
+        """Return the curve as it is without one of the measured counts, not the largest."""
+        left = {s: residuals for s, residuals in self.residuals.items() if s != spp}
+        return replace(self, residuals=left)
+
+    def at(self, spp: float) -> float:
+        """Return the mean distance at a number of samples."""
         last = spp
         while self.noise(last) < self.noise_of_mean and last > 1:
             last //= 4
         if last == spp:
             return self._drawn(spp)
-        (before, _), (error, stderr) = self._drawn(max(last // 4, 1)), self._drawn(last)
+        before, error = self._drawn(max(last // 4, 1)), self._drawn(last)
         fallen = self.noise(max(last // 4, 1)) ** 2 - self.noise(last) ** 2
         slope = (before**2 - error**2) / fallen if fallen > 0 else 0.0
         left = error**2 + max(slope, 0.0) * (self.noise(spp) ** 2 - self.noise(last) ** 2)
-        return sqrt(max(left, 0.0)), stderr
+        return sqrt(max(left, 0.0))
 
-    def _drawn(self, spp: int) -> tuple[float, float]:
+    def _drawn(self, spp: float) -> float:
         nearest = min(self.residuals, key=lambda count: abs(log(count / spp)))
         residuals = self.residuals[nearest]
         own = _size(residuals)
         missing = max(self.noise(spp) ** 2 - self.noise_of_mean**2, 0.0)
         factor = sqrt(missing) / own if own > 0 else 0.0
-        found = [self.distance(self.mean + factor * residual) for residual in residuals]
-        return float(np.mean(found)), float(np.std(found, ddof=1) / sqrt(len(found)))
+        return fmean(self.distance(self.mean + factor * residual) for residual in residuals)
 
 
 def _size(residuals: NDArray) -> float:
@@ -116,19 +120,3 @@ def _power_law(known: dict[int, float], place: float) -> float:
         power = min(max(power, FALLS[0]), FALLS[1])
     anchor = low if place < low else high
     return known[anchor] * (place / anchor) ** power
-
-
-def across_sizes(
-    widths: Sequence[float], errors: Sequence[float], stderrs: Sequence[float], width: float
-) -> tuple[float, float]:
-    """Extrapolate errors along a straight line in ``1 / width``; return error and its doubt.
-
-    The doubt holds the noise of what is measured, and half of what the line adds to the last.
-    """
-    if len(widths) == 1:
-        return errors[0], stderrs[0]
-    (first, last), (before, after) = (1 / np.asarray(widths[-2:], float)), errors[-2:]
-    reach = (1 / width - last) / (first - last)
-    moved = (before - after) * reach
-    noise = np.hypot(stderrs[-1] * (1 - reach), stderrs[-2] * reach)
-    return max(after + moved, 0.0), float(np.hypot(noise, moved / 2))

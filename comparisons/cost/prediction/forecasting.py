@@ -8,9 +8,8 @@ the size itself, too, in the same turns, with counts that were not fitted.
 from collections import defaultdict
 from collections.abc import Sequence
 from itertools import groupby
-from math import log, sqrt
 from operator import attrgetter
-from statistics import NormalDist, median
+from statistics import median
 
 import numpy as np
 
@@ -27,9 +26,10 @@ from comparisons.cost.front import ERRORS, reached
 from comparisons.cost.judging import Judge, converged
 from comparisons.cost.ladder import Distinct
 from comparisons.cost.methods import Methods
-from comparisons.cost.prediction.error_curve import LEAST_DOUBT, ErrorCurve, across_sizes
+from comparisons.cost.prediction.error_curve import ErrorCurve
+from comparisons.cost.prediction.error_law import LEVEL, ErrorLaw, intervals
 from comparisons.cost.prediction.target import SEEN_SPP, Size, sizes
-from comparisons.cost.prediction.time_curve import LEVEL, TimeCurve
+from comparisons.cost.prediction.time_curve import TimeCurve
 from comparisons.cost.timing import interval
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import Progress, passes
@@ -77,36 +77,32 @@ def predict(
     judges = {size: _judge(methods, size, effort, seed, progress) for size in everywhere}
     renderers = _renderers(methods, fitted, target if is_measured else None)
     seconds, errors, images = _measure(renderers, judges, fitted[1], effort.rounds, seed, progress)
-    laws, forecasts = [], []
-    for rung in methods.rungs:
-        keys = [key for key in renderers if key[0] == rung.name and key[1] in fitted]
-        law = TimeCurve.fit(
-            [size[0] * size[1] for _, size, _ in keys],
-            [spp for *_, spp in keys],
-            [median(seconds[key]) for key in keys],
+    times = {rung.name: _time_curve(rung.name, seconds, target) for rung in methods.rungs}
+    laws = {
+        rung.name: _error_law(rung.name, fitted, errors, images, judges[fitted[1]])
+        for rung in methods.rungs
+    }
+    scatter = {name: curve.scatter([*times.values()]) for name, curve in times.items()}
+    error = intervals([*laws.values()], target[0])
+    forecasts = [
+        Forecast(
+            method=rung.name,
+            spp=spp,
+            seconds=Range(*times[rung.name].at(target[0] * target[1], spp, scatter[rung.name])),
+            error=Range(*map(float, error(laws[rung.name], spp))),
+            measured=_seen((rung.name, target, spp), seconds, errors),
         )
-        laws.append(TimeLaw(rung.name, *law.coefficients, law.scatter))
-        kept = {key[2]: images[key] for key in keys if key[1] == fitted[1]}
-        curve = ErrorCurve.measured(kept, judges[fitted[1]].distance)
-        growth = _growth(rung.name, fitted, target, errors)
-        for spp in _forecast_counts(rung, is_measured):
-            key = rung.name, target, spp
-            seen = _seen(seconds[key], errors[key]) if key in renderers else None
-            forecasts.append(
-                Forecast(
-                    method=rung.name,
-                    spp=spp,
-                    seconds=Range(*law.at(target[0] * target[1], spp)),
-                    error=_error(curve, growth, spp, rung.monte_carlo),
-                    measured=seen,
-                )
-            )
+        for rung in methods.rungs
+        for spp in _forecast_counts(rung, is_measured)
+    ]
     return Prediction(
         resolution=target,
         level=LEVEL,
         fitted=fitted,
         rounds=effort.rounds,
-        laws=tuple(laws),
+        laws=tuple(
+            TimeLaw(name, *curve.coefficients, scatter[name]) for name, curve in times.items()
+        ),
         forecasts=tuple(forecasts),
         cheapest=tuple(cheapest(forecasts, error) for error in ERRORS),
     )
@@ -168,29 +164,31 @@ def _measure(renderers, judges, kept_size, rounds, seed, progress):
     return seconds, errors, {key: np.stack(found) for key, found in images.items()}
 
 
-def _growth(name, fitted, target, errors):
-    """Return ``{count: (factor, relative doubt)}``: from the middle size's error to the asked."""
-    found = {}
-    for spp in FITTED_SPP[2]:
-        own = [errors[name, size, spp] for size in fitted[1:]]
-        means = [float(np.mean(each)) for each in own]
-        stderrs = [float(np.std(each, ddof=1) / sqrt(len(each))) for each in own]
-        error, doubt = across_sizes([size[0] for size in fitted[1:]], means, stderrs, target[0])
-        if means[0] > 0 and error > 0:
-            found[spp] = error / means[0], doubt / error
-    return found or {1: (1.0, 0.0)}
+def _time_curve(name, seconds, target):
+    """Fit the times of a method, but those at the asked size."""
+    keys = [key for key in seconds if key[0] == name and key[1] != target]
+    return TimeCurve.fit(
+        [width * height for _, (width, height), _ in keys],
+        [spp for *_, spp in keys],
+        [median(seconds[key]) for key in keys],
+    )
 
 
-def _error(curve, growth, spp, is_random):
-    """Return the error at the asked size, and its interval."""
-    value, stderr = curve.at(spp)
-    factor, doubt = growth[min(growth, key=lambda count: abs(log(count / spp)))]
-    value *= factor
-    doubt = np.hypot(doubt, LEAST_DOUBT if is_random else 0.0)
-    spread = float(np.hypot(factor * stderr, doubt * value))
-    reach = NormalDist().inv_cdf((1 + LEVEL) / 2) * spread
-    return Range(value, max(value - reach, 0.0), value + reach)
+def _error_law(name, fitted, errors, images, judge):
+    """Return the law of a method's errors, with its images at the middle size."""
+    own = {
+        (size[0], spp): found
+        for (method, size, spp), found in errors.items()
+        if method == name and size in fitted
+    }
+    kept = {spp: images[name, size, spp] for method, size, spp in images if method == name}
+    widths = tuple(width for width, _ in fitted)
+    return ErrorLaw(widths, own, ErrorCurve.measured(kept, judge.distance))
 
 
-def _seen(seconds, errors):
-    return Seen(interval(seconds), float(np.mean(errors)), float(np.std(errors, ddof=1)))
+def _seen(key, seconds, errors):
+    """Return what was measured at the asked size, None where nothing was."""
+    if key not in seconds:
+        return None
+    found = errors[key]
+    return Seen(interval(seconds[key]), float(np.mean(found)), float(np.std(found, ddof=1)))

@@ -5,9 +5,12 @@ On later frames (the first one traces and compiles besides)::
     T(N, s) = t_0 + t_N N + t_s N s,    t_0, t_N, t_s >= 0
 
 fitted in logarithms, so that each measurement counts by its relative error. Its interval is that of
-Student's t for one more measurement, from what the measurements depart from the fit.
+Student's t for one more measurement. How far measurements scatter about the law, each of them tells
+by what a fit without it would miss: over all methods of a run together, since the machine is theirs
+in turns, and of each method more by its own.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, sqrt
 
@@ -16,14 +19,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from scipy.optimize import least_squares
 
-LEVEL = 0.9
-"""Chance of an interval to hold what is measured later."""
+from comparisons.cost.prediction.error_law import LEVEL
 
 Range = tuple[float, float, float]
 """A value, and the ends of its interval."""
 
-LEAST_SCATTER = 0.05
-"""Relative: a measurement that is repeated later moves by so much on a quiet machine."""
+SHARED = 6
+"""Measurements that those of all methods count as, for one method beside its own."""
+
+LEAST_SCATTER = 0.01
+"""Relative: no clock and no machine are better."""
 
 
 @dataclass(frozen=True)
@@ -36,16 +41,14 @@ class TimeCurve:
         ``(t_0, t_N, t_s)``.
     covariance
         (3, 3): of their logarithms, over the square of the scatter.
-    scatter
-        Standard deviation of ``log T``.
-    freedom
-        Degrees of freedom that it is known by.
+    missed
+        (n,): what a fit without each measurement misses of it in ``log T``, over what that varies
+        by for a scatter of 1.
     """
 
     coefficients: tuple[float, float, float]
     covariance: NDArray[np.float64]
-    scatter: float
-    freedom: int
+    missed: NDArray[np.float64]
 
     @classmethod
     def fit(cls, pixels: ArrayLike, spp: ArrayLike, seconds: ArrayLike) -> "TimeCurve":
@@ -57,19 +60,26 @@ class TimeCurve:
         found = least_squares(
             lambda logs: np.log(terms @ np.exp(logs)) - measured, start, x_scale=1.0
         )
-        freedom = max(len(measured) - 3, 1)
-        scatter = max(sqrt(2 * found.cost / freedom), LEAST_SCATTER)
         # A coefficient that came out as nothing has no slope, and the pseudoinverse no say in it.
         covariance = np.linalg.pinv(found.jac.T @ found.jac, rcond=1e-6)
-        return cls(tuple(np.exp(found.x).tolist()), covariance, scatter, freedom)
+        leverage = np.einsum("ni,ij,nj->n", found.jac, covariance, found.jac)
+        missed = found.fun / np.sqrt(np.maximum(1 - leverage, 1 / len(measured)))
+        return cls(tuple(np.exp(found.x).tolist()), covariance, missed)
 
-    def at(self, pixels: float, spp: float) -> Range:
+    def scatter(self, curves: Sequence["TimeCurve"]) -> float:
+        """Return the standard deviation of ``log T``, beside the curves of all methods."""
+        shared = np.mean(np.concatenate([curve.missed for curve in curves]) ** 2)
+        whole = np.sum(self.missed**2) + SHARED * shared
+        return max(sqrt(whole / (len(self.missed) + SHARED)), LEAST_SCATTER)
+
+    def at(self, pixels: float, spp: float, scatter: float) -> Range:
         """Return seconds, and the ends of their interval at :data:`LEVEL`."""
         parts = _terms([pixels], [spp])[0] * self.coefficients
         value = float(parts.sum())
         slope = parts / value
-        spread = self.scatter * sqrt(1 + float(slope @ self.covariance @ slope))
-        reach = exp(stats.t.ppf((1 + LEVEL) / 2, self.freedom) * spread)
+        spread = scatter * sqrt(1 + float(slope @ self.covariance @ slope))
+        freedom = len(self.missed) - len(slope) + SHARED
+        reach = exp(stats.t.ppf((1 + LEVEL) / 2, freedom) * spread)
         return value, value / reach, value * reach
 
 
