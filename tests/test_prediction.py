@@ -9,8 +9,9 @@ import pytest
 
 from comparisons.case import Request, open_case
 from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Cost, Forecast, Range
+from comparisons.cost.cost_record import Cost, Forecast, Prices, Range
 from comparisons.cost.effort import Effort
+from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.error_curve import ErrorCurve
 from comparisons.cost.prediction.error_law import LEVEL, ErrorLaw, intervals
 from comparisons.cost.prediction.forecasting import cheapest
@@ -219,6 +220,7 @@ def test_a_study_predicts_every_method_and_measures_counts_that_were_not_fitted(
     assert found.resolution == (64, 48)
     names = {rung.name for rung in predicted.rungs}
     assert {law.method for law in found.laws} == names
+    assert [each.effect for each in found.prices] == [p.effect for p in predicted.prices.effects]
     assert {row.method for row in found.forecasts if row.measured} == names
     for row in found.forecasts:
         assert row.seconds.low < row.seconds.value < row.seconds.high
@@ -240,3 +242,33 @@ def test_measuring_needs_a_size(run):
     code, _, error = run("cost", "fig-8-9", "--measure")
     assert code == 2
     assert "give one with --at" in error
+
+
+def priced(width, removes, adds):
+    """Prices of two effects at a width, of a scene whose every law is known."""
+    height = 3 * width // 4
+    effects = [
+        {
+            "effect": name,
+            "removes": {"value": b + c / width, "low": b + c / width - 0.1,
+                        "high": b + c / width + 0.1},
+            "alone": 0.0, "last": 0.0, "sampling_error": 0.0,
+            "adds_s": {"value": t0 + t * width * height, "low": t0 + t * width * height,
+                       "high": t0 + t * width * height},
+        }
+        for name, (b, c), (t0, t) in zip("ab", removes, adds, strict=True)
+    ]  # fmt: skip
+    others = {"departure": 1.0, "floor": 0.0, "kernel_s": 1.0, "reference_s": 1.0}
+    counts = {"spp": 64, "replicates": 8, "orders": 0}
+    return msgspec.convert({"effects": effects, **others, **counts}, Prices)
+
+
+def test_prices_at_a_size_follow_edges_and_pixels():
+    laws = [(3.0, 20.0), (-1.0, 0.0)], [(0.01, 2e-7), (-0.002, -1e-8)]
+    sizes, target = ((64, 48), (128, 96)), (1024, 768)
+    found = at_size(*(priced(width, *laws) for width, _ in sizes), sizes, target)
+    expected = priced(1024, *laws).effects
+    for one, exact in zip(found, expected, strict=True):
+        assert one.removes.value == pytest.approx(exact.removes.value)
+        assert one.adds_s.value == pytest.approx(exact.adds_s.value)
+        assert one.removes.high - one.removes.low > 0.2  # more than the study's own

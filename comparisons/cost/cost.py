@@ -10,6 +10,8 @@ from comparisons.cost.climbing import climb
 from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Rung, Split
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
+from comparisons.cost.judging import judged
+from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
 from comparisons.cost.prediction.target import require
 from comparisons.effects.lattice import Lattice
@@ -108,7 +110,7 @@ def cost(
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
     # It changes the sizes of the scenes' films, and comes last.
-    prediction = predict(methods, at, effort, options.seed, is_measured, progress) if at else None
+    prediction = _predicted(found, priced.prices, at, is_measured, progress) if at else None
 
     made = Cost(
         scene=source.name,
@@ -153,6 +155,20 @@ def cost(
         reference=reference.mean,
         counted=counted,
     )
+
+
+def _predicted(found, larger, at, is_measured, progress):
+    """Predict what methods cost, and effects, at a size."""
+    effort, options, methods = found.effort, found.options, found.methods
+    studied = options.resolution
+    half = tuple(max(side // 2, 1) for side in studied)
+    given = found.ready, options.viewing, effort, options.seed, progress
+    noiseless = Noiseless(*judged(*given, half, effort.replicates))
+    given = effort.replicates, effort.replicate_spp, options.seed, half
+    lattice = Lattice(options, methods, *given)
+    smaller = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders).prices
+    made = predict(methods, at, effort, options.seed, is_measured, progress)
+    return structs.replace(made, prices=at_size(smaller, larger, (half, studied), at))
 
 
 def quick(source, options=None, progress=None, command=""):

@@ -238,6 +238,14 @@ class Cheapest(Record):
     seconds: Range | None = None
 
 
+class AskedPrice(Record):
+    """What an effect is predicted to remove, in mean ΔE2000, and to add to the time."""
+
+    effect: str
+    removes: Estimated
+    adds_s: Estimated
+
+
 class Prediction(Record):
     """What methods cost at a size, predicted from smaller ones.
 
@@ -253,6 +261,8 @@ class Prediction(Record):
         Timed repeats of each method, size and sample count.
     laws, forecasts, cheapest
         One law of time per method, forecasts over the sample counts, and the cheapest ways.
+    prices
+        Of the effects, with the samples of the study's own prices.
     """
 
     resolution: Resolution
@@ -262,6 +272,7 @@ class Prediction(Record):
     laws: tuple[TimeLaw, ...]
     forecasts: tuple[Forecast, ...]
     cheapest: tuple[Cheapest, ...]
+    prices: tuple[AskedPrice, ...] = ()
 
 
 class Part(Record):

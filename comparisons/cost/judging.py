@@ -3,6 +3,7 @@
 import numpy as np
 
 from comparisons.departure.metrics import LEADING
+from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Renderer
 from reference.rendering.sums import Accumulator, Mean
@@ -22,6 +23,12 @@ def converged(ready, effort, seed, progress, size=None, groups=1):
         total.add(one.images[0])
         means[one.number % groups].add(one.images[0])
     return total.estimate(), np.stack([mean.mean() for mean in means])
+
+
+def judged(ready, viewing, effort, seed, progress, size, groups=1):
+    """Return what tells errors at a size of its own, and the means of :func:`converged`."""
+    reference, means = converged(ready, effort, seed, progress, size, groups)
+    return Judge(reference, gbuffer(ready.scene, *size).hit, viewing), means
 
 
 class Judge:

@@ -45,6 +45,8 @@ def predicted(prediction):
     yield ""
     for row in prediction.cheapest:
         yield _cheapest(row)
+    if prediction.prices:
+        yield from _section(f"Price of an effect at {width}x{height}", _asked(prediction.prices))
 
 
 def _forecasts(prediction):
@@ -63,6 +65,19 @@ def _forecasts(prediction):
                 f"{row.error.low:.3f} to {row.error.high:.3f}",
                 *(seen if is_measured else ()),
             )
+
+
+def _asked(prices):
+    yield "effect", "removed", "interval", "adds", "interval"
+    for price in prices:
+        removes = price.removes
+        interval = f"{removes.low:.3f} to {removes.high:.3f}"
+        yield (
+            price.effect,
+            f"{removes.value:.3f}",
+            interval,
+            *_timed(price.adds_s.value, price.adds_s),
+        )
 
 
 def _cheapest(row):

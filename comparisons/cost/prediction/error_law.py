@@ -29,7 +29,7 @@ SHARED = 4
 """Cases that those of all methods count as, for one method beside its own two."""
 
 OWN_CHANCE = 1 / 3
-"""Of what the line misses at the largest size: by which edges meet the asked one in their own way."""
+"""Of what the line misses at the largest size: what the edges of the asked one add by chance."""
 
 Point = tuple[float, int]
 """A width and a count."""

@@ -23,7 +23,7 @@ from comparisons.cost.cost_record import (
 )
 from comparisons.cost.effort import DETERMINISTIC_SPP, Effort
 from comparisons.cost.front import ERRORS, reached
-from comparisons.cost.judging import Judge, converged
+from comparisons.cost.judging import judged
 from comparisons.cost.ladder import Distinct
 from comparisons.cost.methods import Methods
 from comparisons.cost.prediction.error_curve import ErrorCurve
@@ -31,7 +31,6 @@ from comparisons.cost.prediction.error_law import LEVEL, ErrorLaw, intervals
 from comparisons.cost.prediction.target import SEEN_SPP, Size, sizes
 from comparisons.cost.prediction.time_curve import TimeCurve
 from comparisons.cost.timing import interval
-from reference.rendering.gbuffer import gbuffer
 from reference.rendering.passes import Progress, passes
 
 FITTED_SPP = (4, 16, 64), (4, 8, 16, 64), (4, 16)
@@ -74,7 +73,8 @@ def predict(
     """
     fitted = sizes(target)
     everywhere = (*fitted, target) if is_measured else fitted
-    judges = {size: _judge(methods, size, effort, seed, progress) for size in everywhere}
+    given = methods.ready, methods.viewing, effort, seed, progress
+    judges = {size: judged(*given, size)[0] for size in everywhere}
     renderers = _renderers(methods, fitted, target if is_measured else None)
     seconds, errors, images = _measure(renderers, judges, fitted[1], effort.rounds, seed, progress)
     times = {rung.name: _time_curve(rung.name, seconds, target) for rung in methods.rungs}
@@ -140,12 +140,6 @@ def _renderers(methods, fitted, seen):
             own = made[rung.name, size, first] = methods.renderer(rung.method, first, size)
             made |= {(rung.name, size, spp): own.sampled(spp) for spp in others}
     return made
-
-
-def _judge(methods, size, effort, seed, progress):
-    """Return what tells errors at a size: a converged reference of it."""
-    reference, _ = converged(methods.ready, effort, seed, progress, size)
-    return Judge(reference, gbuffer(methods.ready.scene, *size).hit, methods.viewing)
 
 
 def _measure(renderers, judges, kept_size, rounds, seed, progress):
