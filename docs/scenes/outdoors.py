@@ -37,9 +37,8 @@ scene = {
         "type": "sunsky",
         "sun_direction": (-0.5, -0.6, 0.6),
         "turbidity": 4.0,
-        "sun_scale": 0.02,
-        "sky_scale": 0.02,
-        "to_world": T().rotate((1, 0, 0), 0),
+        "sun_scale": 0.2,
+        "sky_scale": 0.2,
     },
     **BLOCKS,
 }

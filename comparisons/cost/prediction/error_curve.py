@@ -4,14 +4,14 @@ A rendering is ``x = m + e``, with the method's own mean ``m``, wrong by its bia
 ``e``. Both are measured; the mean distance at ``s`` samples is that of ``m + λ e_r`` over the
 measured residuals ``e_r``, with ``λ = σ(s) / σ(s_r)`` from the mean absolute residual ``σ``, which
 a few bright pixels do not rule. So noise keeps its skew, and the distance its curvature. ``σ`` is a
-power of ``s`` between measured squares and beyond them; other counts stratify worse, by a factor
-that one of them shows. Where ``m`` holds more noise than ``s`` samples do, ``E² = b² + c σ²(s)``
-continues from the last counts before.
+power of ``s`` between measured squares and beyond them; other counts stratify worse, by a share that
+one of them shows, and that falls with ``s``. Where ``m`` holds more noise than ``s`` samples do,
+``E² = b² + c σ²(s)`` continues from the last counts before.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isqrt, log, sqrt
+from math import ceil, floor, isqrt, log, sqrt
 from statistics import fmean
 
 import numpy as np
@@ -64,8 +64,9 @@ class ErrorCurve:
             return known[spp]
         squares = {s: size for s, size in known.items() if _is_square(s)}
         others = [size / _power_law(squares, s) for s, size in known.items() if s not in squares]
-        worse = 1.0 if _is_square(spp) or not others else float(np.mean(others))
-        return worse * _power_law(squares, spp)
+        worse = float(np.mean(others)) if others and not _is_square(spp) else 1.0
+        fading = min(min(set(known) - set(squares), default=1) / spp, 1.0)
+        return (1 + (worse - 1) * fading) * _power_law(squares, spp)
 
     @property
     def bias(self) -> float:
@@ -91,8 +92,16 @@ class ErrorCurve:
         return sqrt(max(left, 0.0))
 
     def _drawn(self, spp: float) -> float:
-        nearest = min(self.residuals, key=lambda count: abs(log(count / spp)))
-        residuals = self.residuals[nearest]
+        """Draw from the counts on both sides: where noise has rare peaks, either alone is off."""
+        counts = sorted(self.residuals)
+        place = np.interp(log(spp), np.log(counts), range(len(counts)))
+        low, high = counts[floor(place)], counts[ceil(place)]
+        share = place % 1
+        return self._scaled(low, spp) ** (1 - share) * self._scaled(high, spp) ** share
+
+    def _scaled(self, count: int, spp: float) -> float:
+        """Return the mean distance with the residuals of a count, as large as those of another."""
+        residuals = self.residuals[count]
         own = _size(residuals)
         missing = max(self.noise(spp) ** 2 - self.noise_of_mean**2, 0.0)
         factor = sqrt(missing) / own if own > 0 else 0.0
