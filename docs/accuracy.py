@@ -1,6 +1,6 @@
 """What docs/accuracy.md shows: studies of cost over many scenes, and what they have in common.
 
-``./run docs --accuracy`` measures, in some twenty minutes on an idle machine, and writes the page.
+``./run docs --accuracy`` measures, in half an hour on an idle machine, and writes the page.
 """
 
 from collections import Counter
@@ -30,7 +30,7 @@ def measured(
     width: int = WIDTH,
     effort: Effort | None = None,
 ) -> list[Cost]:
-    """Study what accuracy costs on each scene that textbook shading departs from, in turn."""
+    """Study what accuracy costs on each scene, in turn."""
     found = []
     for name in names:
         case = open_case(name, Request(resolution=(width, 3 * width // 4)))
@@ -39,7 +39,29 @@ def measured(
     return found
 
 
-def table(records: Sequence[Cost]) -> Iterator[str]:
+def setting(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield where and how it was measured."""
+    first = records[0]
+    width, height = first.resolution
+    yield (
+        f"{len(records)} scenes at {width} by {height} pixels, {first.rounds} rounds, on"
+        f" {first.machine.cores} cores of {first.machine.processor}."
+    )
+
+
+def pictures(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield the charts of the larger scenes, for the page."""
+    for record, file in charts(records):
+        yield f"![Error against time: {record.scene.replace('_', ' ')}]({file})"
+
+
+def charts(records: Sequence[Cost]) -> Iterator[tuple[Cost, str]]:
+    """Yield the studies of the larger scenes, and the file of each chart."""
+    names = {file.stem: f"cost-{file.stem.replace('_', '-')}.svg" for file in LARGER}
+    yield from ((record, names[record.scene]) for record in records if record.scene in names)
+
+
+def methods(records: Sequence[Cost]) -> Iterator[str]:
     """Yield a row per scene: the kernel, the cheapest way to each error, and the full plan."""
     head = "Scene", "Textbook", *(f"within {parameter(limit)}" for limit in TOLERANCES), "Full plan"
     rows = [
@@ -75,7 +97,7 @@ def prices(records: Sequence[Cost]) -> Iterator[str]:
     yield from markdown([head, *rows], right=1)
 
 
-def sentences(records: Sequence[Cost]) -> Iterator[str]:
+def findings(records: Sequence[Cost]) -> Iterator[str]:
     """Yield what the studies have in common, each as an item of a list."""
     for limit in TOLERANCES:
         yield f"- {_within(records, limit)}"
@@ -122,8 +144,8 @@ def _stand_ins(records):
         for name in {point.rung for point in record.points if point.pareto}.intersection(names)
     )
     never = [name for name in names if not on_front[name]]
-    said = ", ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
-    left = f" Never: {', '.join(never)}." if never else ""
+    said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
+    left = f" Never: {'; '.join(never)}." if never else ""
     return f"Stand-ins on the Pareto front, by the number of scenes: {said}.{left}"
 
 

@@ -4,9 +4,9 @@ A rendering is ``x = m + e``, with the method's own mean ``m``, wrong by its bia
 ``e``. Both are measured; the mean distance at ``s`` samples is that of ``m + λ e_r`` over the
 measured residuals ``e_r``, with ``λ = σ(s) / σ(s_r)`` from the mean absolute residual ``σ``, which
 a few bright pixels do not rule. So noise keeps its skew, and the distance its curvature. ``σ`` is a
-power of ``s`` between measured squares and beyond them; other counts stratify worse, by a share that
-one of them shows, and that falls with ``s``. Where ``m`` holds more noise than ``s`` samples do,
-``E² = b² + c σ²(s)`` continues from the last counts before.
+power of ``s`` between measured squares and beyond them; other counts stratify worse, by a
+share that one of them shows, and that falls with ``s``. Where ``m`` holds more noise than ``s``
+samples do, ``E² = b² + c σ²(s)`` continues from the last counts before.
 """
 
 from collections.abc import Callable
