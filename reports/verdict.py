@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
-from comparisons.cost.front import cheapest
 from comparisons.departure.metrics import LEADING
 from reports.charts.theme import EFFECT_COLOURS
 from reports.terminal.printing import seconds
@@ -114,6 +113,8 @@ def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
 
 
 def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
+    from comparisons.cost.front import cheapest  # only with a study of cost
+
     best = cheapest(cost.points, tolerance)
     return best and Remedy(best.rung, best.seconds.median)
 

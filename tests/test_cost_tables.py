@@ -79,6 +79,17 @@ def test_nothing_is_said_beyond_the_measured_counts():
     assert times("flat", NOISY + FLAT, 5.0)[0].seconds is None
 
 
+def test_the_interval_of_a_reached_error_holds_what_times_and_errors_vary_by():
+    def found(spread, stderr):
+        points = [timed("noise", n, 0.01 * n, 8 / sqrt(n), stderr, spread) for n in (1, 4, 16, 64)]
+        return equal_error(points, [3.0])[0].seconds
+
+    exact, in_time, in_both = found(0.0, 0.0), found(0.1, 0.0), found(0.1, 0.1)
+    assert exact.low == exact.value == exact.high
+    assert (in_time.low, in_time.high) == pytest.approx((0.9 * exact.value, 1.1 * exact.value))
+    assert in_both.low < in_time.low < in_time.high < in_both.high
+
+
 def test_an_error_is_reached_only_where_the_measured_errors_pass_it():
     biased = [timed("biased", n, 0.01 * n, sqrt(2**2 + 64 / n)) for n in (4, 16, 64)]
     early, late = times("biased", biased, 4.0, 2.5)  # errors measured: 4.5, 2.8, 2.2
