@@ -65,6 +65,11 @@ def test_the_best_within_a_time():
     ]
 
 
+def test_a_time_that_gives_nothing_new_has_no_row():
+    rows = equal_time(NOISY + FLAT, (1e-4, 1e-3, 0.64, 1.0, 10.0))
+    assert [(row.seconds, row.best and row.best.spp) for row in rows] == [(1e-3, None), (0.64, 64)]
+
+
 def test_noise_alone_reaches_an_error_on_the_slope_of_one_half():
     for row in times("noise alone", NOISY, 7.0, 3.0, 1.5, 1.0):
         assert row.seconds.value == pytest.approx(0.01 * (8 / row.error) ** 2)

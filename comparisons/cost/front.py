@@ -7,8 +7,9 @@ nothing is said.
 """
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import log
+from operator import attrgetter
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -61,8 +62,14 @@ def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
 
 
 def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> tuple[Within, ...]:
-    """Return the point of least error within each time; of equal ones the fastest."""
-    return tuple(Within(limit, _best(points, limit)) for limit in times)
+    """Return the point of least error within each time, where a longer one gives a better one.
+
+    Of equal points it is the fastest; where none is as fast, the longest time says so.
+    """
+    rows = [Within(limit, _best(points, limit)) for limit in times]
+    too_short = [row for row in rows if row.best is None][-1:]
+    better = [next(same) for best, same in groupby(rows, attrgetter("best")) if best]
+    return (*too_short, *better)
 
 
 def _best(points, limit):
