@@ -94,7 +94,7 @@ def test_counts_that_stratify_worse_are_told_from_one_of_them():
     shape = 8, 4000, 3
 
     def spread(spp):
-        return (1.5 if spp in (8, 32) else 1) / spp
+        return (1 + 4 / spp if spp in (8, 32) else 1) / spp  # a share that falls with the count
 
     images = {s: rng.normal(size=shape) * spread(s) for s in (4, 8, 16, 64)}
     curve = ErrorCurve.measured(images, lambda image: float(np.abs(image).mean()))
