@@ -26,6 +26,7 @@ from reference.rendering import direct
 from reference.scene.graph import set_variant
 from reports.charts import figures, term_figure, vega
 from reports.charts.albedo_chart import albedo_chart
+from reports.charts.error_over_time import error_over_time
 from reports.files import images
 from reports.terminal import tables
 from tests.witnesses import page
@@ -55,10 +56,13 @@ POLYGONS = (
 
 
 def main(words):
-    """Make everything; with ``--all`` what takes long, too."""
+    """Make everything; with ``--all`` what takes long, too, with ``--accuracy`` one page alone."""
     set_variant("llvm_ad_rgb")
+    if words == ["--accuracy"]:
+        return _accuracy()
     if words == ["--all"]:
         _measurements()
+        _accuracy()
     replace("models.md", "equations", equation_table())
     _guarantees()
     replace("plans.md", "rules", rules())
@@ -167,6 +171,17 @@ def _measurements():
     replace("../README.md", "cost", measured.prices())
     replace("../README.md", "gains", measured.gains())
     replace("../README.md", "speed", measured.speed())
+
+
+def _accuracy():
+    """Study what accuracy costs over many scenes; half an hour on an idle machine."""
+    import accuracy  # beside this script
+
+    records = accuracy.measured()
+    for part in ("setting", "findings", "methods", "prices", "pictures"):
+        replace("accuracy.md", part, getattr(accuracy, part)(records))
+    for record, path in accuracy.charts(records):
+        atomic.write(DOCS / path, vega.paper(error_over_time(record)))
 
 
 def _guarantees():

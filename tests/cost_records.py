@@ -79,7 +79,7 @@ def _record(scene):
             {"seconds": 0.0011, "best": None},
             {
                 "seconds": 0.1,
-                "best": {"method": "full plan", "spp": 16, "seconds": 0.0567, "error": 1.234},
+                "best": point("full plan", 16, 0.0567, 1.234, False),
             },
         ],
         "equal_error": [
@@ -142,7 +142,8 @@ def point(rung, spp, time, error, pareto):
 
 def reached(method, error, seconds, at_most=False):
     """When a method reaches an error."""
-    return {"method": method, "error": error, "seconds": seconds, "at_most": at_most}
+    time = seconds and {"value": seconds, "low": 0.91 * seconds, "high": 1.13 * seconds}
+    return {"method": method, "error": error, "seconds": time, "at_most": at_most}
 
 
 def price(effect, removes, adds):

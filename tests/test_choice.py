@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from comparisons.cost import choice
-from comparisons.cost.choice import Choice, Offer, cheapest, choose
+from comparisons.cost.choice import Choice, Offer, choose
+from comparisons.cost.front import cheapest
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reports.terminal.choice_lines import sentence
+from tests.benchmarks.choice import searched
 from tests.test_cost import TINY
 
 
@@ -24,16 +26,6 @@ class Timed:
 class Point:
     seconds: Timed
     error: float
-
-
-def searched(points, within):
-    """What is beaten by none: no other one within the error is faster, or as fast and better."""
-    allowed = [point for point in points if not point.error > within]
-    for point in allowed:
-        cost = point.seconds.median, point.error
-        if not any((other.seconds.median, other.error) < cost for other in allowed):
-            return point
-    return None
 
 
 def test_the_choice_is_that_of_an_exhaustive_search():

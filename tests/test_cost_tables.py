@@ -6,14 +6,21 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from comparisons.cost.cost_record import Point
+from comparisons.cost.cost_record import Interval, Measured
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.timing import interval
 from comparisons.effects import shapley
 from tests.benchmarks import cost as repeats
 
-NOISY = [Point("noise alone", n, 0.01 * n, 8 / sqrt(n)) for n in (1, 4, 16, 64)]
-FLAT = [Point("flat", 16, 0.002, 12.0)]
+
+def timed(method, spp, seconds, error, stderr=0.0, spread=0.0):
+    low, high = seconds * (1 - spread), seconds * (1 + spread)
+    time = Interval(seconds, low, high, low, high, 0.95, 7)
+    return Measured(method, spp, seconds, 0.0, time, error, stderr, 0.0, 0.0)
+
+
+NOISY = [timed("noise alone", n, 0.01 * n, 8 / sqrt(n)) for n in (1, 4, 16, 64)]
+FLAT = [timed("flat", 16, 0.002, 12.0)]
 
 
 def times(method, points, *errors):
@@ -22,45 +29,50 @@ def times(method, points, *errors):
 
 def test_the_front_is_what_nothing_beats():
     points = [
-        Point("a", 1, 1.0, 5.0),
-        Point("b", 1, 2.0, 5.0),  # as good as a, slower
-        Point("c", 1, 3.0, 6.0),  # worse and slower
-        Point("d", 1, 4.0, 1.0),
-        Point("e", 1, 4.0, 2.0),  # as slow as d, worse
+        timed("a", 1, 1.0, 5.0),
+        timed("b", 1, 2.0, 5.0),  # as good as a, slower
+        timed("c", 1, 3.0, 6.0),  # worse and slower
+        timed("d", 1, 4.0, 1.0),
+        timed("e", 1, 4.0, 2.0),  # as slow as d, worse
     ]
-    assert [p.method for p in pareto(points)] == ["a", "d"]
-    assert [p.method for p in pareto(reversed(points))] == ["a", "d"]
+    assert [p.rung for p in pareto(points)] == ["a", "d"]
+    assert [p.rung for p in pareto(reversed(points))] == ["a", "d"]
 
 
 def test_the_front_agrees_with_its_definition_on_random_points():
     rng = np.random.default_rng(3)
-    points = [Point(str(i), 1, *rng.integers(1, 8, 2).astype(float)) for i in range(60)]
+    points = [timed(str(i), 1, *rng.integers(1, 8, 2).astype(float)) for i in range(60)]
 
     def beaten(p):
         return any(
-            q.seconds <= p.seconds
+            q.seconds.median <= p.seconds.median
             and q.error <= p.error
-            and (q.seconds, q.error) != (p.seconds, p.error)
+            and (q.seconds.median, q.error) != (p.seconds.median, p.error)
             for q in points
         )
 
-    expected = {(p.seconds, p.error) for p in points if not beaten(p)}
-    assert {(p.seconds, p.error) for p in pareto(points)} == expected
+    expected = {(p.seconds.median, p.error) for p in points if not beaten(p)}
+    assert {(p.seconds.median, p.error) for p in pareto(points)} == expected
 
 
 def test_the_best_within_a_time():
     rows = equal_time(NOISY + FLAT, (0.001, 0.01, 0.1, 1.0))
     assert rows[0].best is None
-    assert [(row.best.method, row.best.spp) for row in rows[1:]] == [
+    assert [(row.best.rung, row.best.spp) for row in rows[1:]] == [
         ("noise alone", 1),
         ("noise alone", 4),
         ("noise alone", 64),
     ]
 
 
+def test_a_time_that_gives_nothing_new_has_no_row():
+    rows = equal_time(NOISY + FLAT, (1e-4, 1e-3, 0.64, 1.0, 10.0))
+    assert [(row.seconds, row.best and row.best.spp) for row in rows] == [(1e-3, None), (0.64, 64)]
+
+
 def test_noise_alone_reaches_an_error_on_the_slope_of_one_half():
     for row in times("noise alone", NOISY, 7.0, 3.0, 1.5, 1.0):
-        assert row.seconds == pytest.approx(0.01 * (8 / row.error) ** 2)
+        assert row.seconds.value == pytest.approx(0.01 * (8 / row.error) ** 2)
         assert not row.at_most
 
 
@@ -68,14 +80,25 @@ def test_nothing_is_said_beyond_the_measured_counts():
     below, above = times("noise alone", NOISY, 0.9, 8.5)
     assert below.seconds is None
     assert above.at_most
-    assert above.seconds == NOISY[0].seconds
+    assert above.seconds.value == NOISY[0].seconds.median
     assert times("flat", NOISY + FLAT, 5.0)[0].seconds is None
 
 
+def test_the_interval_of_a_reached_error_holds_what_times_and_errors_vary_by():
+    def found(spread, stderr):
+        points = [timed("noise", n, 0.01 * n, 8 / sqrt(n), stderr, spread) for n in (1, 4, 16, 64)]
+        return equal_error(points, [3.0])[0].seconds
+
+    exact, in_time, in_both = found(0.0, 0.0), found(0.1, 0.0), found(0.1, 0.1)
+    assert exact.low == exact.value == exact.high
+    assert (in_time.low, in_time.high) == pytest.approx((0.9 * exact.value, 1.1 * exact.value))
+    assert in_both.low < in_time.low < in_time.high < in_both.high
+
+
 def test_an_error_is_reached_only_where_the_measured_errors_pass_it():
-    biased = [Point("biased", n, 0.01 * n, sqrt(2**2 + 64 / n)) for n in (4, 16, 64)]
+    biased = [timed("biased", n, 0.01 * n, sqrt(2**2 + 64 / n)) for n in (4, 16, 64)]
     early, late = times("biased", biased, 4.0, 2.5)  # errors measured: 4.5, 2.8, 2.2
-    assert 0.04 < early.seconds < 0.16 < late.seconds < 0.64
+    assert 0.04 < early.seconds.value < 0.16 < late.seconds.value < 0.64
     assert times("biased", biased, 2.0)[0].seconds is None
 
 

@@ -1,11 +1,12 @@
 """The cheapest method whose error stays within a tolerance, out of those measured."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from comparisons.cost.climbing import climb
 from comparisons.cost.cost_record import LeftOut, Measured
 from comparisons.cost.effort import Effort
+from comparisons.cost.front import cheapest
 from comparisons.cost.rungs import FULL_PLAN
 from comparisons.departure.metrics import METRICS
 from comparisons.options import Options
@@ -62,12 +63,6 @@ class Choice(Record, kw_only=True):
     full: Offer
     left_out: tuple[LeftOut, ...] = ()
     record_version: int = VERSION
-
-
-def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
-    """Return the fastest of those whose error is not larger; of equal ones the most accurate."""
-    allowed = (point for point in points if point.error <= within)
-    return min(allowed, key=lambda point: (point.seconds.median, point.error), default=None)
 
 
 def choose(

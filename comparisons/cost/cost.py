@@ -7,10 +7,13 @@ from msgspec import structs
 
 from comparisons import record
 from comparisons.cost.climbing import climb
-from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Point, Rung, Split
+from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Rung, Split
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
-from comparisons.cost.prediction import predict
+from comparisons.cost.judging import judged
+from comparisons.cost.prediction.asked_prices import at_size
+from comparisons.cost.prediction.forecasting import predict
+from comparisons.cost.prediction.target import require
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -87,12 +90,16 @@ def cost(
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface.
+        When the scene cannot be read or paired, or no pixel of it sees a surface; for a size ``at``
+        that is too small, of another shape than ``options.resolution``, or too large.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
     progress = progress or (lambda *_: None)
-    found = climb(source, options or Options(), effort or Effort(), progress, at=at)
+    options = options or Options()
+    if at:
+        require(source.name, at, options.resolution, is_measured)
+    found = climb(source, options, effort or Effort(), progress, at=at)
     options, effort, ready, judge = found.options, found.effort, found.ready, found.judge
     methods, reference, counted = found.methods, found.reference, ready.counted
     width, height = image_size(ready.scene)
@@ -103,7 +110,7 @@ def cost(
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
     # It changes the sizes of the scenes' films, and comes last.
-    prediction = predict(methods, at, effort, options.seed, is_measured, progress) if at else None
+    prediction = _predicted(found, priced.prices, at, is_measured, progress) if at else None
 
     made = Cost(
         scene=source.name,
@@ -150,6 +157,20 @@ def cost(
     )
 
 
+def _predicted(found, larger, at, is_measured, progress):
+    """Predict what methods cost, and effects, at a size."""
+    effort, options, methods = found.effort, found.options, found.methods
+    studied = options.resolution
+    half = tuple(max(side // 2, 1) for side in studied)
+    given = found.ready, options.viewing, effort, options.seed, progress
+    noiseless = Noiseless(*judged(*given, half, effort.replicates))
+    given = effort.replicates, effort.replicate_spp, options.seed, half
+    lattice = Lattice(options, methods, *given)
+    smaller = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders).prices
+    made = predict(methods, at, effort, options.seed, is_measured, progress)
+    return structs.replace(made, prices=at_size(smaller, larger, (half, studied), at))
+
+
 def quick(source, options=None, progress=None, command=""):
     """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
     options = options or Options()
@@ -159,13 +180,10 @@ def quick(source, options=None, progress=None, command=""):
 
 def _compared(measured):
     """Return the points, with the front marked, and what they reach within times and errors."""
-    points = [Point(m.rung, m.spp, m.seconds.median, m.error) for m in measured]
-    front = pareto(points)
+    front = pareto(measured)
+    points = tuple(structs.replace(point, pareto=point in front) for point in measured)
     return {
-        "points": tuple(
-            structs.replace(one, pareto=point in front)
-            for one, point in zip(measured, points, strict=True)
-        ),
+        "points": points,
         "equal_time": equal_time(points),
         "equal_error": equal_error(points),
     }

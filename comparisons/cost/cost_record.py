@@ -105,32 +105,32 @@ class Measured(Record):
     prepare_s: Amount = 0.0
 
 
-class Point(Record):
-    """A method at one sample count: median time in seconds, and mean ΔE2000."""
-
-    method: str
-    spp: int
-    seconds: Positive
-    error: Amount
-
-
 class Within(Record):
     """The best point within a time, None where none is as fast."""
 
     seconds: Positive
-    best: Point | None
+    best: Measured | None
+
+
+class Range(Record):
+    """A value that was not measured itself, and the ends of its interval."""
+
+    value: Amount
+    low: Amount
+    high: Amount
 
 
 class Reached(Record):
     """When a method reaches an error.
 
     ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
-    ``at_most``, where the fewest samples measured reach it already.
+    ``at_most``, where the fewest samples measured reach it already. Its interval, of about 95 %,
+    holds what times and errors vary by, and ends with the measured counts.
     """
 
     method: str
     error: Positive
-    seconds: float | None
+    seconds: Range | None
     at_most: bool = False
 
 
@@ -198,14 +198,6 @@ class Prices(Record):
     orders: int
 
 
-class Range(Record):
-    """A predicted value, and the ends of its interval."""
-
-    value: Amount
-    low: Amount
-    high: Amount
-
-
 class Seen(Record):
     """What was measured where something was predicted: mean ΔE2000, and its spread over rounds."""
 
@@ -246,6 +238,14 @@ class Cheapest(Record):
     seconds: Range | None = None
 
 
+class AskedPrice(Record):
+    """What an effect is predicted to remove, in mean ΔE2000, and to add to the time."""
+
+    effect: str
+    removes: Estimated
+    adds_s: Estimated
+
+
 class Prediction(Record):
     """What methods cost at a size, predicted from smaller ones.
 
@@ -261,6 +261,8 @@ class Prediction(Record):
         Timed repeats of each method, size and sample count.
     laws, forecasts, cheapest
         One law of time per method, forecasts over the sample counts, and the cheapest ways.
+    prices
+        Of the effects, with the samples of the study's own prices.
     """
 
     resolution: Resolution
@@ -270,6 +272,7 @@ class Prediction(Record):
     laws: tuple[TimeLaw, ...]
     forecasts: tuple[Forecast, ...]
     cheapest: tuple[Cheapest, ...]
+    prices: tuple[AskedPrice, ...] = ()
 
 
 class Part(Record):

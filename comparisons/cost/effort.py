@@ -9,7 +9,7 @@ from comparisons.effects import shapley
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size
 
-DETERMINISTIC_SPP = 16
+DETERMINISTIC_SPP = (4, 16)
 """Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
 
 WIDTH = 128
@@ -27,6 +27,8 @@ class Effort:
     largest
         Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
         those the sampler stratifies best.
+    deterministic
+        Samples a pixel of the other rungs.
     depths
         Depths of ``path`` that are rungs.
     reference_spp
@@ -45,6 +47,7 @@ class Effort:
 
     rounds: int = 7
     largest: int = 64
+    deterministic: tuple[int, ...] = DETERMINISTIC_SPP
     depths: tuple[int, ...] = DEPTHS
     reference_spp: int = 64
     replicates: int = 8
@@ -66,6 +69,7 @@ class Effort:
 QUICK = Effort(
     rounds=3,
     largest=16,
+    deterministic=(16,),
     depths=(3,),
     replicates=4,
     replicate_spp=16,

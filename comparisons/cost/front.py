@@ -1,66 +1,105 @@
-"""What a set of timed and judged methods says: Pareto front, equal time, equal error.
+"""What a set of timed and judged methods says: Pareto front, cheapest, equal time, equal error.
 
 A point is a method at one sample count: a time in seconds and an error. Equal error is read off
-between two measured counts of one method only, along the straight line between them in logarithms:
-its slope is −1/2 where the error is noise alone, and flatter towards the method's own bias. Beyond
-the measured counts nothing is said.
+between two counts of one method only, along the straight line between them in logarithms: its slope
+is −1/2 where the error is noise alone, and flatter towards the method's own bias. Beyond the counts
+nothing is said.
 """
 
-from itertools import pairwise
-from math import exp, log
+from collections.abc import Iterable, Sequence
+from itertools import groupby, pairwise
+from math import log
+from operator import attrgetter
+from statistics import NormalDist
+from typing import NamedTuple
 
-from comparisons.cost.cost_record import Reached, Within
+from comparisons.cost.cost_record import Measured, Range, Reached, Within
 
 TIMES_S = (0.01, 0.1, 1.0, 10.0)
 ERRORS = (5.0, 2.0, 1.0, 0.5)
 
+SURE = NormalDist().inv_cdf(0.975)
+"""Standard errors to each side of an interval of 95 %."""
 
-def pareto(points):
+
+class Place(NamedTuple):
+    """Where a curve is: a share of the way, in logarithms, from one of its points to the next."""
+
+    number: int
+    share: float
+
+    def of(self, values: Sequence[float]) -> float:
+        """Return the value there of positive ones, which belong to the points."""
+        after = values[self.number + 1] if self.share else 1.0
+        return values[self.number] ** (1 - self.share) * after**self.share
+
+
+def reached(errors: Sequence[float], error: float) -> Place | None:
+    """Return where errors of one method, its fastest point first, come down to an error."""
+    if errors[0] <= error:
+        return Place(0, 0.0)
+    for number, (before, after) in enumerate(pairwise(errors)):
+        if after <= error < before:
+            share = log(before / error) / log(before / after) if after > 0 else 1.0
+            return Place(number, share)
+    return None
+
+
+def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
+    """Return the fastest of those whose error is not larger; of equal ones the most accurate."""
+    allowed = (point for point in points if point.error <= within)
+    return min(allowed, key=lambda point: (point.seconds.median, point.error), default=None)
+
+
+def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
     """Return the points that no other one beats: none is as fast and as good, and better in one."""
     front, best = [], float("inf")
-    for point in sorted(points, key=lambda p: (p.seconds, p.error)):
+    for point in sorted(points, key=lambda p: (p.seconds.median, p.error)):
         if point.error < best:
             front.append(point)
             best = point.error
     return tuple(front)
 
 
-def equal_time(points, times=TIMES_S):
-    """Return the point of least error within each time; of equal ones the fastest."""
-    rows = []
-    for limit in times:
-        within = [point for point in points if point.seconds <= limit]
-        best = min(within, key=lambda p: (p.error, p.seconds)) if within else None
-        rows.append(Within(limit, best))
-    return tuple(rows)
+def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> tuple[Within, ...]:
+    """Return the point of least error within each time, where a longer one gives a better one.
+
+    Of equal points it is the fastest; where none is as fast, the longest time says so.
+    """
+    rows = [Within(limit, _best(points, limit)) for limit in times]
+    too_short = [row for row in rows if row.best is None][-1:]
+    better = [next(same) for best, same in groupby(rows, attrgetter("best")) if best]
+    return (*too_short, *better)
 
 
-def equal_error(points, errors=ERRORS):
+def _best(points, limit):
+    within = [point for point in points if point.seconds.median <= limit]
+    return min(within, key=lambda p: (p.error, p.seconds.median), default=None)
+
+
+def equal_error(
+    points: Sequence[Measured], errors: Sequence[float] = ERRORS
+) -> tuple[Reached, ...]:
     """Return when each method reaches each error, methods in the order of the points."""
-    methods = list(dict.fromkeys(point.method for point in points))
+    methods = list(dict.fromkeys(point.rung for point in points))
     return tuple(
-        _reached(method, sorted((p for p in points if p.method == method), key=_time), error)
+        _reached(method, [point for point in points if point.rung == method], error)
         for method in methods
         for error in errors
     )
 
 
-def _time(point):
-    return point.seconds
-
-
 def _reached(method, points, error):
-    if points[0].error <= error:
-        return Reached(method, error, points[0].seconds, at_most=True)
-    for before, after in pairwise(points):
-        if after.error <= error < before.error:
-            return Reached(method, error, _between(before, after, error))
-    return Reached(method, error, None)
-
-
-def _between(before, after, error):
-    """Interpolate the time between two points, linearly in logarithms."""
-    if after.error <= 0:
-        return after.seconds
-    slope = log(after.seconds / before.seconds) / log(after.error / before.error)
-    return before.seconds * exp(slope * log(error / before.error))
+    """Return when a method reaches an error; sooner and later where its points may be off."""
+    ordered = sorted(points, key=lambda point: point.seconds.median)
+    found = reached([point.error for point in ordered], error)
+    if found is None:
+        return Reached(method, error, None)
+    ends = []
+    for side, end in ((-1, "low"), (1, "high")):
+        errors = [max(p.error + side * SURE * p.error_stderr, 0.0) for p in ordered]
+        place = reached(errors, error) or Place(len(ordered) - 1, 0.0)
+        ends.append(place.of([getattr(p.seconds, end) for p in ordered]))
+    value = found.of([point.seconds.median for point in ordered])
+    at_most = ordered[0].error <= error
+    return Reached(method, error, Range(value, min(ends[0], value), max(ends[1], value)), at_most)

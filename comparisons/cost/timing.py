@@ -1,4 +1,4 @@
-"""Timing and judging the rungs: in turn, so that a drift of the machine hits all alike.
+"""Timing the rungs: in turn, so that a drift of the machine hits all alike.
 
 What is timed is one rendering of the whole image, evaluated and synchronised. The first run of each
 rung traces and compiles, and stands apart; a second one warms caches; the rounds follow, each with
@@ -9,7 +9,6 @@ import numpy as np
 
 from comparisons import intervals
 from comparisons.cost.cost_record import Interval, Measured
-from comparisons.departure.metrics import LEADING
 from reference.rendering.passes import passes
 
 
@@ -29,48 +28,6 @@ def interval(values):
     )
 
 
-class Judge:
-    """Errors against a converged reference whose own noise is known.
-
-    Parameters
-    ----------
-    reference : reference.rendering.sums.Estimate
-        The reference.
-    counted
-        (H, W): the pixels that count.
-    viewing : comparisons.departure.spaces.Viewing
-        How linear values are looked at.
-    metric : comparisons.departure.metric.Metric
-        Whose mean is the error, ΔE2000 where it is not given.
-    """
-
-    def __init__(self, reference, counted, viewing, metric=LEADING):
-        self.metric = metric
-        self.viewing = viewing
-        self.counted = counted
-        self.reference = reference.mean[counted]
-        self._distances = metric.against(reference.mean, counted, viewing)
-        self.variance = float(np.mean(reference.standard_error[counted] ** 2))
-        """Mean variance of the reference, which a mean squared error holds on top of its own."""
-        self.floor = metric.mean(self._distances(reference.mean + reference.noise))
-        """Error that the reference's noise alone gives."""
-
-    def errors(self, image):
-        """Return the metric's mean, and the linear MSE without the reference's share (may be < 0).
-
-        ``image`` is (H, W, 3).
-        """
-        image = np.asarray(image, float)
-        mse = float(np.mean((image[self.counted] - self.reference) ** 2)) - self.variance
-        return self.metric.mean(self._distances(image)), mse
-
-    def distance(self, pixels):
-        """Return the metric's mean over the counted pixels (N, 3), as if the others were black."""
-        image = np.zeros((*self.counted.shape, 3))
-        image[self.counted] = pixels
-        return self.metric.mean(self._distances(image))
-
-
 def measure(renderers, judge, rounds, seed, progress):
     """Time and judge renderers in turn.
 
@@ -78,7 +35,7 @@ def measure(renderers, judge, rounds, seed, progress):
     ----------
     renderers
         ``{(name, spp): renderer}``; see :class:`reference.rendering.renderer.Renderer`.
-    judge : Judge
+    judge : comparisons.cost.judging.Judge
         What tells errors.
     rounds
         Repeats, at least 2.

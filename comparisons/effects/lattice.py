@@ -44,11 +44,13 @@ class Lattice:
         Samples a pixel of each replicate.
     seed
         Of the study.
+    size
+        Width and height to render in place of the film's; None leaves them.
     """
 
-    def __init__(self, options, methods, replicates, spp, seed):
+    def __init__(self, options, methods, replicates, spp, seed, size=None):
         self.ready, self.replicates = methods.ready, replicates
-        self.spp, self.seed = spp, seed
+        self.spp, self.seed, self.size = spp, seed, size
         self.variant = self.ready.reference.variant
         self.heuristic_variant = methods.heuristic_variant
         self._options, self._pairs = options, methods.pairs
@@ -174,6 +176,7 @@ class Lattice:
         return self._glows[glow]
 
     def _passes(self, renderer):
+        renderer.size = self.size
         loop = passes([renderer], self.seed, self.replicates, stream=Stream.REPLICATES)
         images = [np.array(one.images[0]) for one in loop]
         return np.stack(images), np.array(renderer.times[1:])

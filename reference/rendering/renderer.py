@@ -9,6 +9,7 @@ so that every standard error here comes from the spread of passes.
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
@@ -144,6 +145,12 @@ class Renderer:
     def replays(self) -> bool:
         """See the class."""
         return self._replayed is not None
+
+    def sampled(self, spp):
+        """Return a renderer of the same with another number of samples."""
+        other = copy(self)
+        other.spp, other.times, other.compilation = spp, [], 0.0
+        return other
 
     def _image(self, seed):
         """Render, later passes by replaying the kernels of the first where Dr.Jit can do so.

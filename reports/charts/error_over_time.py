@@ -50,8 +50,8 @@ def plot(record, ground="transparent"):
     is the slope −1/2 of plain Monte Carlo; the dotted one the reference's own noise, below which
     nothing can be told.
     """
-    families = {rung.name: rung.family for rung in record.rungs}
-    rows = [_row(point, families[point.rung]) for point in record.points]
+    rungs = {rung.name: rung for rung in record.rungs}
+    rows = [_row(point, rungs[point.rung]) for point in record.points]
     floor = record.reference.noise_floor
     times = domain([row[bound] for row in rows for bound in ("low", "high")])
     told = [row["error"] for row in rows] + ([floor] if floor > 0 else [])
@@ -64,15 +64,35 @@ def plot(record, ground="transparent"):
         *_points(rows, times, errors, ground),
         *names_beside(rows, times, errors),
     ]
+    return layered(layers)
+
+
+def layered(layers):
+    """Return the specification of a chart of layers over the two axes."""
     # Names may be wider in the reader's font than where the picture is drawn.
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
-    chart = alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding)
-    return specification(chart)
+    return specification(alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding))
+
+
+def by_family(channel, place):
+    """Return a channel that tells families apart, by the colours (0) or shapes (1) of MARKS."""
+    styles = [style[place] for style in MARKS.values()]
+    return channel("family:N", legend=None, scale=alt.Scale(domain=list(MARKS), range=styles))
+
+
+def tooltips():
+    """Return what a point says of itself."""
+    return [
+        alt.Tooltip("rung:N", title="method"),
+        alt.Tooltip("spp:Q", title="samples per pixel"),
+        alt.Tooltip("time:Q", title="time (ms)", format=".3~g"),
+        alt.Tooltip("error:Q", title="mean ΔE2000", format=".3~g"),
+    ]
 
 
 def reading(record):
     """Return how to read the chart, in lines."""
-    sampled = _sampled([point.rung for point in record.points])
+    sampled = any(rung.monte_carlo for rung in record.rungs)
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     return [
         "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
@@ -80,10 +100,11 @@ def reading(record):
     ]
 
 
-def _row(point, family):
+def _row(point, rung):
     return {
         "rung": point.rung,
-        "family": family,
+        "family": rung.family,
+        "sampled": rung.monte_carlo,
         "spp": point.spp,
         "time": point.seconds.median * 1e3,
         "low": point.seconds.low * 1e3,
@@ -121,32 +142,22 @@ def charted(rows, times, errors):
 
 def _points(rows, times, errors, ground):
     """Return the lines of the rungs, and their points with intervals and tooltips."""
-    colours, shapes = zip(*MARKS.values(), strict=True)
-    colour, shape = (
-        channel("family:N", legend=None, scale=alt.Scale(domain=list(MARKS), range=styles))
-        for channel, styles in ((alt.Color, colours), (alt.Shape, shapes))
-    )
-    titles = {"time": "time (ms)", "error": "mean ΔE2000"}
+    colour = by_family(alt.Color, 0)
     chart = charted(rows, times, errors).encode(color=colour)
     return [
         chart.mark_line(strokeWidth=1.2, opacity=0.75).encode(detail="rung:N"),
         chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(x=_time("low", times), x2="high"),
         chart.mark_point(size=55, strokeWidth=1.6, opacity=1).encode(
-            shape=shape,
+            shape=by_family(alt.Shape, 1),
             fill=alt.condition("datum.front", colour, alt.value(ground)),
-            tooltip=[
-                alt.Tooltip("rung:N", title="method"),
-                alt.Tooltip("spp:Q", title="samples per pixel"),
-                *(alt.Tooltip(f"{name}:Q", title=titles[name], format=".3~g") for name in titles),
-            ],
+            tooltip=tooltips(),
         ),
     ]
 
 
 def _slope(rows, times, errors):
     """Return the line of slope −1/2 through the best point of any Monte Carlo rung."""
-    names = _sampled([row["rung"] for row in rows])
-    sampled = [row for row in rows if row["rung"] in names]
+    sampled = [row for row in rows if row["sampled"]]
     if not sampled:
         return []
     best = min(sampled, key=lambda row: row["shown"])
@@ -163,11 +174,6 @@ def _guide(ends, times, errors, dash):
     rows = [{"time": time, "shown": end} for time, end in zip(times, ends, strict=True)]
     style = {"color": FAINT, "strokeWidth": 1.2, "strokeDash": dash, "clip": True, "aria": False}
     return charted(rows, times, errors).mark_line(**style)
-
-
-def _sampled(rungs):
-    """Return the rungs that have points at several sample counts."""
-    return {rung for rung in rungs if rungs.count(rung) > 1}
 
 
 def names_beside(rows, times, errors):

@@ -3,15 +3,14 @@
 import altair as alt
 
 from reports.charts.error_over_time import (
-    HEIGHT,
     LEAST_ERROR,
-    MARKS,
-    WIDTH,
+    by_family,
     charted,
     domain,
+    layered,
     names_beside,
+    tooltips,
 )
-from reports.charts.vega import specification
 
 
 def prediction_chart(record, ground="transparent"):
@@ -26,28 +25,19 @@ def prediction_chart(record, ground="transparent"):
         row["shown"] = max(row["error"], errors[0])
     for row in rows:
         row["low"] = max(row["low"], errors[0])
-    colours = alt.Scale(domain=list(MARKS), range=[colour for colour, _ in MARKS.values()])
-    colour = alt.Color("family:N", legend=None, scale=colours)
+    colour = by_family(alt.Color, 0)
     curves = charted(rows, times, errors).encode(color=colour)
     layers = [
         curves.mark_area(opacity=0.18).encode(y="low:Q", y2="high:Q", detail="rung:N"),
         curves.mark_line(strokeWidth=1.4).encode(detail="rung:N"),
         curves.mark_rule(strokeWidth=1, opacity=0.35).encode(x="fastest:Q", x2="slowest:Q"),
-        curves.mark_point(size=18, filled=True, opacity=0.9).encode(
-            tooltip=[
-                alt.Tooltip("rung:N", title="method"),
-                alt.Tooltip("spp:Q", title="samples per pixel"),
-                alt.Tooltip("time:Q", title="time (ms)", format=".3~g"),
-                alt.Tooltip("error:Q", title="mean ΔE2000", format=".3~g"),
-            ]
-        ),
+        curves.mark_point(size=18, filled=True, opacity=0.9).encode(tooltip=tooltips()),
         *names_beside(rows, times, errors),
     ]
     if seen:
         measured = charted(seen, times, errors).encode(color=colour)
         layers.append(measured.mark_point(shape="cross", size=90, fill=ground, strokeWidth=1.5))
-    padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
-    return specification(alt.layer(*layers).properties(width=WIDTH, height=HEIGHT, padding=padding))
+    return layered(layers)
 
 
 def standing_alone(record):

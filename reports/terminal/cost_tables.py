@@ -45,6 +45,8 @@ def predicted(prediction):
     yield ""
     for row in prediction.cheapest:
         yield _cheapest(row)
+    if prediction.prices:
+        yield from _section(f"Price of an effect at {width}x{height}", _asked(prediction.prices))
 
 
 def _forecasts(prediction):
@@ -63,6 +65,19 @@ def _forecasts(prediction):
                 f"{row.error.low:.3f} to {row.error.high:.3f}",
                 *(seen if is_measured else ()),
             )
+
+
+def _asked(prices):
+    yield "effect", "removed", "interval", "adds", "interval"
+    for price in prices:
+        removes = price.removes
+        interval = f"{removes.low:.3f} to {removes.high:.3f}"
+        yield (
+            price.effect,
+            f"{removes.value:.3f}",
+            interval,
+            *_timed(price.adds_s.value, price.adds_s),
+        )
 
 
 def _cheapest(row):
@@ -110,11 +125,18 @@ def _first(point):
 
 
 def _equal_time(record):
-    yield "within", "method", "samples", "mean ΔE2000", "takes"
+    yield "within", "method", "samples", "mean ΔE2000", "takes", "interval"
     for row in record.equal_time:
         best = row.best
-        shown = best and (best.method, f"{best.spp}", f"{best.error:.3f}", _time(best.seconds))
-        yield _time(row.seconds), *(shown or ("none is as fast", "", "", ""))
+        yield (
+            _time(row.seconds),
+            *(_point(best) if best else ("none is as fast", "", "", "", "")),
+        )
+
+
+def _point(point):
+    error = f"{point.error:.3f} ± {point.error_stderr:.3f}"
+    return point.rung, f"{point.spp}", error, *_timed(point.seconds.median, point.seconds)
 
 
 def _equal_error(record):
@@ -127,7 +149,8 @@ def _equal_error(record):
 def _reached(row):
     if row.seconds is None:
         return "not reached"
-    return f"{'at most ' if row.at_most else ''}{_time(row.seconds)}"
+    time, interval = _timed(row.seconds.value, row.seconds)
+    return f"{'at most ' if row.at_most else ''}{time} ({interval})"
 
 
 def _prices(record):

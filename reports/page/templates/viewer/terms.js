@@ -7,7 +7,7 @@ class TermsPanel {
   /** @param {HTMLElement} panel @param {any} page */
   constructor(panel, page) {
     this.panel = panel;
-    this.weights = page.luminance;
+    this.weights = page.xyz[1];
     /** @type {any} */
     this.scene = null;
     document.addEventListener("pick", (event) => {

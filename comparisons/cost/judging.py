@@ -1,0 +1,73 @@
+"""Judging the rungs: what errors are told against, and by what."""
+
+import numpy as np
+
+from comparisons.departure.metrics import LEADING
+from reference.rendering.gbuffer import gbuffer
+from reference.rendering.passes import Stream, passes
+from reference.rendering.renderer import Renderer
+from reference.rendering.sums import Accumulator, Mean
+
+
+def converged(ready, effort, seed, progress, size=None, groups=1):
+    """Render the reference that errors are told against, with seeds that no rung has.
+
+    Returns its :class:`~reference.rendering.sums.Estimate`, and the means (``groups``, H, W, 3) of
+    its passes in groups, whose number of passes is even.
+    """
+    integrator = ready.reference.integrator
+    renderer = Renderer(ready.scene, integrator, effort.reference_spp, "reference image", size)
+    total, means = Accumulator(), [Mean() for _ in range(groups)]
+    count, stream = 2 * groups * -(-ready.plan.passes // (2 * groups)), Stream.OTHER_SIDE
+    for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
+        total.add(one.images[0])
+        means[one.number % groups].add(one.images[0])
+    return total.estimate(), np.stack([mean.mean() for mean in means])
+
+
+def judged(ready, viewing, effort, seed, progress, size, groups=1):
+    """Return what tells errors at a size of its own, and the means of :func:`converged`."""
+    reference, means = converged(ready, effort, seed, progress, size, groups)
+    return Judge(reference, gbuffer(ready.scene, *size).hit, viewing), means
+
+
+class Judge:
+    """Errors against a converged reference whose own noise is known.
+
+    Parameters
+    ----------
+    reference : reference.rendering.sums.Estimate
+        The reference.
+    counted
+        (H, W): the pixels that count.
+    viewing : comparisons.departure.spaces.Viewing
+        How linear values are looked at.
+    metric : comparisons.departure.metric.Metric
+        Whose mean is the error, ΔE2000 where it is not given.
+    """
+
+    def __init__(self, reference, counted, viewing, metric=LEADING):
+        self.metric = metric
+        self.viewing = viewing
+        self.counted = counted
+        self.reference = reference.mean[counted]
+        self._distances = metric.against(reference.mean, counted, viewing)
+        self.variance = float(np.mean(reference.standard_error[counted] ** 2))
+        """Mean variance of the reference, which a mean squared error holds on top of its own."""
+        self.floor = metric.mean(self._distances(reference.mean + reference.noise))
+        """Error that the reference's noise alone gives."""
+
+    def errors(self, image):
+        """Return the metric's mean, and the linear MSE without the reference's share (may be < 0).
+
+        ``image`` is (H, W, 3).
+        """
+        image = np.asarray(image, float)
+        mse = float(np.mean((image[self.counted] - self.reference) ** 2)) - self.variance
+        return self.metric.mean(self._distances(image)), mse
+
+    def distance(self, pixels):
+        """Return the metric's mean over the counted pixels (N, 3), as if the others were black."""
+        image = np.zeros((*self.counted.shape, 3))
+        image[self.counted] = pixels
+        return self.metric.mean(self._distances(image))

@@ -1,0 +1,51 @@
+"""The prices of effects at a size that is asked for, from those of the study and of half its size.
+
+What an effect removes follows a straight line in ``1 / width``, as errors do, and what it adds to
+the time one in the number of pixels.
+"""
+
+from math import hypot
+
+from comparisons.cost.cost_record import AskedPrice, Prices
+from comparisons.cost.prediction.target import Size
+from comparisons.records import Estimated
+
+
+def at_size(
+    smaller: Prices, larger: Prices, sizes: tuple[Size, Size], target: Size
+) -> tuple[AskedPrice, ...]:
+    """Return the price of each effect at a size.
+
+    Parameters
+    ----------
+    smaller, larger
+        Prices with the same samples per pixel at the two ``sizes``.
+    target
+        The asked width and height.
+    """
+    edges, pixels = (
+        _reach([1 / width for width, _ in (*sizes, target)]),
+        _reach([width * height for width, height in (*sizes, target)]),
+    )
+    return tuple(
+        AskedPrice(
+            effect=after.effect,
+            removes=_continued(before.removes, after.removes, edges, doubt=0.5),
+            adds_s=_continued(before.adds_s, after.adds_s, pixels),
+        )
+        for before, after in zip(smaller.effects, larger.effects, strict=True)
+    )
+
+
+def _reach(places):
+    """Return how far the last place is beyond the second, in steps from the first to that."""
+    first, second, last = places
+    return (last - second) / (second - first)
+
+
+def _continued(before, after, reach, doubt=0.0):
+    """Continue a line through two values, with their intervals and doubt of what it adds."""
+    moved = reach * (after.value - before.value)
+    halves = [(one.high - one.low) / 2 for one in (before, after)]
+    half = hypot(reach * halves[0], (1 + reach) * halves[1], doubt * moved)
+    return Estimated(after.value + moved, after.value + moved - half, after.value + moved + half)

@@ -1,0 +1,172 @@
+"""What docs/accuracy.md shows: studies of cost over many scenes, and what they have in common.
+
+``./run docs --accuracy`` measures, in half an hour on an idle machine, and writes the page.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import median
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+from comparisons.case import Request, open_case
+from comparisons.cost.cost import cost
+from comparisons.cost.cost_record import Cost, Measured
+from comparisons.cost.effort import Effort
+from comparisons.cost.front import ERRORS, cheapest
+from comparisons.cost.rungs import FULL_PLAN, STAND_INS
+from comparisons.gallery.builtin import SCENES
+from reports.terminal.printing import number, parameter, seconds
+from reports.terminal.tables import markdown
+
+LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
+WIDTH = 256
+TOLERANCES = ERRORS[:3]
+
+
+def measured(
+    names: Sequence[str] = (*SCENES, *map(str, LARGER)),
+    width: int = WIDTH,
+    effort: Effort | None = None,
+) -> list[Cost]:
+    """Study what accuracy costs on each scene, in turn."""
+    found = []
+    for name in names:
+        case = open_case(name, Request(resolution=(width, 3 * width // 4)))
+        found.append(cost(case.source, case.options, effort).record)
+        print(name, flush=True)
+    return found
+
+
+def setting(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield where and how it was measured."""
+    first = records[0]
+    width, height = first.resolution
+    yield (
+        f"{len(records)} scenes at {width} by {height} pixels, {first.rounds} rounds, on"
+        f" {first.machine.cores} cores of {first.machine.processor}."
+    )
+
+
+def pictures(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield the charts of the larger scenes, for the page."""
+    for record, file in charts(records):
+        yield f"![Error against time: {record.scene.replace('_', ' ')}]({file})"
+
+
+def charts(records: Sequence[Cost]) -> Iterator[tuple[Cost, str]]:
+    """Yield the studies of the larger scenes, and the file of each chart."""
+    names = {file.stem: f"cost-{file.stem.replace('_', '-')}.svg" for file in LARGER}
+    yield from ((record, names[record.scene]) for record in records if record.scene in names)
+
+
+def methods(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield a row per scene: the kernel, the cheapest way to each error, and the full plan."""
+    head = "Scene", "Textbook", *(f"within {parameter(limit)}" for limit in TOLERANCES), "Full plan"
+    rows = [
+        (
+            record.scene,
+            _cell(_first(record, "Phong kernel")),
+            *(_named(cheapest(record.points, limit)) for limit in TOLERANCES),
+            _cell(_points(record, FULL_PLAN.name)[-1]),
+        )
+        for record in records
+    ]
+    yield from markdown([head, *rows], right=0)
+
+
+def prices(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield each effect's price: where it matters, what it removes and adds there."""
+    worth: dict[str, list[tuple[float, float]]] = {}
+    for record in records:
+        for price in record.prices.effects:
+            if price.removes.low > 0:
+                removed = price.removes.value, price.adds_s.value / record.prices.reference_s
+                worth.setdefault(price.effect, []).append(removed)
+    rows = [
+        (
+            effect,
+            f"{len(found)}",
+            number(median(removed for removed, _ in found)),
+            f"{median(share for _, share in found):.0%}",
+        )
+        for effect, found in sorted(worth.items(), key=lambda row: -len(row[1]))
+    ]
+    head = "Effect", "scenes", "removes, mean ΔE2000", "adds, of the reference's time"
+    yield from markdown([head, *rows], right=1)
+
+
+def findings(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield what the studies have in common, each as an item of a list."""
+    for limit in TOLERANCES:
+        yield f"- {_within(records, limit)}"
+    yield f"- {_worth_most(records)}"
+    yield f"- {_stand_ins(records)}"
+
+
+def _within(records, limit):
+    """Say where a kernel is enough for an error, and what it saves."""
+    enough, saved = [], []
+    for record in records:
+        chosen = cheapest(record.points, limit)
+        full = cheapest(_points(record, FULL_PLAN.name), limit)
+        if chosen and _family(record, chosen.rung) == "kernel":
+            enough.append(record.scene)
+            if full:
+                saved.append(full.seconds.median / chosen.seconds.median)
+    said = (
+        f"Within a mean ΔE2000 of {parameter(limit)}, a kernel without paths is the cheapest way in"
+        f" {len(enough)} of {len(records)} scenes"
+    )
+    return f"{said}: {median(saved):.2g} times as fast as the full plan." if saved else f"{said}."
+
+
+def _worth_most(records):
+    """Say which effect has most of the departure, in how many scenes."""
+    first = Counter()
+    for record in records:
+        sure = [price for price in record.prices.effects if price.removes.low > 0]
+        if sure:
+            first[max(sure, key=lambda price: price.removes.value).effect] += 1
+    if not first:
+        return "No effect surely removes anything."
+    ranked = ", then ".join(f"{effect} ({count})" for effect, count in first.most_common(3))
+    return f"The effect worth most, by the number of scenes: {ranked}."
+
+
+def _stand_ins(records):
+    """Say which stand-ins earn their place on a front."""
+    names = [rung.name for rung in STAND_INS]
+    on_front = Counter(
+        name
+        for record in records
+        for name in {point.rung for point in record.points if point.pareto}.intersection(names)
+    )
+    never = [name for name in names if not on_front[name]]
+    said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
+    left = f" Never: {'; '.join(never)}." if never else ""
+    return f"Stand-ins on the Pareto front, by the number of scenes: {said}.{left}"
+
+
+def _points(record: Cost, name: str) -> tuple[Measured, ...]:
+    """Return the points of a method, also where a scene cannot tell it from another."""
+    return record.points_of(next(rung.name for rung in record.rungs if name in rung.names))
+
+
+def _first(record, name):
+    return _points(record, name)[0]
+
+
+def _family(record, name):
+    return next(rung.family for rung in record.rungs if rung.name == name)
+
+
+def _cell(point):
+    time = point.seconds
+    interval = f"{seconds(time.low)} to {seconds(time.high)}"
+    return f"{number(point.error)} in {seconds(time.median)} ({interval})"
+
+
+def _named(point):
+    return f"{point.rung}, {point.spp} spp: {_cell(point)}" if point else "none"
