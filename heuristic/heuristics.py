@@ -211,7 +211,7 @@ class Heuristic:
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
-"""All heuristics by name."""
+"""All heuristics, under their names."""
 
 declare = HEURISTICS.declare
 """Make a heuristic known by its name, in this process, and return it."""

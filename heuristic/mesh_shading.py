@@ -89,11 +89,11 @@ def shade_mesh(
     Parameters
     ----------
     mesh, interpolation
-        As of :func:`shading_points`.
+        See :func:`shading_points`.
     viewer
         ``P_V``: three numbers, or a Dr.Jit point. What is stored is what is seen from there.
     material, lights, ambient, visible
-        As of :func:`heuristic.shade`; Dr.Jit values hold one entry, or one a vertex or face.
+        See :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
     twosided
         Store the values of the back, with reversed normals, beside those of the front.
     model : callable
@@ -156,7 +156,7 @@ class MeshCorners:
     """
 
     def __init__(self, scene):
-        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face is that of no mesh
+        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face belongs to no mesh
         for shape in scene.shapes():
             if shape.is_mesh():
                 starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count

@@ -15,6 +15,7 @@ import pytest
 from heuristic import plugins
 from reference.rendering import direct
 from reports import jobs
+from reports.commands.compare import compare
 from tests import small_baselines
 from tests.small_scene import SCENE
 
@@ -45,6 +46,13 @@ def spectral():
 def in_this_process(monkeypatch):
     """Let commands render in this process, which has loaded all that they need."""
     monkeypatch.setattr(jobs, "IN_PROCESSES", False)
+
+
+@pytest.fixture(autouse=True)
+def no_causes(monkeypatch):
+    """Let `compare` leave out the causes, nine tenths of a small run; `--why` asks for them."""
+    option = next(option for option in compare.params if option.name == "with_cost")
+    monkeypatch.setattr(option, "default", False)
 
 
 @pytest.fixture
@@ -141,4 +149,5 @@ def _clean_up():
     dr.set_flag(dr.JitFlag.KernelHistory, False)
     dr.kernel_history_clear()
     gc.collect()
+    gc.freeze()  # what is left stays, and the next collection need not look at it
     dr.flush_malloc_cache()

@@ -226,7 +226,8 @@ def test_scenes_lists_every_figure(run):
 
 
 def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
-    words = [sys.executable, "-m", "reports", "compare", scene_file, "-o", "out", "--spp", "2"]
+    words = [sys.executable, "-m", "reports", "compare", scene_file, "-o", "out"]
+    words += ["--spp", "2", "--no-why"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

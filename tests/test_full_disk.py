@@ -189,7 +189,7 @@ def limited(size, *words):
 def test_a_limit_on_the_size_of_files_is_told_and_tears_nothing(run, scene_file, tmp_path):
     """The page is the largest file: the scene is whole, and `run.json` is written."""
     out = tmp_path / "out"
-    words = ("compare", scene_file, "-o", out, "--spp", 2)
+    words = ("compare", scene_file, "-o", out, "--spp", 2, "--no-why")
     refused = limited(100, *words)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert not any("fotismos-partial" in path.name for path in out.rglob("*"))

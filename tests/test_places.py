@@ -226,6 +226,7 @@ def test_a_folder_whose_name_is_not_in_utf8_is_written_to(scene_file):
             "-q",
             "-o",
             out,
+            "--no-why",
             *map(str, SMALL),
         ],
         cwd=scene_file.parent,

@@ -80,7 +80,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     passes
         Independent passes.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def check(source, options, before, level=LEVEL, progress=None):
     Parameters
     ----------
     source, options, progress
-        As of :func:`measure_scene`; ``options`` are those of the baseline. With its seed, what did
+        See :func:`measure_scene`; ``options`` are the baseline's. With its seed, what did
         not change gives the same images on the same machine; with another one the test holds, too.
     before : Measurement
         The baseline's; metrics that it does not know are not tested.

@@ -133,7 +133,7 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
     viewing
         How linear values are looked at.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
     """
     loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)

@@ -121,7 +121,7 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
 
     Where neither side has any spread, the largest difference comes first.
     """
-    found = [move for move in moves if not move.p_corrected >= level]  # a NaN is no pass
+    found = [move for move in moves if not move.p_corrected >= level]  # a NaN does not pass
     return sorted(found, key=_order)
 
 

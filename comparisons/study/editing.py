@@ -185,7 +185,7 @@ def _set(graph, path, value):
         )
     props = graph.props(found[0])
     if not _is_number(props[key]):
-        raise InputError(f"{graph.name}: {path} is no number, and cannot be varied yet.")
+        raise InputError(f"{graph.name}: {path} is not a number, and cannot be varied yet.")
     is_colour = isinstance(props[key], COLOURS)
     props[key] = mi.ScalarColor3f(value) if is_colour else value
 

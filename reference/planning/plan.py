@@ -107,7 +107,7 @@ class Plan:
 
     @property
     def simulated(self) -> tuple:
-        """What tells its integrator from that of another plan for the same scene."""
+        """What tells its integrator from another plan's for the same scene."""
         own = (self.shadows, self.bsdf_samples, self.tabulate_environment, self.light_samples)
         if self.integrator != "direct_all":
             own = (self.rr_depth,)
@@ -256,7 +256,7 @@ def _holds(made: Plan, rule: Pruning) -> bool:
 def _stock(pair: Pair) -> str:
     """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media.
 
-    ``direct`` is no ``path`` of depth 2: that loses light at masks.
+    ``direct`` is not a ``path`` of depth 2: that one loses light at masks.
     """
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator

@@ -154,7 +154,7 @@ class Graph:
         return [index for index in self.nodes_in_use() if self.kind(index) == kind]
 
     def kind(self, index):
-        """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
+        """Return the kind of a node; Mitsuba does not know it of plugins written in Python."""
         kind = self.state.nodes[index].type
         if kind != mi.ObjectType.Unknown:
             return kind
@@ -164,7 +164,7 @@ class Graph:
         return self.kinds[plugin]
 
     def _kind_of_object(self, index):
-        """Return the kind of a user's own plugin: that of the object that it makes."""
+        """Return the kind of a user's own plugin: the kind of the object that it makes."""
         made = self.instantiate(index)
         for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
             if isinstance(made, getattr(mi, kind)):

@@ -179,7 +179,7 @@ def _note_sampler(graph, sensor, overridden):
     """Record the scene's own samples, which those of the plan replace."""
     for _, index in graph.children(sensor, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
-        given = f"{graph.plugin(index)}, {count} samples a pixel"
+        given = f"{graph.plugin(index)}, {count} samples per pixel"
         overridden.append(Overridden("sampler", given, "sampler and samples of the plan"))
 
 
