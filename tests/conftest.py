@@ -48,11 +48,21 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(jobs, "IN_PROCESSES", False)
 
 
+WHY = next(option for option in compare.params if option.name == "with_cost")
+"""Whether `compare` finds causes, which takes nine tenths of a small run."""
+BY_DEFAULT = WHY.default
+
+
 @pytest.fixture(autouse=True)
 def no_causes(monkeypatch):
-    """Let `compare` leave out the causes, nine tenths of a small run; `--why` asks for them."""
-    option = next(option for option in compare.params if option.name == "with_cost")
-    monkeypatch.setattr(option, "default", False)
+    """Let `compare` leave out the causes unless `--why` is given."""
+    monkeypatch.setattr(WHY, "default", False)
+
+
+@pytest.fixture
+def causes(monkeypatch, no_causes):
+    """Let `compare` find causes by default, as it does for its users."""
+    monkeypatch.setattr(WHY, "default", BY_DEFAULT)
 
 
 @pytest.fixture
