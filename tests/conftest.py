@@ -71,6 +71,13 @@ def apart(monkeypatch, in_this_process):
     monkeypatch.setattr(jobs, "IN_PROCESSES", True)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def frozen():
+    """Let collections skip what outlives a file of tests: modules, and half a million objects."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture
 def run(monkeypatch, capsys):
     """Run the command line, all in this process; returns exit code, output and messages."""
@@ -159,5 +166,4 @@ def _clean_up():
     dr.set_flag(dr.JitFlag.KernelHistory, False)
     dr.kernel_history_clear()
     gc.collect()
-    gc.freeze()  # what is left stays, and the next collection need not look at it
     dr.flush_malloc_cache()
