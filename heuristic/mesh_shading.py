@@ -169,7 +169,7 @@ class MeshCorners:
         )
 
     def at(self, si, active=True):
-        """Return three pairs of a weight and an interaction, one a vertex of the face hit.
+        """Return three pairs of a weight and an interaction, one per vertex of the face hit.
 
         The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
         :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are no
@@ -194,7 +194,7 @@ class MeshCorners:
 
 
 def _corner_arrays(mesh):
-    """Return positions, normals and texture coordinates, three entries a face."""
+    """Return positions, normals and texture coordinates, three entries per face."""
     if mesh is None:
         return dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Point2f, 3)
     if mesh.has_face_normals():

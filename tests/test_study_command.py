@@ -50,7 +50,7 @@ def test_study_writes_dataset_figures_and_findings(run, file, tmp_path):
     assert str(page) in printed
     code, printed, _ = run("study", file, "-o", out)
     assert code == 0
-    assert "4 points were at hand" in printed
+    assert "4 points were cached" in printed
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_
             "study", file, "-o", tmp_path / "out", "--scheduler", dask_cluster.start(processes)
         )
         assert code == 0, messages
-        assert f"{len(done)} points were at hand" in printed
+        assert f"{len(done)} points were cached" in printed
         assert all(path.stat().st_mtime_ns == when for path, when in done.items())
         assert dataset.read(tmp_path / "out/study/small/small.parquet").num_rows == 16
     finally:

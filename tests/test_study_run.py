@@ -117,7 +117,7 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, mon
 
     outcome = running.run(wanted, tmp_path / "cut", noted)
     assert len(done) == 8 - 3 + 1  # the one whose file is damaged is done again
-    assert (outcome.done, outcome.at_hand, outcome.failed) == (6, 2, 0)
+    assert (outcome.done, outcome.cached, outcome.failed) == (6, 2, 0)
     assert outcome.table.equals(whole.table)
     assert running.run(wanted, tmp_path / "cut").done == 0
 
@@ -158,7 +158,7 @@ def test_processes_give_the_same_and_a_dead_one_ends_the_run(rgb, tmp_path, monk
     with pytest.raises(LostProcessError, match="run the same command again"):
         running.run(wanted, tmp_path / "b", ending_processes(signal.SIGABRT))
     outcome = running.run(wanted, tmp_path / "b")
-    assert outcome.at_hand >= 3
+    assert outcome.cached >= 3
     assert 0 < outcome.done <= 11
     assert outcome.table.equals(alone.table)
     killed = running.run(wanted, tmp_path / "c", ending_processes(signal.SIGKILL))
@@ -194,7 +194,7 @@ def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
     assert outcome.table["dE2000"].to_pylist()[1] is None
     assert outcome.table["alpha"].to_pylist() == [0.1, 0.2, 0.3]
     again = running.run(wanted, tmp_path)
-    assert (again.done, again.at_hand, again.failed) == (1, 2, 0)
+    assert (again.done, again.cached, again.failed) == (1, 2, 0)
 
 
 def test_the_dataset_says_units_meanings_and_where_it_comes_from(rgb, tmp_path):

@@ -76,7 +76,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     source : reference.scene.source.Source
         The scene.
     options : comparisons.options.Options
-        What is rendered; ``spp`` is over all passes, and the plan's where it is not given.
+        What is rendered; ``spp`` is over all passes, and the plan's if omitted.
     passes
         Independent passes.
     progress

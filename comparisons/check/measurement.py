@@ -1,4 +1,4 @@
-"""What a check measures of a scene: the departure and regional colours, each with its doubt.
+"""What a check measures of a scene: the departure and regional colours, each with its uncertainty.
 
 Both halves are rendered in independent passes, as a comparison does. The spread of passes is the
 only source of the standard errors here, so that they hold whatever noise a scene has.

@@ -153,7 +153,7 @@ def parse(text, name="study", folder=Path()):
     parts = tuple(_part(part, folder) for part in parts)
     names = [part.name for part in parts]
     if len(set(names)) < len(names):
-        raise InputError(f"parts are called {', '.join(names)}: give each a name of its own.")
+        raise InputError(f"parts are called {', '.join(names)}: give each its own name.")
     return Study(name, table.get("title", name), parts, text, tuple(table.get("figure", ())))
 
 

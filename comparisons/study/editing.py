@@ -61,7 +61,7 @@ class Kept:
         self._kept = None
 
     def scene(self, graph):
-        """Return a Mitsuba scene of a graph: the one at hand, edited, or a new one."""
+        """Return a Mitsuba scene of a graph: the cached one, edited, or a new one."""
         if self._kept is not None:
             edits = self._edits_of(graph)
             if edits is not None:

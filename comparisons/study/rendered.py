@@ -118,7 +118,7 @@ def _opened(scene, identity):
 
 @lru_cache(maxsize=4)
 def _kept(scene, identity):
-    """Return the scenes at hand of both halves, for all points of a scene in this process."""
+    """Return the cached scenes of both halves, for all points of a scene in this process."""
     return Kept(), Kept()
 
 

@@ -1,4 +1,4 @@
-"""Indices of refraction at which rough plastics have wanted albedos at normal incidence."""
+"""Indices of refraction at which rough plastics have given albedos at normal incidence."""
 
 from collections.abc import Sequence
 from dataclasses import replace

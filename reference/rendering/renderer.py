@@ -162,8 +162,8 @@ class Renderer:
         if width * height * self.spp > LARGEST_PASS:
             raise InputError(
                 f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once are"
-                f" too many: {LARGEST_PASS} samples a pass are allowed. Give fewer with --spp, or a"
-                " smaller image with --resolution."
+                f" too many: {LARGEST_PASS} samples per pass are allowed. Give fewer with --spp, or"
+                " a smaller image with --resolution."
             )
 
     def pass_times(self):

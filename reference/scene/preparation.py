@@ -37,7 +37,7 @@ class Settings:
     """What the scene's own integrator asks for.
 
     ``integrator`` is its plugin, None where the scene has none; ``max_depth`` counts as Mitsuba's,
-    -1 for no limit; ``rr_depth`` is None where it is not given.
+    -1 for no limit; ``rr_depth`` is None if omitted.
     """
 
     integrator: str | None = None
@@ -95,7 +95,7 @@ def film_size(graph, sensor=0):
 
 
 def _size(film):
-    """Return a film's width and height, or what Mitsuba takes where they are not given."""
+    """Return a film's width and height, or Mitsuba's defaults if omitted."""
     sides = zip(("width", "height"), allowed.FILM, strict=True)
     return tuple(int(film.get(side, usual)) for side, usual in sides)
 
