@@ -26,9 +26,8 @@ import OpenEXR
 import pyarrow.parquet
 from PIL import Image
 
+from tests.programs import ROOT
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 SIZE = ("--resolution", "48x48")
 SCENES = {"a": SCENE, "b": SCENE.replace("0.2, 0.3, 0.5", "0.5, 0.3, 0.2")}

@@ -8,17 +8,15 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 from random import Random
 
 import jsonschema
 import pytest
 
 from tests.interruptions import results
+from tests.programs import ROOT
 from tests.schemas import schema
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 ABORTS = """
 import os, signal

@@ -1,11 +1,11 @@
 """Imports point one way: heuristic ← reference ← comparisons ← reports."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.programs import ROOT
+
 ROOMS = ["heuristic", "reference", "comparisons", "reports"]
 
 

@@ -8,15 +8,14 @@ import subprocess
 import sys
 import time
 import tomllib
-from pathlib import Path
 
 import pytest
 
 from comparisons.processes import cluster
 from comparisons.study import dataset
 from tests import dask_cluster
+from tests.programs import ROOT
 
-ROOT = Path(__file__).parent.parent
 STUDY = """title = "A small study"
 [[part]]
 name = "lobe"
