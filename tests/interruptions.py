@@ -73,6 +73,8 @@ class Command:
 COMMANDS = {
     "compare": Command(lambda own, out: ["compare", own / "a.xml", own / "b.xml", "-o", out, *SIZE,
                                          "--spp", 16]),
+    "compare without causes": Command(lambda own, out: [*COMMANDS["compare"].words(own, out),
+                                                        "--no-why"]),
     "report": Command(lambda own, out: ["report", "-o", out, *SIZE, "--spp", 16], module=False),
     "cost": Command(lambda own, out: ["cost", own / "a.xml", "-o", out, *SIZE, "--rounds", 2,
                                       "--spp", 8]),

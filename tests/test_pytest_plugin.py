@@ -6,8 +6,7 @@ import sys
 
 import pytest
 
-from tests.programs import python
-from tests.programs import ROOT
+from tests.programs import ROOT, python
 
 SCENE = """<scene version="3.0.0">
   <sensor type="perspective">
