@@ -69,11 +69,11 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
     assert {p: p.read_bytes() for p in (tmp_path / "out/a").iterdir()} == files
     again = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert page.count("data:image/png") == again.count("data:image/png") > 4
-    for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",)):
+    for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",), ("--why",)):
         assert run(*words, *other)[0] == 130
     (folder / "a.xml").write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"))
     assert run(*words)[0] == 130
-    assert rendered == ["a"] * 5
+    assert rendered == ["a"] * 6
 
 
 def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
@@ -105,10 +105,11 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
         return written[-1][1]
 
     monkeypatch.setattr(output, "write_scene", spy)
-    run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)
+    run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4, "--why")
     (key, view), place = written[0], tmp_path / "out/a"
     found = finished.load(place, key)
     assert found == view
+    assert found.cost
     assert finished.load(place, key + "x") is None
     text = (place / "view.json").read_text(encoding="utf-8")
     for broken in ("", "[]", "{}", text[:-20], text.replace('"planes"', '"plains"')):
