@@ -220,23 +220,6 @@ def _start(folder, out):
     )
 
 
-def _results(out):
-    """Return all that a batch wrote of its scenes but times and what is derived from them."""
-    found = {}
-    for path in sorted(out.glob("?/*")):
-        if path.suffix == ".json":
-            record = json.loads(path.read_text(encoding="utf-8"))
-            record = record.get("content", record)
-            record = record.get("view", record)
-            record = record.get("record", record)
-            found[path.relative_to(out)] = {
-                key: value for key, value in record.items() if key != "time"
-            }
-        else:
-            found[path.relative_to(out)] = path.read_bytes()
-    return found
-
-
 def _kill(folder, tmp_path, kills, moment):
     """Kill a batch so many times, and let it end: its results are those of a whole one.
 
@@ -267,7 +250,7 @@ def _kill(folder, tmp_path, kills, moment):
     assert last.communicate(timeout=300)[1] == ""
     assert last.returncode == 0
     assert all(path.read_bytes() == content for path, content in kept.items())
-    assert _results(out) == _results(tmp_path / "whole")
+    assert results(out) == results(tmp_path / "whole")
     wanted, found = (sorted(p.name for p in (tmp_path / n).iterdir()) for n in ("whole", "killed"))
     assert found == wanted
     return kept
