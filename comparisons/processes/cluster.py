@@ -149,6 +149,7 @@ def local(workers: int, prepare: Prepare = tuple) -> Iterator[Cluster]:
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # a free port for what stays of it
             silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,
