@@ -156,7 +156,7 @@ class MeshCorners:
     """
 
     def __init__(self, scene):
-        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face belongs to no mesh
+        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face is that of no mesh
         for shape in scene.shapes():
             if shape.is_mesh():
                 starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
@@ -169,7 +169,7 @@ class MeshCorners:
         )
 
     def at(self, si, active=True):
-        """Return three pairs of a weight and an interaction, one per vertex of the face hit.
+        """Return three pairs of a weight and an interaction, one a vertex of the face hit.
 
         The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
         :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are no

@@ -229,7 +229,7 @@ def add(total, lost, term):
 
 
 def summed(total, lost):
-    """Return ``total + lost``; what was lost of a sum beyond the type's range is not a number."""
+    """Return ``total + lost``; what was lost of a sum beyond the type's range is no number."""
     return total + dr.select(dr.isfinite(lost), lost, 0)
 
 

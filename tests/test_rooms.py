@@ -1,11 +1,11 @@
 """Imports point one way: heuristic ← reference ← comparisons ← reports."""
 
 import ast
+from pathlib import Path
 
 import pytest
 
-from tests.programs import ROOT
-
+ROOT = Path(__file__).parents[1]
 ROOMS = ["heuristic", "reference", "comparisons", "reports"]
 
 

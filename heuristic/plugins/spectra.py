@@ -9,7 +9,7 @@ from heuristic import colours
 
 
 def coefficient(props, name):
-    """Read a reflection coefficient, 0 if omitted.
+    """Read a reflection coefficient, 0 where it is not given.
 
     Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same
     RGB; above 1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.

@@ -107,7 +107,7 @@ class Plan:
 
     @property
     def simulated(self) -> tuple:
-        """What tells its integrator from another plan's for the same scene."""
+        """What tells its integrator from that of another plan for the same scene."""
         own = (self.shadows, self.bsdf_samples, self.tabulate_environment, self.light_samples)
         if self.integrator != "direct_all":
             own = (self.rr_depth,)

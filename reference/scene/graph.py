@@ -154,7 +154,7 @@ class Graph:
         return [index for index in self.nodes_in_use() if self.kind(index) == kind]
 
     def kind(self, index):
-        """Return the kind of a node; Mitsuba does not know it of plugins written in Python."""
+        """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
         kind = self.state.nodes[index].type
         if kind != mi.ObjectType.Unknown:
             return kind

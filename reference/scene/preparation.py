@@ -95,7 +95,7 @@ def film_size(graph, sensor=0):
 
 
 def _size(film):
-    """Return a film's width and height, or Mitsuba's defaults if omitted."""
+    """Return a film's width and height, or what Mitsuba takes where they are not given."""
     sides = zip(("width", "height"), allowed.FILM, strict=True)
     return tuple(int(film.get(side, usual)) for side, usual in sides)
 

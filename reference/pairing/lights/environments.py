@@ -86,6 +86,10 @@ def _ambient_ratio(graph: Graph) -> tuple[tuple[float, ...], bool]:
     return tuple(ratio), exact
 
 
+def _sky(light: Given) -> object:
+    return measured.mean_radiance(light.graph, _only(light, "sun_scale"))
+
+
 def _daylight(light: Given) -> PairedEmitter:
     sun = measured.irradiance(light.graph, _only(light, "sky_scale"))
     note = measured.MEAN
@@ -111,6 +115,6 @@ def _only(light: Given, off: str) -> mi.Emitter:
 DAYLIGHT = LightKind(
     plugins=("sunsky", "timed_sunsky"),
     to_heuristic=_daylight,
-    ambient=lambda light: measured.mean_radiance(light.graph, _only(light, "sun_scale")),
+    ambient=_sky,
     surrounds=True,
 )
