@@ -91,7 +91,7 @@ def visibility(given: Any) -> Callable[[Any, Any], Any] | None:
 
 
 def require_one_size(values: Mapping[str, Any]) -> None:
-    """Refuse Dr.Jit arrays, by name, of different numbers of points; one point fits any number.
+    """Reject named Dr.Jit arrays of different numbers of points; one point fits any number.
 
     Raises
     ------

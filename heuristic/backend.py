@@ -125,7 +125,7 @@ def inspect() -> LLVMInfo:
     """Say which LLVM Dr.Jit uses, usable or not."""
     source, path = _chosen()
     note = _TOO_EARLY if _imported_too_early else ""
-    # Dr.Jit would print lines of its own about a path that does not exist.
+    # Dr.Jit would print its own lines about a path that does not exist.
     if path is not None and len(path.parts) > 1 and not path.is_file():
         return LLVMInfo(None, path, source, note)
     version = _version()

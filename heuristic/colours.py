@@ -20,7 +20,7 @@ def checked(name: str, value: Any) -> Any:
     Raises
     ------
     InputError
-        For a negative, infinite or NaN value, or one that is no number.
+        For a negative, infinite or NaN value, or one that is not a number.
     """
     if dr.is_array_v(value) and dr.is_jit_v(value):
         return value

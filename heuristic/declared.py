@@ -1,4 +1,4 @@
-"""Declarations by name: the package's own, a program's, and those of installed packages."""
+"""Named declarations: the package's own, a program's, and those of installed packages."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -21,7 +21,7 @@ Declaration = TypeVar("Declaration", bound=Named)
 
 
 class Declared(Mapping[str, Declaration], Generic[Declaration]):
-    """All declarations of one kind by name, the package's own first.
+    """All named declarations of one kind, the package's own first.
 
     Parameters
     ----------

@@ -93,9 +93,9 @@ class Heuristic:
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
         each point: no Python ``if`` on arrays, but ``drjit.select``.
     label
-        For people; the name where it is not given.
+        For people; the name if omitted.
     needs
-        Which of :data:`INPUTS` it reads: all but ``visible`` where it is not given. One that needs
+        Which of :data:`INPUTS` it reads: all but ``visible`` if omitted. One that needs
         ``visible`` casts its shadows itself; for others the integrator may (``occlusion``).
     parameters
         Numbers that it can be tuned by.
@@ -211,7 +211,7 @@ class Heuristic:
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
-"""All heuristics by name."""
+"""All heuristics, under their names."""
 
 declare = HEURISTICS.declare
 """Make a heuristic known by its name, in this process, and return it."""

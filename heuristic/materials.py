@@ -87,7 +87,7 @@ class PairedMaterial(Material):
     Parameters
     ----------
     base_color
-        Reflectance of the diffuse base, 0..1; of metals, that of the surface at normal incidence.
+        Reflectance of the diffuse base, 0..1; of metals, of the surface at normal incidence.
     alpha
         Root mean square slope of the microfacets, as of Beckmann's distribution and GGX: the square
         of what engines call roughness. 1e-4 to 1; 1 for a surface without an interface.

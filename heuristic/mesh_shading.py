@@ -94,11 +94,11 @@ def shade_mesh(
     Parameters
     ----------
     mesh, interpolation
-        As of :func:`shading_points`.
+        See :func:`shading_points`.
     viewer
         ``P_V``: three numbers, or a Dr.Jit point. What is stored is what is seen from there.
     material, lights, ambient, visible
-        As of :func:`heuristic.shade`; Dr.Jit values hold one entry, or one a vertex or face.
+        See :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
     twosided
         Store the values of the back, with reversed normals, beside those of the front.
     model : callable
@@ -205,7 +205,7 @@ class MeshCorners:
 
 
 def _corner_arrays(mesh):
-    """Return positions, normals and texture coordinates, three entries a face."""
+    """Return positions, normals and texture coordinates, three entries per face."""
     if mesh is None:
         return dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Point2f, 3)
     if mesh.has_face_normals():

@@ -76,7 +76,7 @@ class Point:
     Attributes
     ----------
     parameters
-        The heuristic's parameters by name, as attributes.
+        The heuristic's parameters, as attributes.
     prepared
         What the heuristic's ``prepare`` returned for the scene; None without it.
     wavelengths
@@ -141,7 +141,7 @@ class Point:
     def textbook(self, **instead: Any) -> Array:
         """Return the chapters' model at the points, :func:`heuristic.shade`.
 
-        Arguments by name stand in place of those that are given there, such as ``ambient=0``.
+        Named arguments replace those given there, such as ``ambient=0``.
         """
         return shading.shade(*self.given._replace(**instead))
 

@@ -33,7 +33,7 @@ def opened(word: str) -> Heuristic:
     Raises
     ------
     InputError
-        When there is no such file or function, or its code fails: by its line.
+        When there is no such file or function, or its code fails: naming its line.
     """
     file, function = in_file(word) or (word, "")
     path, function = Path(file), function or FUNCTION
@@ -60,7 +60,7 @@ def _read(word: str, path: Path, function: str) -> tuple[Heuristic, frozenset[Pa
 
 
 def _run(path: Path) -> dict[str, Any]:
-    """Return what a file defines, by name."""
+    """Return what a file defines, under its names."""
     try:
         return runpy.run_path(str(path.resolve()), run_name=MODULE)
     except (Exception, SystemExit) as error:  # whatever a user's own code raises

@@ -2,7 +2,7 @@
 
 A vertex has no normal of its own; it gets the mean of those of the faces around it, in one of three
 weightings. All take the mesh as Dr.Jit arrays: ``positions`` with three floats of any type a
-vertex, ``faces`` with three vertex numbers a face, of a type such as ``Array3u``. They return one
+vertex, ``faces`` with three vertex numbers per face, of a type such as ``Array3u``. They return one
 vector a vertex, and share these rules:
 
 - A face without area contributes nothing.

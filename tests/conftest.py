@@ -15,6 +15,7 @@ import pytest
 from heuristic import plugins
 from reference.rendering import direct
 from reports import jobs
+from reports.commands.compare import compare
 from tests import small_baselines
 from tests.small_scene import SCENE
 
@@ -47,10 +48,34 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(jobs, "IN_PROCESSES", False)
 
 
+WHY = next(option for option in compare.params if option.name == "with_cost")
+"""Whether `compare` finds causes, which takes nine tenths of a small run."""
+BY_DEFAULT = WHY.default
+
+
+@pytest.fixture(autouse=True)
+def no_causes(monkeypatch):
+    """Let `compare` leave out the causes unless `--why` is given."""
+    monkeypatch.setattr(WHY, "default", False)
+
+
+@pytest.fixture
+def causes(monkeypatch, no_causes):
+    """Let `compare` find causes by default, as it does for its users."""
+    monkeypatch.setattr(WHY, "default", BY_DEFAULT)
+
+
 @pytest.fixture
 def apart(monkeypatch, in_this_process):
     """Let commands render in a process apart, as they do for their users."""
     monkeypatch.setattr(jobs, "IN_PROCESSES", True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def frozen():
+    """Let collections skip what outlives a file of tests: modules, and half a million objects."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

@@ -5,9 +5,8 @@ import socket
 import subprocess
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from tests.programs import ROOT
 
 
 def start(processes):

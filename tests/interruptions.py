@@ -26,9 +26,8 @@ import OpenEXR
 import pyarrow.parquet
 from PIL import Image
 
+from tests.programs import ROOT
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 SIZE = ("--resolution", "48x48")
 SCENES = {"a": SCENE, "b": SCENE.replace("0.2, 0.3, 0.5", "0.5, 0.3, 0.2")}
@@ -74,6 +73,8 @@ class Command:
 COMMANDS = {
     "compare": Command(lambda own, out: ["compare", own / "a.xml", own / "b.xml", "-o", out, *SIZE,
                                          "--spp", 16]),
+    "compare without causes": Command(lambda own, out: [*COMMANDS["compare"].words(own, out),
+                                                        "--no-why"]),
     "report": Command(lambda own, out: ["report", "-o", out, *SIZE, "--spp", 16], module=False),
     "cost": Command(lambda own, out: ["cost", own / "a.xml", "-o", out, *SIZE, "--rounds", 2,
                                       "--spp", 8]),

@@ -16,8 +16,8 @@ import pytest
 
 from heuristic import backend
 from heuristic.errors import InstallationError
+from tests.programs import ROOT, python
 
-ROOT = Path(__file__).parents[1]
 REQUIREMENTS = ["requirements.txt", "requirements-test.txt"]
 
 # Prints what `check` says, after a line that may stand in for a machine other than this one.
@@ -200,9 +200,7 @@ print(mi.Bitmap(sys.argv[1]).size())
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to have a single core")
 def test_images_are_written_and_read_on_a_machine_of_one_core(tmp_path):
-    command = [sys.executable, "-c", IMAGES, tmp_path / "image.exr"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    done = python("-c", IMAGES, tmp_path / "image.exr")
     assert "64, 64" in done.stdout, done.stderr
 
 

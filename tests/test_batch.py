@@ -8,17 +8,15 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 from random import Random
 
 import jsonschema
 import pytest
 
 from tests.interruptions import results
+from tests.programs import ROOT
 from tests.schemas import schema
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 ABORTS = """
 import os, signal
@@ -71,11 +69,11 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
     assert {p: p.read_bytes() for p in (tmp_path / "out/a").iterdir()} == files
     again = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert page.count("data:image/png") == again.count("data:image/png") > 4
-    for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",)):
+    for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",), ("--why",)):
         assert run(*words, *other)[0] == 130
     (folder / "a.xml").write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"))
     assert run(*words)[0] == 130
-    assert rendered == ["a"] * 5
+    assert rendered == ["a"] * 6
 
 
 def test_the_key_follows_the_content_of_files_beside_the_scene(rgb, tmp_path):
@@ -107,10 +105,11 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
         return written[-1][1]
 
     monkeypatch.setattr(output, "write_scene", spy)
-    run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)
+    run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4, "--why")
     (key, view), place = written[0], tmp_path / "out/a"
     found = finished.load(place, key)
     assert found == view
+    assert found.cost
     assert finished.load(place, key + "x") is None
     text = (place / "view.json").read_text(encoding="utf-8")
     for broken in ("", "[]", "{}", text[:-20], text.replace('"planes"', '"plains"')):
@@ -221,23 +220,6 @@ def _start(folder, out):
     )
 
 
-def _results(out):
-    """Return all that a batch wrote of its scenes but times and what is derived from them."""
-    found = {}
-    for path in sorted(out.glob("?/*")):
-        if path.suffix == ".json":
-            record = json.loads(path.read_text(encoding="utf-8"))
-            record = record.get("content", record)
-            record = record.get("view", record)
-            record = record.get("record", record)
-            found[path.relative_to(out)] = {
-                key: value for key, value in record.items() if key != "time"
-            }
-        else:
-            found[path.relative_to(out)] = path.read_bytes()
-    return found
-
-
 def _kill(folder, tmp_path, kills, moment):
     """Kill a batch so many times, and let it end: its results are those of a whole one.
 
@@ -268,7 +250,7 @@ def _kill(folder, tmp_path, kills, moment):
     assert last.communicate(timeout=300)[1] == ""
     assert last.returncode == 0
     assert all(path.read_bytes() == content for path, content in kept.items())
-    assert _results(out) == _results(tmp_path / "whole")
+    assert results(out) == results(tmp_path / "whole")
     wanted, found = (sorted(p.name for p in (tmp_path / n).iterdir()) for n in ("whole", "killed"))
     assert found == wanted
     return kept

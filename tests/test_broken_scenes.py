@@ -357,7 +357,7 @@ def test_options_beyond_their_bounds_are_refused(words, message):
 
 def test_a_pass_is_bounded_however_it_is_asked_for(rgb, tmp_path):
     case = case_of(tmp_path, SCENE, spp=LARGEST_SPP, resolution=(2000, 1000))
-    with pytest.raises(InputError, match=f"{LARGEST_PASS} samples a pass"):
+    with pytest.raises(InputError, match=f"{LARGEST_PASS} samples per pass"):
         measure_scene(case.source, case.options)
 
 

@@ -12,10 +12,9 @@ import jsonschema
 import pytest
 
 from reports import cli
+from tests.programs import python
 from tests.schemas import schema
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parent.parent
 
 
 def test_compare_writes_what_the_contract_names(run, scene_file, tmp_path):
@@ -226,9 +225,8 @@ def test_scenes_lists_every_figure(run):
 
 
 def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
-    words = [sys.executable, "-m", "reports", "compare", scene_file, "-o", "out", "--spp", "2"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    words = ("compare", scene_file, "-o", "out", "--spp", 2, "--no-why")
+    done = python("-m", "reports", *words, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out/index.html").is_file()
 

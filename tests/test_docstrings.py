@@ -3,7 +3,6 @@
 import doctest
 import importlib
 import inspect
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,8 @@ import heuristic
 from comparisons.departure import metrics
 from heuristic import terms
 from reference.pairing import factors
+from tests.programs import ROOT
 
-ROOT = Path(__file__).parent.parent
 ROOMS = ("heuristic", "reference", "comparisons", "reports")
 
 

@@ -3,7 +3,6 @@
 import importlib.util
 import re
 import shlex
-from pathlib import Path
 from urllib.parse import unquote
 
 import click
@@ -13,9 +12,9 @@ from markdown_it import MarkdownIt
 from nbclient import NotebookClient
 
 from reports import cli
+from tests.programs import ROOT
 from tests.witnesses import page, test_povray
 
-ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 OF_RUN = {"test", "lint", "bench", "docs"}
 

@@ -30,6 +30,13 @@ SHORT = {
 LEAST = 400
 
 
+def without_causes(fault):
+    """Nine tenths of a small comparison are its causes; the long form has them."""
+    more = ("--no-why",) if "compare" in fault.words[:1] else ()
+    shell = fault.shell.replace(" compare ", " compare --no-why ")
+    return dataclasses.replace(fault, words=(*fault.words, *more), shell=shell)
+
+
 def wrong(kind, chosen):
     return list(table.failures(faults.trials([(kind, fault) for fault in chosen])))
 
@@ -37,7 +44,7 @@ def wrong(kind, chosen):
 @pytest.mark.parametrize("kind", faults.KINDS)
 def test_a_few_faults_of_each_kind(kind):
     known = {fault.name: fault for fault in faults.of_kind(kind)}
-    assert wrong(kind, [known[name] for name in SHORT[kind]]) == []
+    assert wrong(kind, [without_causes(known[name]) for name in SHORT[kind]]) == []
 
 
 @pytest.mark.guarantee(

@@ -3,8 +3,6 @@
 import errno
 import io
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,8 +11,7 @@ from comparisons import atomic
 from heuristic.errors import OutputError
 from reports.files import listing, ownership
 from reports.run import output
-
-ROOT = Path(__file__).parents[1]
+from tests.programs import python
 
 CALLS = ("mkdir", "rename", "replace", "unlink", "rmdir", "open", "write")
 """What changes a disk, by its name in `os`."""
@@ -176,20 +173,13 @@ cli.main()
 
 def limited(size, *words):
     """Run the command line with a limit on the size of files, in bytes."""
-    return subprocess.run(
-        [sys.executable, "-c", LIMITED, str(size), *map(str, words)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    return python("-c", LIMITED, size, *words)
 
 
 def test_a_limit_on_the_size_of_files_is_told_and_tears_nothing(run, scene_file, tmp_path):
     """The page is the largest file: the scene is whole, and `run.json` is written."""
     out = tmp_path / "out"
-    words = ("compare", scene_file, "-o", out, "--spp", 2)
+    words = ("compare", scene_file, "-o", out, "--spp", 2, "--no-why")
     refused = limited(100, *words)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert not any("fotismos-partial" in path.name for path in out.rglob("*"))
@@ -213,14 +203,7 @@ def finished_again(run, words, out):
 @pytest.mark.parametrize("kind", ["arrays", "JSON", "EXR", "Parquet"])
 def test_every_kind_of_file_is_written_whole_or_not_at_all(kind, tmp_path):
     """Cut anywhere, at each size up to its own, also where a library writes it."""
-    done = subprocess.run(
-        [sys.executable, "-c", EVERY_SIZE, kind, tmp_path],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = python("-c", EVERY_SIZE, kind, tmp_path)
     assert done.stdout.startswith("cut at"), done.stderr
     assert [path.suffix for path in tmp_path.iterdir()] == [".whole"]
 

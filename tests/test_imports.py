@@ -1,10 +1,6 @@
 """What a comparison imports: the rooms that it passes through, and no others."""
 
-import subprocess
-import sys
-from pathlib import Path
-
-ROOT = Path(__file__).parents[1]
+from tests.programs import python
 
 OURS = ("heuristic", "reference", "comparisons", "reports")
 """The packages of the project."""
@@ -27,13 +23,8 @@ print(*sorted(sys.modules))
 
 
 def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", COMPARE, tmp_path / "out"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-c", COMPARE, tmp_path / "out")
+    assert done.returncode == 0, done.stderr
     modules = [name for name in done.stdout.split() if name.partition(".")[0] in OURS]
     assert "comparisons.compare" in modules
     for folder in ELSEWHERE:

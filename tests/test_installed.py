@@ -6,13 +6,11 @@ Slow: it installs all dependencies from the package registry.
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from tests.programs import ROOT
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 SUITE = """
 import pytest

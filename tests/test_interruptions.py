@@ -48,7 +48,7 @@ def test_a_signal_waits_until_a_module_is_loaded(number, tmp_path):
     assert process.returncode == 128 + number
 
 
-@pytest.mark.parametrize("name", ["compare", "study"])
+@pytest.mark.parametrize("name", ["compare without causes", "study"])
 def test_an_interrupted_command_leaves_nothing_broken(name):
     assert [trial for trial in trials(name, 2) if trial.faults] == []
 
@@ -59,6 +59,6 @@ def test_an_interrupted_command_leaves_nothing_broken(name):
     " gives the results of an undisturbed one.",
 )
 @pytest.mark.slow
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", sorted({*COMMANDS} - {"compare without causes"}))
 def test_fifty_interruptions_of_each_command_leave_nothing_broken(name):
     assert [trial for trial in trials(name, SHOWN, seed=1) if trial.faults] == []

@@ -279,7 +279,7 @@ def test_points_that_do_not_fit_are_done_again(study, tmp_path):
     for content in ({"rows": None}, {"rows": [row | {"rmse": "x"}]}, {}, {"rows": 3}):
         entry.save(content)
         outcome = running.run(study, tmp_path)
-        assert (outcome.done, outcome.at_hand) == (1, 3)
+        assert (outcome.done, outcome.cached) == (1, 3)
         assert outcome.table.equals(whole)
     entry.remove()
     os.mkfifo(entry.path)

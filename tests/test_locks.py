@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +13,7 @@ from comparisons import atomic
 from heuristic.errors import OutputError
 from reports.files import holding, listing, ownership
 from reports.run import output
-
-ROOT = Path(__file__).parents[1]
+from tests.programs import ROOT
 
 HOLDS = """
 import sys, time

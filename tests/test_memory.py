@@ -2,8 +2,6 @@
 
 import re
 import resource
-import subprocess
-import sys
 
 import pytest
 
@@ -12,6 +10,7 @@ from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.rendering import memory
 from reference.rendering.renderer import Renderer
+from tests.programs import python
 from tests.small_scene import SCENE
 
 
@@ -78,14 +77,7 @@ def test_a_limit_on_addresses_counts():
         "resource.setrlimit(resource.RLIMIT_AS, (2**35, resource.RLIM_INFINITY));"
         "before = next(memory._of_limit()); print(before)"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=memory.Path.cwd(),
-    )
-    assert 0 < int(ended.stdout) < 2**35
+    assert 0 < int(python("-c", code).stdout) < 2**35
     assert resource.getrlimit(resource.RLIMIT_AS)[0] != 2**35
 
 

@@ -1,12 +1,11 @@
 """A comparison in a notebook."""
 
 from html.parser import HTMLParser
-from pathlib import Path
 
 import nbformat
 from nbclient import NotebookClient
 
-ROOT = Path(__file__).parents[1]
+from tests.programs import ROOT
 
 CELL = """
 from reports.notebook import compare

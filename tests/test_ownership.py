@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -15,6 +14,7 @@ from heuristic.errors import InputError
 from reports.ci.checks import FILES
 from reports.files import holding, listing, ownership
 from reports.run import output
+from tests.programs import python
 
 HIDDEN = {listing.MARK, holding.LOCK}
 SMALL = ("--spp", 2, "--resolution", "12x12")
@@ -240,9 +240,7 @@ print(at)
 )
 def test_what_is_put_where_a_killed_run_was_about_to_write_is_not_ours(tmp_path):
     """Killed at every call that changes the disk; the user's file comes before the next run."""
-    root, words = Path(__file__).parents[1], [sys.executable, "-c", KILLED, tmp_path]
-    done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True)
-    assert 15 < int(done.stdout) < 99
+    assert 15 < int(python("-c", KILLED, tmp_path).stdout) < 99
     for folder in tmp_path.iterdir():
         mine = [folder / name for name in ("index.html", "fit/fit.json")]
         mine = [path for path in mine if path.parent.is_dir() and not path.exists()]

@@ -1,7 +1,6 @@
 """The pairing of heuristic and physical values: factors, conventions, misses, refusals."""
 
 from math import pi, sqrt
-from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
@@ -14,9 +13,9 @@ from heuristic.errors import InputError
 from reference import Convention, Source
 from reference.pairing import albedo, factors, halves
 from reference.pairing.factors import Phong
+from tests.programs import ROOT
 from tests.test_physics import look_at
 
-ROOT = Path(__file__).parents[1]
 MATCHED, LITERAL = Convention.MATCHED, Convention.LITERAL
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 

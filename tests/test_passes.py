@@ -1,10 +1,6 @@
 """Stopping at a noise target, and going on after an interruption."""
 
-import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +13,8 @@ from comparisons.render import LIMIT_SPP, WAVEFRONT, is_checked, schedule
 from heuristic.errors import InputError
 from reference.planning.plan import PASSES
 from reports.run.kept import KeptPasses, key_of
+from tests.programs import python
 
-ROOT = Path(__file__).parents[1]
 SMALL = (24, 24)
 
 INTERRUPTED = """
@@ -51,13 +47,7 @@ def arrays(result):
 @pytest.mark.guarantee("runs", "A run that was killed goes on to the same image, bit for bit.")
 def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
     file = tmp_path / "passes.npz"
-    ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED, file],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=120,
-        check=False,
-    )
-    assert ended.returncode == -signal.SIGKILL
+    assert python("-c", INTERRUPTED, file).returncode == -signal.SIGKILL
     kept = KeptPasses(file, "key", interval=0)
     done = int(kept.load()["sum0_count"])
     assert 1 <= done <= 5

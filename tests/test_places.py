@@ -13,9 +13,8 @@ import pytest
 from reports.commands import __path__ as commands
 from reports.files import listing, ownership
 from reports.run import output, places
+from tests.programs import ROOT
 from tests.small_scene import SCENE
-
-ROOT = Path(__file__).parents[1]
 
 SMALL = ("--spp", 2, "--resolution", "12x12")
 
@@ -226,6 +225,7 @@ def test_a_folder_whose_name_is_not_in_utf8_is_written_to(scene_file):
             "-q",
             "-o",
             out,
+            "--no-why",
             *map(str, SMALL),
         ],
         cwd=scene_file.parent,

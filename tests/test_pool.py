@@ -14,8 +14,7 @@ import pytest
 from comparisons.processes.pool import Pool
 from comparisons.processes.worker import Task, end_after_task
 from heuristic.errors import InputError, LostProcessError
-
-ROOT = Path(__file__).parents[1]
+from tests.programs import ROOT
 
 
 def add(*numbers):

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.test_cli import ROOT
+from tests.programs import ROOT, python
 
 SCENE = """<scene version="3.0.0">
   <sensor type="perspective">
@@ -136,9 +136,7 @@ def test_without_llvm_tests_are_skipped_with_the_reason(suite):
 def test_the_plugin_imports_nothing_heavy():
     heavy = "{'mitsuba', 'drjit', 'numpy'}"
     code = f"import reports.ci.pytest_plugin, sys; print({heavy} & {{*sys.modules}})"
-    words = [sys.executable, "-c", code]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
+    assert python("-c", code).stdout.strip() == "set()"
 
 
 def test_the_package_brings_the_plugin():

@@ -1,24 +1,13 @@
 """The README's example runs as it is printed, in a process of its own."""
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from tests.programs import ROOT, python
 
 
 def test_the_readmes_example_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
-    done = subprocess.run(
-        [sys.executable, "-c", code + "print(colour)"],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
+    done = python("-c", code + "print(colour)", cwd=tmp_path, PYTHONWARNINGS="error")
     assert (done.returncode, done.stderr) == (0, "")
     # k_a + k_d (N.L) with N.L = 4 / 5; the mirror direction is as far off the viewer, to the ninth.
     expected = [0.3 + k_d * 0.8 + 0.7 * 0.8**9 for k_d in (0.5, 0.4, 0.3)]

@@ -1,9 +1,5 @@
 """Passes after the first replay its kernels: the images must be those of tracing each pass."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -12,9 +8,9 @@ from comparisons.case import Request, open_case
 from comparisons.compare import prepare
 from comparisons.cost.methods import Methods
 from reference.rendering.renderer import Renderer, variant
+from tests.programs import python
 
 SEEDS = (1, 2, 3)
-ROOT = Path(__file__).parents[1]
 
 
 def methods(name):
@@ -57,10 +53,7 @@ for name in {names}:
 
 def test_later_passes_are_replayed_in_a_process_of_their_own():
     # What other tests leave alive, such as a BSDF without a scene, keeps Dr.Jit from it.
-    code = REPLAYED.format(names=("plastic-spheres", "fig-8-9"))
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
-    )
+    done = python("-c", REPLAYED.format(names=("plastic-spheres", "fig-8-9")))
     rows = [line.split("|") for line in done.stdout.splitlines() if line.count("|") == 2]
     assert len(rows) > 10
     assert [row for row in rows if row[2] != "True"] == []

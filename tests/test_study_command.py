@@ -8,15 +8,14 @@ import subprocess
 import sys
 import time
 import tomllib
-from pathlib import Path
 
 import pytest
 
 from comparisons.processes import cluster
 from comparisons.study import dataset
 from tests import dask_cluster
+from tests.programs import ROOT
 
-ROOT = Path(__file__).parent.parent
 STUDY = """title = "A small study"
 [[part]]
 name = "lobe"
@@ -50,7 +49,7 @@ def test_study_writes_dataset_figures_and_findings(run, file, tmp_path):
     assert str(page) in printed
     code, printed, _ = run("study", file, "-o", out)
     assert code == 0
-    assert "4 points were at hand" in printed
+    assert "4 points were cached" in printed
 
 
 @pytest.mark.parametrize(
@@ -119,7 +118,7 @@ def test_a_restarted_scheduler_loses_nothing_and_repeats_nothing(run, file, tmp_
             "study", file, "-o", tmp_path / "out", "--scheduler", dask_cluster.start(processes)
         )
         assert code == 0, messages
-        assert f"{len(done)} points were at hand" in printed
+        assert f"{len(done)} points were cached" in printed
         assert all(path.stat().st_mtime_ns == when for path, when in done.items())
         assert dataset.read(tmp_path / "out/study/small/small.parquet").num_rows == 16
     finally:

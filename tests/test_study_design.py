@@ -56,7 +56,7 @@ def test_random_points_are_not_a_lattice():
     ("text", "expected"),
     [
         ("", "nothing to do"),
-        ("title = \n[[part]]", "no TOML.*line 1"),
+        ("title = \n[[part]]", "not TOML.*line 1"),
         ("[[part]]\nname = 'a'", "no scene.*lobe"),
         (lobe(""), "nothing to vary"),
         (lobe("alfa = 1"), "'alfa' is not known.*alpha"),
@@ -80,7 +80,7 @@ def test_random_points_are_not_a_lattice():
         (lobe("alpha = {from = 0.1, to = 1}", "design = 'sobol'\npoints = 500"), "256 or 512"),
         (lobe("alpha = {from = 0.1, to = 1}", "design = 'random'"), "0 points"),
         (lobe("alpha = [0.1]", "design = 'random'\npoints = 4"), "no parameter has a range"),
-        (lobe("alpha = 0.1") * 2, "a name of its own"),
+        (lobe("alpha = 0.1") * 2, "its own name"),
     ],
 )
 def test_a_mistake_is_refused_with_what_is_allowed(text, expected):

@@ -1,7 +1,6 @@
 """The shipped study: its page says what its dataset says, and its dataset what the code gives."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -9,8 +8,8 @@ from comparisons.study import dataset, design, point, query
 from heuristic.errors import InputError
 from reports.charts import study_charts
 from reports.run import study_files
+from tests.programs import ROOT
 
-ROOT = Path(__file__).parent.parent
 FILE = ROOT / "studies/phong-roughplastic.toml"
 PAGE = ROOT / "docs/findings.md"
 

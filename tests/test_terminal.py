@@ -5,14 +5,13 @@ import shlex
 import subprocess
 import sys
 from io import StringIO
-from pathlib import Path
 
 import pytest
 
 from reports import cli
 from reports.terminal import progress
+from tests.programs import ROOT
 
-ROOT = Path(__file__).parent.parent
 COMMANDS = sorted(cli.cli.commands)
 
 

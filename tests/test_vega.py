@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import pytest
 
@@ -11,6 +9,7 @@ from heuristic.errors import OutputError
 from reports.charts import theme, vega
 from reports.page import page
 from tests import records
+from tests.programs import python
 from tests.test_page import HOSTILE, Page
 
 
@@ -58,8 +57,7 @@ def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
 
 def test_a_comparison_without_a_study_of_cost_does_not_wait_for_altair():
     told = "import sys, reports.page.page, reports.run.single; print('altair' in sys.modules)"
-    shown = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
-    assert shown.stdout.strip() == "False"
+    assert python("-c", told).stdout.strip() == "False"
 
 
 def test_two_charts_on_a_page_share_no_id():

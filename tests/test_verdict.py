@@ -95,7 +95,14 @@ def test_advice_names_cause_and_remedy_of_each_scene_that_fails():
     assert verdict.WITH_CAUSES in line
 
 
-def test_a_run_ends_with_its_verdict(run, scene_file, tmp_path):
-    code, printed, _ = run("compare", scene_file, "-o", tmp_path / "out", "--spp", 4)
-    assert code == 0
-    assert "Textbook shading " in printed
+def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
+    run, causes, scene_file, tmp_path
+):
+    for words, has_causes in (((), True), (("--no-why",), False)):
+        out = tmp_path / f"{has_causes}"
+        small = ("--spp", 4, "--resolution", "12x8")
+        code, printed, _ = run("compare", scene_file, "-o", out, *small, *words)
+        assert code == 0
+        assert "Textbook shading " in printed
+        assert ("--why" in printed) is not has_causes  # advice to find them
+        assert (out / "my-scene/cost.json").exists() is has_causes

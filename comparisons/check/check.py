@@ -76,11 +76,11 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     source : reference.scene.source.Source
         The scene.
     options : comparisons.options.Options
-        What is rendered; ``spp`` is over all passes, and the plan's where it is not given.
+        What is rendered; ``spp`` is over all passes, and the plan's if omitted.
     passes
         Independent passes.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def check(source, options, before, level=LEVEL, progress=None):
     Parameters
     ----------
     source, options, progress
-        As of :func:`measure_scene`; ``options`` are those of the baseline. With its seed, what did
+        See :func:`measure_scene`; ``options`` are the baseline's. With its seed, what did
         not change gives the same images on the same machine; with another one the test holds, too.
     before : Measurement
         The baseline's; metrics that it does not know are not tested.

@@ -1,4 +1,4 @@
-"""What a check measures of a scene: the departure and regional colours, each with its doubt.
+"""What a check measures of a scene: the departure and regional colours, each with its uncertainty.
 
 Both halves are rendered in independent passes, as a comparison does. The spread of passes is the
 only source of the standard errors here, so that they hold whatever noise a scene has.
@@ -133,7 +133,7 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
     viewing
         How linear values are looked at.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
     """
     loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)

@@ -1,4 +1,4 @@
-"""Which measured numbers moved by more than both sides' doubt: Welch's t-test, many at a time.
+"""Which numbers moved by more than both sides' uncertainty: Welch's t-test, many at a time.
 
 Before and after are independent measurements, or share random numbers where they have one seed;
 the second only makes the difference of unchanged things smaller than the test allows for.
@@ -28,7 +28,7 @@ class Move(Record):
     Attributes
     ----------
     quantity, half, block
-        As of :class:`comparisons.check.measurement.Quantity`; row and column count from 1.
+        See :class:`comparisons.check.measurement.Quantity`; row and column count from 1.
     before, after
         What was measured then and now.
     error
@@ -121,7 +121,7 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
 
     Where neither side has any spread, the largest difference comes first.
     """
-    found = [move for move in moves if not move.p_corrected >= level]  # a NaN is no pass
+    found = [move for move in moves if not move.p_corrected >= level]  # a NaN does not pass
     return sorted(found, key=_order)
 
 

@@ -70,12 +70,12 @@ class Recorder:
         samples = []
         for bsdf, parts in zip(self._materials.bsdfs, self._parts, strict=True):
             whole = {key: _joined([part[key] for part in parts]) for key in parts[0]}
-            shadows = sorted((key for key in whole if key.startswith("light ")), key=_light_number)
+            shadows = (f"light {number}" for number in range(len(whole)))
             samples.append(
                 Samples(
                     *(whole[key] for key in (*VECTORS, "pixel")),
                     textures={name: whole[name] for name in _textured(bsdf)},
-                    visible=tuple(whole[key] for key in shadows),
+                    visible=tuple(whole[key] for key in shadows if key in whole),
                 )
             )
         fixed = self._fixed.estimate().mean.reshape(-1, 3)
@@ -178,10 +178,6 @@ def _described(bsdf):
         for name in COEFFICIENTS
     }
     return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
-
-
-def _light_number(key):
-    return int(key.removeprefix("light "))
 
 
 def _joined(parts):

@@ -26,7 +26,7 @@ class Samples:
     pixel
         (N,), the index of each sample's pixel in reading order.
     textures
-        Colours (N samples) of the coefficients that vary over the surface, by name.
+        Colours (N samples) of the coefficients that vary over the surface, under their names.
     visible
         One mask (N samples) for each light, in the kernel's order; empty where nothing is hidden.
     """
@@ -58,7 +58,7 @@ class Surface:
     samples
         :class:`Samples` of each material.
     lights, ambient
-        As of :func:`heuristic.shade`.
+        See :func:`heuristic.shade`.
     fixed
         (H W, 3), what no parameter changes: emission (8.1) and background.
     samples_a_pixel

@@ -86,7 +86,7 @@ def materials(attempt, normalised, physical):
 
 
 def lights(attempt, names):
-    """Return the factors on the intensities of lights, by name; the first is what they refer to."""
+    """Return the named factors on the intensities of lights, relative to the first."""
     first = FittedLight(
         light=names[0],
         name="intensity",
@@ -109,7 +109,7 @@ def lights(attempt, names):
 
 
 def physical_materials(graph):
-    """Return the plain parameters of each BSDF of the physical half, by name."""
+    """Return the plain parameters of each named BSDF of the physical half."""
     found = {}
     for index in graph.nodes(mi.ObjectType.BSDF):
         label = graph.label(index)

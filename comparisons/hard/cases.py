@@ -46,7 +46,7 @@ class HardCase(Description):
 
 @dataclass(frozen=True)
 class Statement:
-    """What is laid down where nothing is exact: no formula breaks, but somebody must decide."""
+    """What is defined by convention: no formula breaks, but somebody must decide."""
 
     name: str
     text: str

@@ -42,7 +42,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class HardCases:
-    """All cases with their errors, what is laid down, pictures of some, and the models' energy.
+    """All cases with their errors, the conventions, pictures of some, and the models' energy.
 
     ``conventions`` are pairs of a :class:`Statement` and whether it holds; ``furnaces`` have the
     models' albedo under light from each of ``angles``, in degrees, and their asymmetry.

@@ -1,6 +1,6 @@
 """What is defined by convention: limits at which no formula breaks, but which are no mathematics.
 
-Each could be laid down otherwise. What was laid down is said here, and tests hold the code to it.
+Each could be defined otherwise; tests hold the code to these.
 """
 
 import drjit as dr

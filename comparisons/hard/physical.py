@@ -1,9 +1,9 @@
 """The hard cases of the reference: where Mitsuba, or how it is read, would be at fault.
 
 Two kinds. Where Mitsuba is right but its formula breaks as printed, ours is the reference's own
-value, held against the formula in extended precision. Where Mitsuba itself is at fault, what counts
-is what is booked on the heuristic: the exact value over the reference's, which is to be 1. Naively
-every pixel counts; ours sets those aside that `comparisons.departure.limits` marks.
+value, compared with the formula in extended precision. Where Mitsuba itself is at fault, what
+counts is attributed to the heuristic: the exact value over the reference's, which is to be 1.
+Naively every pixel counts; ours leaves out those that `comparisons.departure.limits` marks.
 
 All of it needs a Mitsuba variant and the plugins.
 """

@@ -27,7 +27,7 @@ ALLOWED_FAILURES = 30
 """Workers that may die with a task before it is blamed, in a cluster that this process made."""
 
 AHEAD = 4
-"""Tasks at hand for each worker: enough to keep it busy, few enough to lose little."""
+"""Tasks queued per worker: enough to keep it busy, few enough to lose little."""
 
 TIMEOUT = 20
 """Seconds in which a scheduler must answer."""
@@ -149,6 +149,7 @@ def local(workers: int, prepare: Prepare = tuple) -> Iterator[Cluster]:
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # a free port for what stays of it
             silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,

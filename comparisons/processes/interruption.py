@@ -5,7 +5,6 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import NoReturn
 
 SIGNALS = {
     number
@@ -62,7 +61,7 @@ def code_of(error: BaseException | None) -> int:
 def _interrupt(number: int, frame: FrameType | None) -> None:
     for each in SIGNALS:
         if signal.getsignal(each) is _interrupt:
-            signal.signal(each, _leave)
+            signal.signal(each, lambda number, _: os._exit(128 + number))
     if not (_is_held_back or _is_importing(frame)):
         raise Interrupted(number)
     # Native modules that are just loaded crash, or swallow what is raised: later, then.
@@ -76,7 +75,3 @@ def _is_importing(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-def _leave(number: int, frame: FrameType | None) -> NoReturn:
-    os._exit(128 + number)

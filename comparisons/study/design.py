@@ -56,7 +56,7 @@ class Part:
         ``grid``: all combinations; ``random``: independent and uniform (in the logarithm where the
         scale is); ``sobol``: the scrambled Sobol sequence, a power of 2 of points.
     spans
-        What each parameter runs over, by name, slowest first in a grid.
+        What each named parameter runs over, slowest first in a grid.
     count
         Number of points of a random or Sobol design.
     heuristic
@@ -119,7 +119,7 @@ def read(path):
     Raises
     ------
     InputError
-        When there is no such file, it is no TOML, or something in it is not allowed: naming it,
+        When there is no such file, it is not TOML, or something in it is not allowed: naming it,
         what is allowed, and what to do.
     """
     path = Path(path)
@@ -145,7 +145,7 @@ def parse(text, name="study", folder=Path()):
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"this is no TOML: {error}.") from error
+        raise InputError(f"this is not TOML: {error}.") from error
     _known(table, {"title", "part", "figure"}, "the study")
     parts = table.get("part")
     if not isinstance(parts, list) or not parts:
@@ -153,7 +153,7 @@ def parse(text, name="study", folder=Path()):
     parts = tuple(_part(part, folder) for part in parts)
     names = [part.name for part in parts]
     if len(set(names)) < len(names):
-        raise InputError(f"parts are called {', '.join(names)}: give each a name of its own.")
+        raise InputError(f"parts are called {', '.join(names)}: give each its own name.")
     return Study(name, table.get("title", name), parts, text, tuple(table.get("figure", ())))
 
 
@@ -200,7 +200,7 @@ OWN = "heuristic."
 
 
 def _flat(given):
-    """Return parameters by name; TOML reads ``heuristic.gloss`` as a table in a table."""
+    """Return named parameters; TOML reads ``heuristic.gloss`` as a table in a table."""
     own = given.get(OWN[:-1], {})
     if not isinstance(own, dict):
         return given
@@ -217,7 +217,7 @@ def _check_heuristic(name, scene, where):
         rendered = [each for each, one in SCENES.items() if one.make is not None]
         raise InputError(
             f"{where}: the scene {scene} is evaluated without an image, with Phong's model alone."
-            f" Study {name} on {' or '.join(rendered)}, or on a scene of yours."
+            f" Study {name} on {' or '.join(rendered)}, or on your own scene."
         )
 
 

@@ -61,7 +61,7 @@ class Kept:
         self._kept = None
 
     def scene(self, graph):
-        """Return a Mitsuba scene of a graph: the one at hand, edited, or a new one."""
+        """Return a Mitsuba scene of a graph: the cached one, edited, or a new one."""
         if self._kept is not None:
             edits = self._edits_of(graph)
             if edits is not None:
@@ -185,7 +185,7 @@ def _set(graph, path, value):
         )
     props = graph.props(found[0])
     if not _is_number(props[key]):
-        raise InputError(f"{graph.name}: {path} is no number, and cannot be varied yet.")
+        raise InputError(f"{graph.name}: {path} is not a number, and cannot be varied yet.")
     is_colour = isinstance(props[key], COLOURS)
     props[key] = mi.ScalarColor3f(value) if is_colour else value
 

@@ -25,7 +25,7 @@ class Listed:
 
 
 class Fixed(Listed):
-    """One value, that of all points."""
+    """One value for all points."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ def measure(heuristic, reference, counted, noise=None):
     """Return the columns that all scenes have, over the pixels ``counted`` (H, W).
 
     heuristic, reference, noise
-        Linear images (H, W, 3); the noise is that of their difference.
+        Linear images (H, W, 3); the noise belongs to their difference.
     """
     summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
@@ -46,7 +46,7 @@ def largest_miss(misses):
 def measure_each(heuristic, reference):
     """Return the columns of single values (N,) of grey, one array each.
 
-    There is no shape to a single value; what a best exposure would leave is nothing.
+    A single value has no shape; what a best exposure would leave is nothing.
     """
     test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
     pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}

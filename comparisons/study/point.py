@@ -123,7 +123,7 @@ def check(part):
 
 
 def rows(block):
-    """Evaluate a block; return one row a point, as dictionaries.
+    """Evaluate a block; return one row per point, as dictionaries.
 
     A point that fails has its parameters and, in the column ``error``, what went wrong.
     """

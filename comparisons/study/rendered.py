@@ -30,7 +30,7 @@ stratified. Four are enough to see what noise is left."""
 
 
 def row(part, point, identity):
-    """Render a point and return its columns; the identity is that of :class:`point.Block`.
+    """Render a point and return its columns; for the identity see :class:`point.Block`.
 
     Under the names of :data:`comparisons.study.columns.STEPS` are the root mean square changes of
     the image as each of them is simulated too; ``dominant`` names the largest.
@@ -118,7 +118,7 @@ def _opened(scene, identity):
 
 @lru_cache(maxsize=4)
 def _kept(scene, identity):
-    """Return the scenes at hand of both halves, for all points of a scene in this process."""
+    """Return the cached scenes of both halves, for all points of a scene in this process."""
     return Kept(), Kept()
 
 

@@ -24,11 +24,11 @@ WORTH_A_PROCESS = 16
 
 @dataclass(frozen=True)
 class Outcome:
-    """A study that has run: the dataset, and how many points were done, at hand, and failed."""
+    """A study that has run: the dataset, and how many points were done, cached, and failed."""
 
     table: object
     done: int
-    at_hand: int
+    cached: int
     failed: int
 
 
@@ -58,8 +58,8 @@ def run(study, folder, spread=None, progress=None, blocks=None):
         Where finished blocks are kept, in ``points/``.
     spread : callable, optional
         Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
-        (:func:`processes`, :func:`workers_of`). All are done in this
-        process where it is not given.
+        (:func:`processes`, :func:`workers_of`). If omitted, all are done in
+        this process.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
     blocks : optional
@@ -86,7 +86,7 @@ def run(study, folder, spread=None, progress=None, blocks=None):
     # Parts may share points; these are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
-    at_hand = done = total - sum(len(block.points) for block in left)
+    cached = done = total - sum(len(block.points) for block in left)
     report = progress or (lambda *_: None)
     report("points", done, total)
     for block, rows in (spread or processes(0))(left):
@@ -95,7 +95,7 @@ def run(study, folder, spread=None, progress=None, blocks=None):
         done += len(rows)
         report("points", done, total)
     rows = [row for block in blocks for row in _named(block, found[block.key])]
-    return Outcome(dataset.table(study, rows), done - at_hand, at_hand, _failed(rows))
+    return Outcome(dataset.table(study, rows), done - cached, cached, _failed(rows))
 
 
 def processes(count, ready=lambda workers: tuple, limit_s=inf):

@@ -57,7 +57,7 @@ class StudyScene:
     title
         A sentence on what is compared.
     parameters
-        Its own parameters by name; each scene has those of one of the two materials besides.
+        Its own named parameters; each scene has those of one of the two materials besides.
     make
         Makes the dictionary for ``mitsuba.load_dict`` out of a point and a BSDF; None for scenes
         that are evaluated without an image.
@@ -158,7 +158,7 @@ SCENES = {
         _enclosure,
     ),
 }
-"""The scenes by name. Any other scene can be studied through paths to its parameters."""
+"""The named scenes. Any other scene can be studied through paths to its parameters."""
 
 UNLIMITED = Parameter("", -inf, inf, 0, "a parameter of the scene, by its path")
 """What is known of a parameter of a user's own scene."""

@@ -191,7 +191,7 @@ def _told(word: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _columns(value: Any, size: int) -> list[np.ndarray]:
-    """Return a value as arrays of floats, one a component; zeros for None."""
+    """Return a value as arrays of floats, one per component; zeros for None."""
     if value is None:
         return [np.zeros(1, np.float32)] * size
     value = dr.detach(value)

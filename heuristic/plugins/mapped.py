@@ -8,7 +8,7 @@ Plugin                   Operands                            Value
 ``heuristic_rest``       ``a``, scalar ``weight``            ``a (1 - weight)``
 ``heuristic_sum``        ``a``, ``b``                        ``a + b``
 ``heuristic_blend``      ``a``, ``b``, scalar ``weight``     ``a (1 - weight) + b weight``
-``heuristic_sides``      ``front``, ``back``                 that of the side that is seen
+``heuristic_sides``      ``front``, ``back``                 the one of the side that is seen
 ``heuristic_exponent``   scalar ``alpha``                    ``(1 / alpha^2 - 1) / 2``, 0 or more
 ``heuristic_interior``   ``rho``; numbers ``scale``,         ``scale rho / (1 - rho return)``
                          ``return``

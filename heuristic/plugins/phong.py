@@ -23,7 +23,7 @@ All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
 
     {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
 
-The reflected radiance for irradiance ``E`` at normal incidence is that of 8.10 for ``I_p = E / pi``
+The reflected radiance for irradiance ``E`` at normal incidence is 8.10's for ``I_p = E / pi``
 (:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
 has no cosine of its own; as the chapters have it, it neither conserves energy nor is reciprocal.
 """

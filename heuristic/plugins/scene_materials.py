@@ -21,7 +21,7 @@ class SceneMaterials:
     Raises
     ------
     InputError
-        For a BSDF that is no ``phong``.
+        For a BSDF that is not a ``phong``.
     """
 
     DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
@@ -34,8 +34,8 @@ class SceneMaterials:
         for bsdf in self.bsdfs:
             if not hasattr(bsdf, "material"):
                 raise InputError(
-                    f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is no phong. The integrator heuristic"
-                    " renders the heuristic half of a pair, which reference.pair makes."
+                    f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is not a phong. The integrator"
+                    " heuristic renders the heuristic half of a pair, which reference.pair makes."
                 )
         places = {_registry_index(bsdf): number for number, bsdf in enumerate(self.bsdfs)}
         numbers = [places.get(index, 0) for index in range(max(places, default=0) + 1)]

@@ -118,7 +118,7 @@ NO_SHADOWS = Pruning(
     absent="no shape can stand between a light and a reflecting surface",
     proof="Light from a point y reaches a surface point x along a segment, which lies in the box"
     " around y and the shape of x. A shape whose box does not meet that one does not meet the"
-    " segment. The shape of x itself is no obstacle: x lies on its outer side and is seen from"
+    " segment. The shape of x itself is not an obstacle: x lies on its outer side and is seen from"
     " outside, and a segment that passes through the shape arrives from behind, where an opaque"
     " BSDF returns nothing. A light that is flat, or convex and shines outwards, does not hide the"
     " side that shines.",

@@ -97,7 +97,7 @@ def pair(
     interpolation : Interpolation
         Of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
     tessellation : int, optional
-        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 where it is not given;
+        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 if omitted;
         given, it makes meshes for PHONG too.
     prune
         Whether the kernel leaves out the terms that no material has.

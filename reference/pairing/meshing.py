@@ -29,7 +29,7 @@ def replace_shapes(
     scene : mitsuba.Scene
         The same shapes, instantiated; they are told by their ids.
     resolution
-        Of what is no mesh yet, as in :func:`heuristic.meshes.to_mesh`; None for its default.
+        Of what is not a mesh yet, as in :func:`heuristic.meshes.to_mesh`; None for its default.
     interpolation : Interpolation
         Gouraud shading needs one normal a vertex, hence faces that share none where the mesh has
         ``face_normals``.

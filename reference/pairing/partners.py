@@ -108,10 +108,6 @@ def _of_phong(graph: Graph, index: int, convention: Convention) -> Partner:
     return Partner(tuple(found["diffuse_reflectance"]), found["alpha"], ior)
 
 
-def _diffuse(context: Context, index: int) -> Partner:
-    return Partner(context.value(index, "reflectance", 0.5))
-
-
 def _plastic(context: Context, index: int) -> Partner:
     base = context.value(index, "diffuse_reflectance", 0.5)
     return Partner(base, _alpha(context, index), _ior(context.graph, index, "polypropylene"))
@@ -169,7 +165,7 @@ def _ior(graph: Graph, index: int, inside: str) -> float:
 
 
 _RULES = {
-    "diffuse": _diffuse,
+    "diffuse": lambda context, index: Partner(context.value(index, "reflectance", 0.5)),
     "null": lambda context, index: Partner(),
     "principled": _principled,
     **dict.fromkeys(("plastic", "roughplastic"), _plastic),

@@ -1,4 +1,4 @@
-"""Indices of refraction at which rough plastics have wanted albedos at normal incidence."""
+"""Indices of refraction at which rough plastics have given albedos at normal incidence."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -55,7 +55,7 @@ def nearest(plastics: Sequence[RoughPlastic], wanted: Sequence[Albedo]) -> list[
 
     A high index reflects more, and lets less through to the diffuse base and out again: no index
     gives both parts. Nearest is the least sum of squares over the parts and channels. All are
-    searched for at once, since albedos of many surfaces take little longer than that of one.
+    searched for at once, since albedos of many surfaces take little longer than one.
     """
 
     def distances(log_iors, which):

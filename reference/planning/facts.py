@@ -32,7 +32,7 @@ BSDF, EMITTER, SENSOR, SHAPE = (
 class LightFacts:
     """What is known about one light.
 
-    ``position`` is that of a point or spot, ``toward`` the direction to a directional light,
+    ``position`` belongs to a point or spot, ``toward`` the direction to a directional light,
     ``shape`` the name of the shape of an area light; the others are None.
     """
 

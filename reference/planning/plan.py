@@ -263,7 +263,7 @@ def _holds(made: Plan, rule: Pruning) -> bool:
 def _stock(pair: Pair) -> str:
     """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media.
 
-    ``direct`` is no ``path`` of depth 2: that loses light at masks.
+    ``direct`` is not a ``path`` of depth 2: that one loses light at masks.
     """
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator

@@ -95,7 +95,7 @@ class Queries:
     low, high
         (Q, 3): the box that an answer has to meet.
     other
-        (Q,): one more shape that is no answer, -1 for none. The receiver never is.
+        (Q,): one more shape that is not an answer, -1 for none. The receiver never is.
     """
 
     receiver: np.ndarray

@@ -1,4 +1,4 @@
-"""A probe of each pruned scene: the plan's light against that of everything simulated.
+"""A probe of each pruned scene: the plan's light compared with everything simulated.
 
 A rule of pruning holds under premises, and a list of premises may lack one. So some camera rays are
 drawn at random and followed twice: by the plan's integrator, and by the one that a user of Mitsuba
@@ -66,8 +66,8 @@ class Guard:
     rays
         Camera rays that were followed both ways.
     departure, error
-        Mean of the plan less that of everything, and its standard error, as shares of the larger
-        mean radiance; of the rays that decided.
+        Mean of the plan minus the mean of everything, and its standard error, as shares of the
+        larger mean radiance; of the rays that decided.
     seconds
         Time that the probe took, with compilation.
     """
@@ -82,7 +82,7 @@ class Guard:
     def words(self) -> str:
         """What was found, as a sentence."""
         return (
-            f"the plan's mean is {self.departure:+.2%} off that of everything simulated, with a"
+            f"the plan's mean is {self.departure:+.2%} off the mean of everything simulated, with a"
             f" standard error of {self.error:.2%}, over {self.rays} camera rays"
         )
 

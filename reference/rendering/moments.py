@@ -126,7 +126,7 @@ class DifferenceSums(Accumulator):
     def estimate(self, dtype: type = float, last: bool = False) -> DifferenceEstimate:
         """Return what the passes so far say, as the base does; the third cumulant in doubles."""
         third, n = self._array("cubes", float, last), self.count
-        # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, that of the mean 1/n² of it.
+        # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
         plain = super().estimate(dtype, last)
         return DifferenceEstimate(**vars(plain), third=third, grouped=self._grouped())
@@ -142,7 +142,7 @@ class DifferenceSums(Accumulator):
 
 
 class SumsOfHalves(DifferenceSums):
-    """Running sums of a difference that has no mean of its own: it is that of the halves' means.
+    """Running sums of a difference; its mean is the difference of the halves' means.
 
     Each pass is added to it before it is added to those.
 

@@ -39,9 +39,9 @@ ROUNDING = 1e-5
 class PassTimes:
     """Times of the passes of one half, in seconds.
 
-    ``first`` is that of the first pass, which traces and compiles; ``compilation`` the part of it
-    that LLVM took, next to nothing for kernels that Dr.Jit finds in its cache on disk. ``median``
-    is of the passes after the first (of the first where it is alone).
+    ``first`` is the time of the first pass, which traces and compiles; ``compilation`` the part of
+    it that LLVM took, next to nothing for kernels in Dr.Jit's cache on disk. ``median`` is of
+    the passes after the first (of the first if it is alone).
     """
 
     median: float
@@ -179,9 +179,9 @@ class Renderer:
         width, height = image_size(self.scene)
         if width * height * self.spp > LARGEST_PASS:
             raise InputError(
-                f"{self.label}: {self.spp} samples a pixel of {width}x{height} pixels at once are"
-                f" too many: {LARGEST_PASS} samples a pass are allowed. Give fewer with --spp, or a"
-                " smaller image with --resolution."
+                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once are"
+                f" too many: {LARGEST_PASS} samples per pass are allowed. Give fewer with --spp, or"
+                " a smaller image with --resolution."
             )
 
     def pass_times(self) -> PassTimes:

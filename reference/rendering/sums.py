@@ -53,7 +53,7 @@ class Mean:
     ----------
     compact
         Whether all sums but the mean are kept in single precision, as roots of their power: so
-        their range is that of the images. Each pass adds less than 2e-7 of a sum to its error.
+        their range is the images' own. Each pass adds less than 2e-7 of a sum to its error.
     """
 
     SUMS: tuple[str, ...] = ("mean",)

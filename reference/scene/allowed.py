@@ -1,7 +1,7 @@
 """What the values of a scene's elements may be, looked at before anything is made.
 
 Mitsuba refuses some values that cannot be meant, and renders others in silence: a sphere of radius
-NaN is not there, an infinite index of refraction is black. Numbers are held against :data:`RULES`,
+NaN is not there, an infinite index of refraction is black. Numbers are compared with :data:`RULES`,
 transforms against :func:`_transform`, and every number has to be one that single precision has.
 """
 

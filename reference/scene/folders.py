@@ -25,7 +25,7 @@ class Found:
 
 
 def scenes_in(folder: Path) -> Found:
-    """Return the scenes in a folder and its subfolders; hidden ones and links are passed over.
+    """Return the scenes in a folder and its subfolders; hidden ones and links are skipped.
 
     They are the files ``*.xml`` that have a scene element, but not those that others include, and
     the files ``*.py`` that define ``scene``. Nothing is run.

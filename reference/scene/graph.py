@@ -166,7 +166,7 @@ class Graph:
         return self.kinds[plugin]
 
     def _kind_of_object(self, index):
-        """Return the kind of a user's own plugin: that of the object that it makes."""
+        """Return the kind of a user's own plugin: the kind of the object that it makes."""
         made = self.instantiate(index)
         for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
             if isinstance(made, getattr(mi, kind)):

@@ -38,7 +38,7 @@ class Settings:
     """What the scene's own integrator asks for.
 
     ``integrator`` is its plugin, None where the scene has none; ``max_depth`` counts as Mitsuba's,
-    -1 for no limit; ``rr_depth`` is None where it is not given.
+    -1 for no limit; ``rr_depth`` is None if omitted.
     """
 
     integrator: str | None = None
@@ -180,7 +180,7 @@ def _note_sampler(graph, sensor, overridden):
     """Record the scene's own samples, which those of the plan replace."""
     for _, index in graph.children(sensor, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
-        given = f"{graph.plugin(index)}, {count} samples a pixel"
+        given = f"{graph.plugin(index)}, {count} samples per pixel"
         overridden.append(Overridden("sampler", given, "sampler and samples of the plan"))
 
 

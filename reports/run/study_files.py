@@ -134,7 +134,7 @@ def summary(study, outcome):
         if good:
             line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
         yield line
-    if outcome.at_hand:
-        yield f"{outcome.at_hand} points were at hand from an earlier run."
+    if outcome.cached:
+        yield f"{outcome.cached} points were cached by an earlier run."
     for row in [row for row in rows if row["error"] is not None][:3]:
         yield f"failed: {row['part']}, point {row['point']}: {row['error']}"

@@ -43,7 +43,7 @@ def mean_radiance(graph: Graph, emitter: mi.Emitter) -> Any:
 def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | None:
     """Return ``int L dw`` of a distant light as intensity ``I_p``, and its mean direction.
 
-    The direction, in which the light travels, is that of the mean of the directions that it comes
+    The direction, in which the light travels, is the mean of the directions that it comes
     from, weighted by radiance. None where no light arrives.
     """
     means, toward = _arriving(emitter)

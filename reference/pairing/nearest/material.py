@@ -1,4 +1,4 @@
-"""What a rule of :mod:`reference.pairing.nearest` returns, and what it has at hand."""
+"""What a rule of :mod:`reference.pairing.nearest` returns, and what it may use."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -76,7 +76,8 @@ def plastic(context: Context, index: int) -> Nearest:
     base = context.value(index, "diffuse_reflectance", 0.5)
     coat = context.value(index, "specular_reflectance", 1.0)
     if context.convention is Convention.LITERAL:
-        return Nearest(k_a=base, k_d=base, k_s=coat, n=_smooth_exponent(), lost=(MIRROR,))
+        n = exponent_of(probe.SMOOTH_ALPHA)
+        return Nearest(k_a=base, k_d=base, k_s=coat, n=n, lost=(MIRROR,))
     levels = [
         albedo.of_smooth_plastic(
             level,
@@ -173,10 +174,6 @@ def _rough(graph: Graph, index: int) -> RoughPlastic | None:
         return _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
     except (InputError, RuntimeError):
         return None
-
-
-def _smooth_exponent() -> float:
-    return exponent_of(probe.SMOOTH_ALPHA)
 
 
 def _roughplastic(
