@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from comparisons.check.moved import Move
+from comparisons.departure.metrics import METRICS
 from heuristic.errors import InputError
 from reports.ci import annotations, junit
 from tests.schemas import schema
@@ -78,7 +79,7 @@ def test_json_says_what_moved(run, folder, tmp_path):
     assert (move["half"], move["block"]) == ("reference", [2, 3])
     assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
     assert move["p_corrected"] < failed["significance"] < 0.01
-    assert failed["tested"] == 5 + 2 * 3 * (1 + 4 * 4)  # metrics; halves, channels, blocks
+    assert failed["tested"] == len(METRICS) + 1 + 2 * 3 * (1 + 4 * 4)  # metrics; halves, channels, blocks
 
 
 def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):

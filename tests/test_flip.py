@@ -11,7 +11,7 @@ from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic.errors import InputError
 
 FLIPS = pytest.mark.parametrize("name", ["ldr_flip", "hdr_flip"])
-SIZE = (12, 12, 3)
+SIZE = (11, 13, 3)
 
 
 def flat(colour):
@@ -83,7 +83,7 @@ def test_exposures_are_those_of_the_authors(seed):
     reference = np.random.default_rng(seed).lognormal(0.0, 1.0, SIZE)
     *_, used = evaluate(reference.astype(np.float32), reference.astype(np.float32), "HDR")
     expected = used["startExposure"], used["stopExposure"]
-    np.testing.assert_allclose(exposures(reference), expected, atol=1e-5)
+    np.testing.assert_allclose(exposures(reference), expected, atol=1e-3)
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-38, 1e-9, 1.0, 1e30])
