@@ -55,7 +55,8 @@ def test_what_lies_beyond_the_range_is_clipped_as_documented(metric):
     above = metric(2 * image("white"), 3 * image("white"))
     assert above > 1 if metric.name == "dE_ITP" else above < 1e-9 or metric.name == "hdr_flip"
     peak = 10_000 / 203
-    assert metric(image("a million cd/m²"), np.full((1, 1, 3), peak)) < 1e-6
+    if metric.name != "hdr_flip":  # its exposures go on
+        assert metric(image("a million cd/m²"), np.full((1, 1, 3), peak)) < 1e-6
 
 
 @ALL

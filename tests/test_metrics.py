@@ -342,7 +342,7 @@ def test_linear_summaries(images):
     json.dumps([plain(summary), plain(ratios)])
 
 
-@ALL
+@POINTWISE
 def test_noise_floor_is_what_noise_alone_gives(metric):
     """Twice the noise gives twice the floor, another draw the same, none gives none."""
     rng = np.random.default_rng(3)

@@ -25,6 +25,9 @@ SHOWN = 2.118872
 #: The largest value of half floats, beyond which HDR-FLIP sees no difference.
 LARGEST = 65504.0
 
+#: Luminance of display white below which a pixel is black: brighter exposures overflow.
+DARKEST = 1e-9
+
 #: Stops between the first and the last exposure of HDR-FLIP, each of which takes as long as FLIP.
 MOST_STOPS = 8.0
 
@@ -57,10 +60,11 @@ def exposures(reference: Array) -> tuple[float, float]:
     median of the pixels that are not. At most `MOST_STOPS` apart; both 0 for a black image.
     """
     light = luminance(reference)
-    lit = light[light > 0.0]
+    lit = light[light > DARKEST]
     if not lit.size:
         return 0.0, 0.0
-    middle = np.median(light) or np.median(lit)
+    middle = np.median(light)
+    middle = middle if middle > DARKEST else np.median(lit)
     start, stop = (float(np.log2(SHOWN / y)) for y in (light.max(), middle))
     return start, min(stop, start + MOST_STOPS)
 

@@ -9,8 +9,8 @@ ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three, flip-evaluator the last two. Beside them stands the signed ratio of luminances in
-stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
+colour-science defines the first three, flip-evaluator computes the last two. Beside them stands
+the signed ratio of luminances in stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
 """
 
 from __future__ import annotations

@@ -75,12 +75,17 @@ def resize(scene, size):
         parameters.update()
 
 
-def gbuffer(scene, width=GRID, height=GRID, sensor=0):
-    """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
+def camera_rays(scene, width, height, sensor=0):
+    """Return the rays through the centres of ``width`` by ``height`` cells of the film."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     position = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
     ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
-    si = scene.ray_intersect(ray)
+    return ray
+
+
+def gbuffer(scene, width=GRID, height=GRID, sensor=0):
+    """Trace the rays of `camera_rays`."""
+    si = scene.ray_intersect(camera_rays(scene, width, height, sensor))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points, normals = (

@@ -88,7 +88,7 @@ def _annotate(results, folder, level, variables):
 def table(results, level):
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    rows = [headings, *([_cell(cell) for cell in _cells(result)] for result in results)]
+    rows = [headings, *([cell(cell) for cell in _cells(result)] for result in results)]
     head = ["### fotismos check", "", lines.verdict(results, level), ""]
     return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 
@@ -101,7 +101,7 @@ def _cells(result):
     return result.name, result.status, f"{what} ({len(moved)} in all)", *numbers
 
 
-def _cell(text):
+def cell(text):
     """Return text in one line that Markdown shows as it is; `markdown` sees to bars."""
     text = junit.clean(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)

@@ -3,6 +3,7 @@
 import click
 
 from reports import jobs
+from reports.ci import asked
 from reports.run import batch
 from reports.terminal import verbosity
 
@@ -46,7 +47,10 @@ from reports.terminal import verbosity
     help="Find causes and remedies, in a small size; not of a picture. [default: why]",
 )
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
+@asked.with_options(*asked.bounds, *asked.files)
+@click.pass_context
 def compare(
+    context,
     scenes,
     output,
     figures,
@@ -57,6 +61,11 @@ def compare(
     timeout,
     workers,
     scheduler,
+    max_mean,
+    max_visible,
+    junit,
+    summary,
+    link,
     **rendering,
 ):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
@@ -80,6 +89,7 @@ def compare(
       fotismos compare my_scenes/
       fotismos compare my_scene.xml --heuristic my_shader.py
       fotismos compare my_scene.xml --image theirs.exr
+      fotismos compare my_scenes/ --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     has_image, is_asked = bool(rendering["image"]), with_cost or cost
@@ -87,4 +97,7 @@ def compare(
         raise click.UsageError("--image goes with one scene, and without --why.")
     with_cost = is_asked or (with_cost is None and not has_image)
     wanted = batch.Wanted(jobs.request(rendering), figures, with_cost, fresh, scripts)
-    batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler))
+    words = {"max_mean": max_mean, "max_visible": max_visible, "junit": junit}
+    judge = asked.Judge(words | {"summary": summary, "link": link})
+    batch.run(scenes, output, wanted, jobs.pool(timeout, workers, scheduler), judge=judge)
+    context.exit(judge.exit_code)

@@ -7,7 +7,7 @@ of them may kill.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,13 +21,20 @@ from reports.run.single import Wanted
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
+    from reports.page.scene_view import SceneView
     from reports.run.stages import Run
 
 More = Callable[[Pool, "Run"], dict[str, Any]]
+Judge = Callable[[Path, Sequence["SceneView"]], None]
 
 
 def run(
-    names: Iterable[str], folder: Path, wanted: Wanted, pool: Pool, more: More | None = None
+    names: Iterable[str],
+    folder: Path,
+    wanted: Wanted,
+    pool: Pool,
+    more: More | None = None,
+    judge: Judge | None = None,
 ) -> None:
     """Compare scenes, and write the results of each, then page and tables of all.
 
@@ -43,6 +50,8 @@ def run(
         Where they are compared; it is ended.
     more
         Does what else the page shows in the pool, counts its time, and returns it in a dictionary.
+    judge
+        Called in the end, with the output folder and the views of the scenes that were compared.
 
     Raises
     ------
@@ -73,6 +82,8 @@ def run(
                     _write(record, folder, found, views, failures, wanted.figures, shown)
                 raise
             _write(record, folder, found, views, failures, wanted.figures, shown)
+            if judge is not None:
+                judge(folder, [views[place] for place in found if place in views])
     if failures:
         error = max(failures.values(), key=lambda error: error.exit_code)
         count = f"{len(failures)} of {len(found)} scenes failed, "
