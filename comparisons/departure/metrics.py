@@ -10,7 +10,8 @@ hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many e
 =============  ================================  ==========================================
 
 colour-science defines the first three, flip-evaluator computes the last two. Beside them stands
-the signed ratio of luminances in stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
+the signed ratio of luminances in stops, which is no distance. Statistics over an image are in
+`comparisons.departure.statistics`.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def _annotate(results, folder, level, variables):
 def table(results, level):
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    rows = [headings, *([cell(cell) for cell in _cells(result)] for result in results)]
+    rows = [headings, *([*map(cell, _cells(result))] for result in results)]
     head = ["### fotismos check", "", lines.verdict(results, level), ""]
     return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 

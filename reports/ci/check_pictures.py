@@ -30,9 +30,8 @@ def pictures(check, before=None):
 
     ``heuristic`` and ``reference`` are the halves as they are now; ``*-change`` says by how much
     the luminance of each block changed, ``*-p`` how probable that is by chance, corrected for all
-    that was tested; ``*-before`` is the
-    baseline's own picture, where ``before`` has it, and ``*-error`` ΔE2000 from
-    it.
+    that was tested; ``*-before`` is the baseline's own picture, where ``before`` has it, and
+    ``*-error`` ΔE2000 from it.
     """
     made = {}
     for half in HALVES:

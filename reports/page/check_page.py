@@ -9,7 +9,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from comparisons.check.measurement import HALVES
-from comparisons.departure.metrics import LEADING
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from heuristic import program
 from reports.ci import lines
 from reports.ci.check_pictures import LARGEST_ERROR
@@ -28,9 +28,9 @@ TITLES = {"heuristic": "Textbook half", "reference": "Reference"}
 KINDS = {
     "-before": "Before",
     "": "Now",
+    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} and more (light)",
     "-change": "Change of luminance, by block",
-    "-p": "Chance that nothing moved, by block",
-    "-error": f"{LEADING.label}, from 0 to {LARGEST_ERROR:g}",
+    "-p": "Chance of this though nothing changed, by block",
 }
 """Captions of the pictures of a half, by the ending of their names."""
 
@@ -62,7 +62,7 @@ def render(results: Sequence[Result], level: float) -> str:
 
 
 def write(folder: Path, results: Sequence[Result], level: float) -> Path | None:
-    """Write the page to a folder and return its path; where nothing moved, delete an earlier one."""
+    """Write the page to a folder and return its path; None if nothing moved."""
     if not any(result.status == "failed" for result in results):
         ownership.clear(folder, (PAGE,))
         return None
@@ -74,6 +74,7 @@ def _failure(result):
     """Return what the template shows of one baseline."""
     halves = [_half(result, half) for half in HALVES]
     sides = result.check.before, result.check.after
+    sides = result.check.before, result.check.after
     before, after = (measured.metrics[LEADING.name].value for measured in sides)
     return {
         "result": result,
@@ -81,9 +82,16 @@ def _failure(result):
         "after": f"{after:.3f}",
         "versions": lines.versions_line(result),
         "halves": [half for half in halves if half["moved"]] or halves,
-        "moved": [lines.moved_cells(move) for move in result.check.moved[:SHOWN]],
+        "moved": [_cells(move) for move in result.check.moved[:SHOWN]],
         "update": program.command("check", result.path, "--update"),
     }
+
+
+def _cells(move):
+    """Return the cells of a row, metrics by their labels."""
+    name, *numbers = lines.moved_cells(move)
+    labels = {metric.name: metric.label for metric in (*METRICS.values(), RATIO)}
+    return labels.get(name, name), *(number.replace("-", "−") for number in numbers)
 
 
 def _half(result, half):

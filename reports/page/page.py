@@ -25,6 +25,7 @@ from markupsafe import Markup
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS
+from comparisons.departure.ranking import rankings
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import luminance
 from comparisons.records import plain
@@ -130,6 +131,7 @@ def render(
             columns=overview.columns(),
             legends=legends(),
             equations=equations,
+            ranking=rankings([scene.record for scene in scenes]),
             verifications=verifications,
             **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
             run=run,
