@@ -92,7 +92,7 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     if summary is not None:
         address = (link or str(page)) if page else ""
         summaries.append(summary, summaries.of_check(results, significance, address))
-    notes = annotations.annotate(results, output, significance)
+    notes = annotations.annotate(results, output, significance, written=summary)
     if as_json:
         click.echo(to_json(check_record.of_all(results, significance)), nl=False)
     elif not verbosity.is_quiet():
