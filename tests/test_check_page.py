@@ -135,3 +135,14 @@ def test_a_summary_that_cannot_be_written_is_a_message(run, baselines_folder, tm
     words = ("check", baselines_folder / "fig-8-6a.json", "-o", tmp_path / "out")
     code, _, messages = run(*words, "--summary", tmp_path / "file/s.md")
     assert (code, "Name a file that can be written to" in messages) == (2, True)
+
+
+def test_a_baseline_from_before_a_metric_is_checked_without_it(run, baselines_folder, tmp_path):
+    path = baselines_folder / "fig-8-6a.json"
+    data = json.loads(path.read_text(encoding="utf-8"))
+    for name in ("ldr_flip", "hdr_flip"):
+        del data["metrics"][name]
+    path.write_text(json.dumps(data), encoding="utf-8")
+    code, printed, _ = run("check", path, "--json", "-o", tmp_path / "out")
+    (found,) = json.loads(printed)["checks"]
+    assert (code, set(found["metrics"])) == (0, set(data["metrics"]))
