@@ -3,6 +3,7 @@
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+from comparisons.departure.metrics import drawn
 from tests.browser.conftest import NOISY_ID
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
@@ -95,8 +96,8 @@ def test_without_scripts_all_scenes_have_pictures_numbers_and_charts(visitor):
     page = visitor.page
     page.goto(visitor.report.url)
     assert page.locator(".scene:visible").count() == 2
-    assert page.locator(".scene .pictures img:visible").count() == 14
-    assert page.locator(".scene .chart svg:visible").count() == 8
+    assert page.locator(".scene .pictures img:visible").count() == 2 * (4 + len(drawn()))
+    assert page.locator(".scene .chart svg:visible").count() == 2 + 2 * len(drawn())
     assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0
 
@@ -106,7 +107,7 @@ def test_paper_gets_the_static_pictures(visitor):
     page.emulate_media(media="print")
     assert not page.locator("#viewer").is_visible()
     assert page.locator(".scene:visible").count() == 1
-    assert page.locator(".scene .pictures img:visible").count() == 7
+    assert page.locator(".scene .pictures img:visible").count() == 4 + len(drawn())
     visitor.open()
     assert page.locator(".scene:visible").count() == 2
     assert page.locator(".overview").is_visible()
