@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons import atomic
+from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.processes.worker import end_after_task
@@ -60,6 +61,7 @@ class Request:
     allow_empty: bool = False
     image: tuple[str, ...] = ()
     transfer: str | None = None
+    pixels_per_degree: float | None = None
 
     def __post_init__(self) -> None:
         values = {key: str(value) for key, value in dict(self.define or ()).items()}
@@ -95,6 +97,18 @@ class Request:
                 f"options {', '.join(unknown)} are not known: choose of {', '.join(sorted(known))}."
             )
         return cls(**words)
+
+    @property
+    def viewing(self) -> Viewing:
+        """The viewing conditions.
+
+        Raises
+        ------
+        InputError
+            For one that is not allowed.
+        """
+        given = self.pixels_per_degree
+        return DEFAULT_VIEWING if given is None else Viewing(pixels_per_degree=given)
 
     def stated(self) -> dict[str, Any]:
         """Return what is asked for as plain data, without what is None, False or empty."""
@@ -149,6 +163,7 @@ class Case:
             allow_empty=asked.allow_empty,
             image=asked.image,
             transfer=asked.transfer,
+            viewing=asked.viewing,
         )
 
     def asking(self, **changes: Any) -> "Case":

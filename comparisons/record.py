@@ -30,7 +30,7 @@ from heuristic.heuristics import named
 from reference.planning.light_by_light import loses_light
 from reference.rendering.guard import Verdict
 
-LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "flip-evaluator", "OpenEXR")
 
 
 @dataclass(frozen=True)

@@ -147,6 +147,8 @@ def rendering_options(command):
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
+        click.option("--pixels-per-degree", type=Within(min=1, max=1000), metavar="N",
+                     help="FLIP: pixels to a degree of the eye's view. [default: 67]"),
         click.option("--allow-empty", is_flag=True,
                      help="Take pictures in which no pixel sees a surface."),
     )  # fmt: skip

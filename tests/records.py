@@ -114,6 +114,8 @@ def data():
             "dE_ITP": metric(12.91),
             "dE_CAM16UCS": metric(3.638),
             "rmse": metric(0.04871, ()),
+            "ldr_flip": metric(0.1234, ()),
+            "hdr_flip": metric(0.2345, ()),
         },
         "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
         "significant": {"fraction": 0.632, "undetermined": 0.171, "level": 0.05},

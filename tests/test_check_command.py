@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from comparisons.check.moved import Move
+from comparisons.departure.metrics import METRICS
 from heuristic.errors import InputError
 from reports.ci import annotations, junit
 from tests.schemas import schema
@@ -50,7 +51,7 @@ def test_what_moved_fails_with_a_table_and_pictures(run, folder, tmp_path):
     assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", printed)
     assert f"fotismos check {folder / 'fig-8-6b.json'} --update" in printed
     names = {path.name for path in (out / "check/fig-8-6b").iterdir()}
-    kinds = ("", "-change", "-p", "-error")
+    kinds = ("", "-before", "-change", "-p", "-error")
     pictures = {f"{half}{kind}.png" for half in ("heuristic", "reference") for kind in kinds}
     assert names == {".fotismos", "check.json", *pictures}
     assert {path.name for path in out.iterdir()} == {".fotismos", ".fotismos-lock", "check"}
@@ -78,7 +79,9 @@ def test_json_says_what_moved(run, folder, tmp_path):
     assert (move["half"], move["block"]) == ("reference", [2, 3])
     assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
     assert move["p_corrected"] < failed["significance"] < 0.01
-    assert failed["tested"] == 5 + 2 * 3 * (1 + 4 * 4)  # metrics; halves, channels, blocks
+    assert failed["tested"] == len(METRICS) + 1 + 2 * 3 * (
+        1 + 4 * 4
+    )  # metrics; halves, channels, blocks
 
 
 def test_one_bad_baseline_does_not_keep_the_others(run, folder, tmp_path):

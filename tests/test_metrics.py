@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from comparisons.departure.metric import Pixelwise
 from comparisons.departure.metrics import (
     LOG2_EPSILON,
     METRICS,
@@ -28,6 +29,9 @@ from reference.rendering.renderer import require_finite
 
 VIEWING = Viewing()
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
+POINTWISE = pytest.mark.parametrize(
+    "metric", [m for m in METRICS.values() if isinstance(m, Pixelwise)], ids=lambda m: m.name
+)
 PERCEPTUAL = pytest.mark.parametrize("metric", [m for m in METRICS.values() if not m.linear])
 
 # Sharma, Wu and Dalal 2005, table 1: two CIE L*a*b* colours and their ΔE00, to 4 decimals.
@@ -184,7 +188,7 @@ def test_cam16ucs_is_the_formula(images):
     )
 
 
-@ALL
+@POINTWISE
 def test_identity_is_zero_and_order_does_not_matter(metric, images):
     test, reference = images
     np.testing.assert_array_equal(metric(test, test), 0.0)
@@ -199,7 +203,7 @@ def test_the_exposure_is_a_factor_on_both_images(metric, images):
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9)
 
 
-@ALL
+@POINTWISE
 def test_blocks_do_not_show(metric):
     rng = np.random.default_rng(2)
     test, reference = rng.random((2, 190, 180, 3))  # 34,200 pixels: one block and a bit
@@ -208,7 +212,7 @@ def test_blocks_do_not_show(metric):
     np.testing.assert_array_equal(whole[-1:], metric(test[-1:], reference[-1:]))
 
 
-@ALL
+@POINTWISE
 def test_arguments_are_left_alone(metric, images):
     coordinates = [metric.coordinates(image, VIEWING) for image in images]
     before = [c.copy() for c in (*images, *coordinates)]
@@ -275,7 +279,7 @@ def test_best_exposure_finds_a_known_factor(metric, factor, images):
     assert after.max == pytest.approx(0.0, abs=1e-3)
 
 
-@ALL
+@POINTWISE
 def test_best_exposure_is_the_minimum_of_a_scan(metric, images):
     """With another shape there is no exact factor; no factor of a fine scan may do better."""
     reference = images[1]
@@ -338,7 +342,7 @@ def test_linear_summaries(images):
     json.dumps([plain(summary), plain(ratios)])
 
 
-@ALL
+@POINTWISE
 def test_noise_floor_is_what_noise_alone_gives(metric):
     """Twice the noise gives twice the floor, another draw the same, none gives none."""
     rng = np.random.default_rng(3)

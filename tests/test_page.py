@@ -175,7 +175,7 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
 def test_pictures_have_texts_and_maps_their_ranges(record, pictures):
     shown = Page(page.render([records.view(record, embedded=pictures)]))
     drawings = [attrs for tag, attrs in shown.tags if "data-picture" in attrs]
-    assert len({attrs["data-picture"] for attrs in drawings}) == len(drawings) == 7
+    assert len({attrs["data-picture"] for attrs in drawings}) == len(drawings) == 4 + len(drawn())
     assert all(len(attrs["aria-label"]) > 15 for attrs in drawings)
     for metric_ in METRICS.values():
         assert metric_.definition in shown.text

@@ -31,6 +31,10 @@ def test_the_dataset_is_that_of_the_study(shipped):
         assert {name: row[name] for name in values} == values
 
 
+LATER = {"ldr_flip", "hdr_flip"}
+"""Metrics that are younger than the shipped dataset."""
+
+
 @pytest.mark.parametrize(
     ("part", "every"), [("incidence", 50), ("by name", 80), ("profile", 1), ("lamp", 14)]
 )
@@ -40,8 +44,8 @@ def test_points_computed_again_are_as_in_the_dataset(part, every, rgb, shipped):
     (chosen,) = [p for p in study.parts if p.name == part]
     for block in point.blocks(chosen)[::every]:
         for row in point.rows(block):
-            for name, value in row.items():
-                expected = wanted[row["point"]][name]
+            for name in row.keys() - LATER:
+                value, expected = row[name], wanted[row["point"]][name]
                 if isinstance(value, float) and name != "exposure":
                     # The fourth digit: compilers differ, and noise floors magnify it.
                     expected = pytest.approx(expected, rel=2e-3, abs=2e-3)

@@ -16,7 +16,7 @@ from msgspec import Meta, structs
 from comparisons import record, records
 from comparisons.case import Request
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
-from comparisons.departure.metrics import BUILT_IN, METRICS, RATIO
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.records import VERSION, Amount, Record, Versions, laid_out
 from heuristic import program
 from heuristic.errors import InputError
@@ -141,7 +141,7 @@ def _require_metrics(metrics):
     for name in metrics:
         if name not in {*METRICS, RATIO.name}:
             raise ValueError(f"{name!r} is not a metric.")
-    for name in (*BUILT_IN, RATIO.name):
+    for name in (LEADING.name, RATIO.name):
         if name not in metrics:
             raise ValueError(f"the metric {name!r} is missing.")
 

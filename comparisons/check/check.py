@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import mitsuba as mi
 import numpy as np
 
-from comparisons.check.measurement import PASSES, Measurement, Pictures, measure
+from comparisons.check.measurement import PASSES, Measurement, Pictures, block_edges, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
+from comparisons.check.objects import Seen, seen
 from comparisons.compare import guarded
+from comparisons.departure.spaces import luminance
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size
 
@@ -31,6 +34,8 @@ class Check:
         Chance of an alarm though nothing changed.
     pictures
         Both halves as they are now.
+    seen
+        The objects of the scene, where something moved.
     """
 
     before: Measurement
@@ -39,6 +44,7 @@ class Check:
     moved: tuple[Move, ...]
     level: float
     pictures: Pictures
+    seen: Seen | None = None
 
     @property
     def passed(self):
@@ -48,6 +54,21 @@ class Check:
     def change(self, half):
         """Return the change of a half's blocks, (rows, columns, 3) linear RGB."""
         return self.after.colours[half].blocks - self.before.colours[half].blocks
+
+    def objects(self, half, before=None):
+        """Return the share that each object has of a half's change, the largest first.
+
+        ``before`` is the half's picture when the baseline was made; without it, or in another
+        size, changes are known by blocks alone, and shared by what is seen in each.
+        """
+        now = getattr(self.pictures, half)
+        if before is None or before.shape != now.shape:
+            change = luminance(np.abs(self.change(half)))
+            rows, columns = (np.diff(block_edges(side)) for side in now.shape[:2])
+            spread = change.repeat(rows, axis=0).repeat(columns, axis=1)
+        else:
+            spread = luminance(np.abs(now - before))
+        return self.seen.carried(spread)
 
     def p_values(self, half):
         """Return the least p-value of each block of a half, corrected for all that was tested."""
@@ -61,11 +82,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Measured:
-    """A scene as it was just measured: with the samples taken, and the pictures."""
+    """A scene as it was just measured: with the samples taken, the pictures, and the scene."""
 
     measurement: Measurement
     pictures: Pictures
     spp: int
+    scene: mi.Scene
 
 
 def measure_scene(source, options, passes=PASSES, progress: Callable | None = None):
@@ -91,7 +113,7 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     for half in (ready.heuristic, ready.reference):
         half.spp = max(1, spp // passes)
     found, pictures = measure(ready, options.seed, passes, options.viewing, progress)
-    return Measured(found, pictures, spp)
+    return Measured(found, pictures, spp, ready.scene)
 
 
 def check(source, options, before, level=LEVEL, progress=None):
@@ -120,7 +142,9 @@ def check(source, options, before, level=LEVEL, progress=None):
             f" scene {shapes[1][0]} by {shapes[1][1]}. Write it again with --update."
         )
     moves = differences(before, after)
-    return Check(before, now.measurement, moves, tuple(moved(moves, level)), level, now.pictures)
+    found = tuple(moved(moves, level))
+    objects = seen(now.scene) if found else None
+    return Check(before, now.measurement, moves, found, level, now.pictures, objects)
 
 
 def made_small(case):

@@ -5,10 +5,13 @@ dE2000         CIE DE2000                        display-referred: exposed, clip
 dE_ITP         ITU-R BT.2124                     HDR: absolute luminance up to 10,000 cd/m²
 dE_CAM16UCS    CAM16-UCS (Li et al. 2017)        display-referred, with viewing conditions
 rmse           root mean square                  linear light, neither exposed nor clipped
+ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial frequency
+hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three. Beside them stands the signed ratio of luminances in
-stops, which is no distance. Statistics over an image are in `comparisons.departure.statistics`.
+colour-science defines the first three, flip-evaluator computes the last two. Beside them stands
+the signed ratio of luminances in stops, which is no distance. Statistics over an image are in
+`comparisons.departure.statistics`.
 """
 
 from __future__ import annotations
@@ -18,8 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from comparisons.departure.flip import hdr_flip, ldr_flip
 from comparisons.departure.metric import (
     METRICS,
+    Metric,
     Pixelwise,
     checked_pair,
     declare,
@@ -111,6 +116,34 @@ RMSE = METRICS.own(
         linear=True,
         coordinates=_linear,
         difference=_root_mean_square,
+    )
+)
+
+METRICS.own(
+    Metric(
+        name="ldr_flip",
+        label="LDR-FLIP",
+        unit="from 0 to 1, which green and blue are apart",
+        definition="FLIP (Andersson et al. 2020) of the images as a display shows them: what is "
+        "seen in flipping between them, edges and points apart, at the pixels per degree given.",
+        caution="It holds for one distance from the screen. Above white it sees nothing.",
+        map_range=(0.0, 1.0),
+        rounding=1e-4,
+        function=ldr_flip,
+    )
+)
+METRICS.own(
+    Metric(
+        name="hdr_flip",
+        label="HDR-FLIP",
+        unit="from 0 to 1, which green and blue are apart",
+        definition="The largest LDR-FLIP over the exposures from that which shows the brightest "
+        "light of the reference to that which shows its median (Andersson et al. 2021, ACES).",
+        caution="Nobody sees all these exposures at once: a pixel counts by its worst.",
+        map_range=(0.0, 1.0),
+        rounding=1e-4,
+        drawn=False,
+        function=hdr_flip,
     )
 )
 

@@ -35,6 +35,9 @@ Array = NDArray[np.float64]
 #: ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m².
 PQ_PEAK = 10_000.0
 
+#: Of a viewing condition, pixels to a degree: filters grow with it, and no eye resolves so many.
+MOST_PIXELS = 1000.0
+
 #: Pixels converted at a time: temporaries stay small whatever the image's size.
 _BLOCK = 2**17
 
@@ -58,12 +61,21 @@ class Viewing(Record):
     ambient_illuminance: Annotated[Positive, Meta(description="CAM16: illuminance, lx.")] = 64.0
     background: Annotated[Positive, Meta(description="CAM16: Y_b; white is 100.")] = 20.0
     surround: Literal["average"] = "average"
+    # As the authors of FLIP state it: 0.7 m from a screen 0.7 m wide with 3840 pixels.
+    pixels_per_degree: Annotated[
+        float, Meta(ge=1, le=MOST_PIXELS, description="FLIP: pixels to a degree of the eye's view.")
+    ] = 67.0
 
     def __post_init__(self) -> None:
         for name in ("exposure", "white_luminance", "ambient_illuminance", "background"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise InputError(f"viewing: {name} is {value}, but must be positive and finite")
+        if not 1.0 <= self.pixels_per_degree <= MOST_PIXELS:
+            raise InputError(
+                f"pixels per degree: {self.pixels_per_degree} is not allowed: give a number from 1"
+                f" to {MOST_PIXELS:g}, such as 67."
+            )
 
     def record(self) -> dict[str, float | str]:
         """The values as written to ``comparison.json``."""

@@ -226,7 +226,8 @@ def best_exposure(
 ) -> float:
     """The factor on `test`, within ±6 stops, that makes the mean of `metric` over `mask` smallest.
 
-    That of a linear metric is the factor of least squares. Of others, the mean is taken over at
+    That of a linear metric is the factor of least squares, which is taken for a metric of
+    neighbourhoods, too: it would have to look at whole images. Of others, the mean is taken over at
     most 16,384 counted pixels, drawn with a fixed seed. Whole stops bracket the minimum, a bounded
     scalar search (Brent) finds it to 0.001 stop, and the factors 1 and least squares compete with
     it, so an image that is a multiple of the reference gives that multiple exactly. 1 if no pixel
@@ -237,7 +238,7 @@ def best_exposure(
 
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    if metric.linear:
+    if metric.linear or not isinstance(metric, Pixelwise):
         return least_squares_factor(test[mask], reference[mask])
     lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
     if not all(lit):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -82,10 +83,15 @@ def resize(scene: Scene, size: tuple[int, int]) -> None:
         parameters.update()
 
 
-def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0) -> GBuffer:
-    """Trace the rays through the centres of ``width`` by ``height`` cells of the film."""
+def camera_rays(scene: Scene, width: int, height: int, sensor: int = 0) -> Any:
+    """Return the rays through the centres of ``width`` by ``height`` cells of the film."""
     places = np.meshgrid(np.arange(width), np.arange(height))
-    si = scene.ray_intersect(pixel_rays(scene, (width, height), *places, sensor))
+    return pixel_rays(scene, (width, height), *places, sensor)
+
+
+def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0) -> GBuffer:
+    """Trace the rays of :func:`camera_rays`."""
+    si = scene.ray_intersect(camera_rays(scene, width, height, sensor))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points, normals = (

@@ -33,7 +33,7 @@ TEAMCITY = str.maketrans({c: f"|{c}" for c in "'|[]"} | {"\n": "|n", "\r": "|r"}
 """What each service wants in place of characters that its lines are made of."""
 
 
-def annotate(results, folder, level, environment=None):
+def annotate(results, folder, level, environment=None, written=None):
     """Write the files that the CI service reads, and return the lines that it looks for.
 
     Parameters
@@ -46,14 +46,17 @@ def annotate(results, folder, level, environment=None):
         Significance of the whole command.
     environment
         Variables of the environment; those of this process where they are not given.
+    written
+        A file that has the table already, by ``--summary``.
 
     Raises
     ------
     InputError
         When a file cannot be written to.
     """
+    variables = os.environ if environment is None else environment
     try:
-        return _annotate(results, folder, level, os.environ if environment is None else environment)
+        return _annotate(results, folder, level, variables, written)
     except OSError as error:
         raise InputError(
             f"{error.filename or folder}: {error.strerror or error}. This is where the CI service"
@@ -61,11 +64,11 @@ def annotate(results, folder, level, environment=None):
         ) from error
 
 
-def _annotate(results, folder, level, variables):
+def _annotate(results, folder, level, variables, written):
     bad = [result for result in results if result.exit_code]
     if variables.get("GITHUB_ACTIONS") == "true":
         summary = variables.get("GITHUB_STEP_SUMMARY")
-        if summary:
+        if summary and Path(summary) != written:
             with Path(summary).open("a", encoding="utf-8") as file:
                 file.write(table(results, level))
         return [_github(result, variables) for result in bad]
@@ -88,7 +91,7 @@ def _annotate(results, folder, level, variables):
 def table(results, level):
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    rows = [headings, *([_cell(cell) for cell in _cells(result)] for result in results)]
+    rows = [headings, *([*map(cell, _cells(result))] for result in results)]
     head = ["### fotismos check", "", lines.verdict(results, level), ""]
     return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 
@@ -101,7 +104,7 @@ def _cells(result):
     return result.name, result.status, f"{what} ({len(moved)} in all)", *numbers
 
 
-def _cell(text):
+def cell(text):
     """Return text in one line that Markdown shows as it is; `markdown` sees to bars."""
     text = junit.clean(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)

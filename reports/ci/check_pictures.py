@@ -15,7 +15,7 @@ from reports.files import images
 LONGEST = 640
 """Pixels of the longer side; small pictures are enlarged, pixel by pixel."""
 
-NAMES = tuple(half + kind for half in HALVES for kind in ("", "-change", "-p", "-error"))
+NAMES = tuple(half + kind for half in HALVES for kind in ("", "-before", "-change", "-p", "-error"))
 """Names of all pictures that a failure can have."""
 
 LARGEST_ERROR = 2.0
@@ -30,7 +30,8 @@ def pictures(check, before=None):
 
     ``heuristic`` and ``reference`` are the halves as they are now; ``*-change`` says by how much
     the luminance of each block changed, ``*-p`` how probable that is by chance, corrected for all
-    that was tested; ``*-error`` is ΔE2000 from the baseline's own picture, where ``before`` has it.
+    that was tested; ``*-before`` is the baseline's own picture, where ``before`` has it, and
+    ``*-error`` ΔE2000 from it.
     """
     made = {}
     for half in HALVES:
@@ -41,6 +42,7 @@ def pictures(check, before=None):
         if before is not None:
             size = before[half].shape[:2]
             distance = LEADING(_reduced_to(now, size), before[half])
+            made[f"{half}-before"] = _enlarged(images.tonemap(before[half]))
             made[f"{half}-error"] = _enlarged(images.error_map(distance, LARGEST_ERROR))
     return {name: images.png(picture) for name, picture in made.items()}
 

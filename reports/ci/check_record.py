@@ -39,6 +39,13 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
     moved: tuple[Move, ...] | None = None
     metrics: dict[str, Before] | None = None
     versions: dict[str, VersionChange] | None = None
+    causes: Annotated[
+        tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
+    ] = ()
+    objects: Annotated[
+        dict[str, dict[str, Share]] | None,
+        Meta(description="By half: the share of the change that each object has."),
+    ] = None
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
 
 
@@ -75,6 +82,8 @@ def of(result):
         message=result.message,
         **compared,
         versions=result.versions or None,
+        causes=result.causes,
+        objects=result.objects,
         pictures=result.folder and result.folder.as_posix(),
     )
 

@@ -5,8 +5,9 @@ from pathlib import Path
 from time import perf_counter
 
 from comparisons import record
-from comparisons.check import baseline, check
+from comparisons.check import baseline, check, diagnosis
 from comparisons.check.check import Check
+from comparisons.check.measurement import HALVES
 from comparisons.check.moved import LEVEL
 from comparisons.records import to_json
 from heuristic.errors import FotismosError
@@ -46,6 +47,10 @@ class Result:
         Where the pictures of a failure are.
     versions
         Those that changed since the baseline was made, by name.
+    causes
+        Of a failure: sentences on why, as far as the numbers tell.
+    objects
+        Of a failure: the share of the change that each object has, by half.
     """
 
     path: Path
@@ -57,6 +62,8 @@ class Result:
     exit_code: int = 0
     folder: Path | None = None
     versions: dict[str, VersionChange] | None = None
+    causes: tuple[str, ...] = ()
+    objects: dict[str, dict[str, float]] | None = None
 
     @property
     def name(self):
@@ -100,6 +107,7 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
         exit_code=0 if found.passed else 1,
         folder=None if found.passed else folder,
         versions=_changed_versions(file.baseline),
+        **({} if found.passed else _explained(found, pictures)),
     )
     if result.folder is not None:
         _write_failure(result, pictures)
@@ -180,6 +188,13 @@ def _changed_versions(baseline):
         for name, old in baseline.versions.items()
         if now.get(name) != old
     }
+
+
+def _explained(found: Check, before):
+    """Return causes and objects of a failure; ``before`` are the baseline's pictures, if any."""
+    halves = (half for half in HALVES if any(move.half == half for move in found.moved))
+    objects = {half: found.objects(half, before and before[half]) for half in halves}
+    return {"causes": tuple(diagnosis.causes(found)), "objects": objects}
 
 
 def _write_failure(result, before):

@@ -34,6 +34,27 @@ def document(results):
     return tostring(root, encoding="utf-8", xml_declaration=True)
 
 
+def of_gates(outcomes):
+    """Return the XML document of the gates of a comparison, one test case for each."""
+    states = [outcome.state for outcome in outcomes]
+    totals = {
+        "name": "fotismos compare",
+        "tests": str(len(outcomes)),
+        "failures": str(states.count("failed")),
+        "errors": "0",
+    }
+    root = Element("testsuites", totals)
+    suite = SubElement(root, "testsuite", totals, skipped=str(states.count("undetermined")))
+    for outcome in outcomes:
+        name = clean(f"{outcome.scene}, {outcome.gate}")
+        case = SubElement(suite, "testcase", name=name, classname="fotismos.compare")
+        kind = {"failed": "failure", "undetermined": "skipped"}.get(outcome.state)
+        if kind:
+            SubElement(case, kind, message=clean(str(outcome)))
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True)
+
+
 def headline(result):
     """Return one line on a baseline that did not pass."""
     if result.check is None:

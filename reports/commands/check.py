@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from comparisons import atomic
 from heuristic.errors import InputError
 from reports import jobs
+from reports.ci import asked
 from reports.terminal import verbosity
 
 
@@ -35,12 +35,7 @@ from reports.terminal import verbosity
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
 @jobs.json_option
-@click.option(
-    "--junit",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Write a JUnit XML file.",
-)
+@asked.with_options(*asked.files)
 @jobs.output_option("out")
 @jobs.timeout_option
 @jobs.workers_option
@@ -50,8 +45,8 @@ from reports.terminal import verbosity
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.pass_context
-def check(context, baseline, update, scenes, images, significance, as_json, junit, output,
-          timeout, workers, scheduler, **rendering):  # fmt: skip
+def check(context, baseline, update, scenes, images, significance, as_json, junit, summary, link,
+          output, timeout, workers, scheduler, **rendering):  # fmt: skip
     """Say whether anything that was measured before moved by more than noise.
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
@@ -77,27 +72,34 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     with jobs.pool(timeout, workers, scheduler) as pool:
         pool.start()
         from comparisons.records import to_json
-        from reports.ci import annotations, check_record, lines, suite
+        from reports.ci import annotations, check_record, lines, suite, summaries
         from reports.ci.junit import document
+        from reports.page import check_page
         from reports.run.output import below, held
 
+        page = None
         if update:
             results = suite.update(pool, baseline, scenes, images, significance, given)
         else:
             with held(output, jobs.command_line()) as held_folder:
                 folder = below(held_folder, "check")
                 results = suite.examine(pool, baseline, significance, given.get("seed"), folder)
+                page = check_page.write(folder, results, significance)
     for result in results:
         if result.status == "error":
             click.echo(f"fotismos: error: {result.message}", err=True)
-    if junit is not None:
-        _write(junit, document(results))
-    notes = annotations.annotate(results, output, significance)
+    asked.write_junit(junit, lambda: document(results))
+    if summary is not None:
+        address = (link or str(page)) if page else ""
+        summaries.append(summary, summaries.of_check(results, significance, address))
+    notes = annotations.annotate(results, output, significance, written=summary)
     if as_json:
         click.echo(to_json(check_record.of_all(results, significance)), nl=False)
     elif not verbosity.is_quiet():
         for line in lines.lines(results, significance):
             click.echo(line)
+        if page:
+            click.echo(f"page: {page}")
     elif any(result.exit_code for result in results):
         click.echo(lines.verdict(results, significance))
     for line in notes:
@@ -114,11 +116,3 @@ def _require_consistent(update, scenes, images, given):
             f"{', '.join(wanting)}: a check renders its baseline's own scene and options. Add"
             " --update to write another baseline."
         )
-
-
-def _write(path, content):
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.put(path, content)
-    except OSError as error:
-        raise InputError(f"--junit {path}: {error.strerror or error}.") from error

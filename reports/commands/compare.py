@@ -3,6 +3,7 @@
 import click
 
 from reports import jobs, opening
+from reports.ci import asked
 from reports.run import batch
 from reports.terminal import verbosity
 
@@ -47,7 +48,10 @@ from reports.terminal import verbosity
 )
 @opening.option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
+@asked.with_options(*asked.bounds, *asked.files)
+@click.pass_context
 def compare(
+    context,
     scenes,
     output,
     figures,
@@ -59,6 +63,11 @@ def compare(
     workers,
     scheduler,
     is_opened,
+    max_mean,
+    max_visible,
+    junit,
+    summary,
+    link,
     **rendering,
 ):
     """Say how far textbook shading is from physics, where, and whether that is more than noise.
@@ -82,6 +91,7 @@ def compare(
       fotismos compare my_scenes/
       fotismos compare my_scene.xml --heuristic my_shader.py
       fotismos compare my_scene.xml --image theirs.exr
+      fotismos compare my_scenes/ --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     has_image, is_asked = bool(rendering["image"]), with_cost or cost
@@ -90,5 +100,8 @@ def compare(
     with_cost = is_asked or (with_cost is None and not has_image)
     request = jobs.request(rendering)
     wanted = batch.Wanted(request, figures, with_cost=with_cost, fresh=fresh, with_scripts=scripts)
+    words = {"max_mean": max_mean, "max_visible": max_visible, "junit": junit}
+    judge = asked.Judge(words | {"summary": summary, "link": link})
     rendered = jobs.pool(timeout, workers, scheduler)
-    batch.run(scenes, output, wanted, rendered, seen=opening.seen(is_opened))
+    batch.run(scenes, output, wanted, rendered, seen=opening.seen(is_opened), judge=judge)
+    context.exit(judge.exit_code)

@@ -11,7 +11,7 @@ from heuristic.errors import InstallationError
 from heuristic.version import __version__
 from reports import jobs
 
-LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
+LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "flip-evaluator", "OpenEXR")
 
 TIMEOUT_S = 300
 """Seconds for a test rendering, which takes some ten where nothing is compiled yet."""

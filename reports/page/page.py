@@ -25,6 +25,7 @@ from markupsafe import Markup
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, METRICS
+from comparisons.departure.ranking import rankings
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
@@ -131,6 +132,7 @@ def render(
             columns=overview.columns(),
             legends=legends(),
             equations=equations,
+            ranking=rankings([scene.record for scene in scenes]),
             verifications=verifications,
             **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
             run=run,

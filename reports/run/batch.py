@@ -7,7 +7,7 @@ of them may kill. The page is written as soon as there is a picture, and again a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,10 +21,12 @@ from reports.run.single import Wanted
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
+    from reports.page.scene_view import SceneView
     from reports.run.stages import Run
     from reports.terminal.progress import Bar
 
 More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
+Judge = Callable[[Path, Sequence["SceneView"]], None]
 
 SKETCH, WHOLE, MORE = 1.0, 8.0, 3.0
 """About how long a scene takes in each part of a run, for the time that is left."""
@@ -37,6 +39,7 @@ def run(
     pool: Pool,
     more: More | None = None,
     seen: Callable[[Path], object] = lambda _: None,
+    judge: Judge | None = None,
 ) -> None:
     """Compare scenes, and write the results of each, then page and tables of all.
 
@@ -54,6 +57,8 @@ def run(
         Does what else the page shows in the pool, counts its time, and returns it in a dictionary.
     seen
         Called with the page's path when it is there for the first time.
+    judge
+        Called in the end, with the output folder and the views of the scenes that were compared.
 
     Raises
     ------
@@ -102,6 +107,8 @@ def run(
                     raise
                 error = raised
             _write(record, growing, wanted.figures, shown)
+            if judge is not None:
+                judge(folder, [growing.views[place] for place in found if place in growing.views])
     if error:
         raise error
     if growing.failures:

@@ -74,6 +74,7 @@ def noisy():
         "dE2000": np.minimum(2 * spot, 90) + rng.random((HEIGHT, WIDTH)),
         "dE_ITP": 5 * spot,
         "dE_CAM16UCS": spot,
+        "ldr_flip": spot / 40,
     }
     marks = rng.choice([0.0, 0.5, 1.0], (HEIGHT, WIDTH))
     found = comparison(NOISY, heuristic, reference, maps, marks)

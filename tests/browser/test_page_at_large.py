@@ -3,6 +3,7 @@
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+from comparisons.departure.metrics import drawn
 from tests.browser.conftest import NOISY_ID
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
@@ -96,7 +97,7 @@ def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visit
     assert page.locator(".scene:visible").count() == 2
     assert page.locator(".card img:visible").count() == 6
     assert page.locator("canvas:visible").count() == 0
-    assert page.locator(".scene .chart svg:visible").count() == 8
+    assert page.locator(".scene .chart svg:visible").count() == 2 + 2 * len(drawn())
     assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0
 
@@ -118,7 +119,7 @@ def test_paper_gets_the_pictures_of_the_open_scene(visitor):
     page.emulate_media(media="print")
     assert not page.locator("#viewer, #inspector, #distribution").filter(visible=True).count()
     assert page.locator(".scene:visible").count() == 1
-    assert pictures.and_(page.locator(":visible")).count() == 7
+    assert pictures.and_(page.locator(":visible")).count() == 4 + len(drawn())
     assert min(pictures.evaluate_all(COLOURS)) > 2
     visitor.open()
     assert page.locator(".scene:visible").count() == 0

@@ -42,7 +42,7 @@ def check_inspector(shown, channels, x, y):
     for half in ("heuristic", "reference"):
         for index, value in enumerate(rgb(channels, half, x, y)):
             assert read(shown[f"{half}.{index}"]) == float(f"{value:.2e}")
-    for name in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
+    for name in ("dE2000", "dE_ITP", "dE_CAM16UCS", "ldr_flip"):
         if 0 < channels[f"{name}.Y"][y, x] < 0.01:
             assert shown[name] == "< 0.01"
             continue
@@ -166,7 +166,7 @@ def test_side_by_side_has_three_panes_of_the_same_place(visitor, report):
 def test_error_maps_have_their_colours_and_their_bar(visitor, report):
     page = visitor.open(f"{SCENE}&mode=error")
     channels = report.channels[NOISY]
-    for name, top in (("dE2000", 20), ("dE_ITP", 60), ("dE_CAM16UCS", 20)):
+    for name, top in (("dE2000", 20), ("dE_ITP", 60), ("dE_CAM16UCS", 20), ("ldr_flip", 1)):
         page.get_by_label("Map of the error").select_option(name)
         page.get_by_label("Range").select_option(str(top))
         expected = magma(channels[f"{name}.Y"][16, 30], top)

@@ -1,0 +1,110 @@
+"""The page of a check that failed: before, after, what moved, where, on which object, and why."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from comparisons.check.measurement import HALVES
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
+from heuristic import program
+from reports.ci import lines
+from reports.ci.check_pictures import LARGEST_ERROR
+from reports.ci.checks import Result
+from reports.files import ownership
+from reports.run.places import PAGE
+from reports.terminal.printing import percent
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+SHOWN = 12
+"""Quantities that a scene's table has, and objects that carry a change."""
+
+TITLES = {"heuristic": "Textbook half", "reference": "Reference"}
+
+KINDS = {
+    "-before": "Before",
+    "": "Now",
+    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} and more (light)",
+    "-change": "Change of luminance, by block",
+    "-p": "Chance of this though nothing changed, by block",
+}
+"""Captions of the pictures of a half, by the ending of their names."""
+
+
+def render(results: Sequence[Result], level: float) -> str:
+    """Return the page of all results of a check, those that failed in full.
+
+    Parameters
+    ----------
+    results
+        Of :mod:`reports.ci.checks`; the pictures of a failure are read from its folder.
+    level
+        Significance of the whole command.
+    """
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters["percent"] = percent
+    failed = [result for result in results if result.status == "failed"]
+    return environment.get_template("check.html.j2").render(
+        verdict=lines.verdict(results, level),
+        results=results,
+        failed=[_failure(result) for result in failed],
+    )
+
+
+def write(folder: Path, results: Sequence[Result], level: float) -> Path | None:
+    """Write the page to a folder and return its path; None if nothing moved."""
+    if not any(result.status == "failed" for result in results):
+        ownership.clear(folder, (PAGE,))
+        return None
+    ownership.write(ownership.folder(folder) / PAGE, render(results, level))
+    return folder / PAGE
+
+
+def _failure(result):
+    """Return what the template shows of one baseline."""
+    halves = [_half(result, half) for half in HALVES]
+    sides = result.check.before, result.check.after
+    sides = result.check.before, result.check.after
+    before, after = (measured.metrics[LEADING.name].value for measured in sides)
+    return {
+        "result": result,
+        "before": f"{before:.3f}",
+        "after": f"{after:.3f}",
+        "versions": lines.versions_line(result),
+        "halves": [half for half in halves if half["moved"]] or halves,
+        "moved": [_cells(move) for move in result.check.moved[:SHOWN]],
+        "update": program.command("check", result.path, "--update"),
+    }
+
+
+def _cells(move):
+    """Return the cells of a row, metrics by their labels."""
+    name, *numbers = lines.moved_cells(move)
+    labels = {metric.name: metric.label for metric in (*METRICS.values(), RATIO)}
+    return labels.get(name, name), *(number.replace("-", "−") for number in numbers)
+
+
+def _half(result, half):
+    paths = {kind: result.folder / f"{half}{kind}.png" for kind in KINDS}
+    objects = (result.objects or {}).get(half, {})
+    return {
+        "title": TITLES[half],
+        "moved": any(move.half == half for move in result.check.moved),
+        "pictures": [(KINDS[kind], _uri(path)) for kind, path in paths.items() if path.is_file()],
+        "has_before": paths["-before"].is_file(),
+        "objects": list(objects.items())[:SHOWN],
+    }
+
+
+def _uri(path):
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
