@@ -206,6 +206,7 @@ def _shaders():
 
     found = examples.comparisons()
     replace("shaders.md", "shaders", examples.table(found))
+    replace("shaders.md", "mistakes", examples.mistakes())
     shown = examples.pictures(found)
     _sheet("shaders.png", list(shown), [list(shown.values())])
 
