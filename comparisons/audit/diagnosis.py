@@ -223,7 +223,8 @@ def _asked(heuristic: Heuristic, points: Textbook) -> np.ndarray:
     ]
     given = Given(
         vector(points.position), vector(points.normal), vector(points.view), material, lights,
-        mi.Spectrum(points.ambient.tolist()), lambda toward, distance: dr.full(mi.Bool, True, POINTS),
+        mi.Spectrum(points.ambient.tolist()),
+        lambda toward, distance: dr.full(mi.Bool, True, POINTS),
     )  # fmt: skip
     parameters = {each.name: mi.Float(each.default) for each in heuristic.parameters}
     value = mi.Spectrum(heuristic.evaluate(given, mi.Point2f(0.5), parameters, None))
