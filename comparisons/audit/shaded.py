@@ -70,8 +70,8 @@ class Shaded(Subject):
         self.heuristic = heuristic
         if heuristic.needs == {"position"}:
             raise InputError(
-                f"heuristic {heuristic.name} reads positions alone, as a picture does, and cannot be"
-                " asked from all directions. Compare it on a scene."
+                f"heuristic {heuristic.name} reads positions alone, as a picture does, and cannot"
+                " be asked from all directions. Compare it on a scene."
             )
         known = {each.name: each for each in heuristic.parameters}
         for name in given:

@@ -2,8 +2,8 @@
 
 ``prepare`` draws the scene once, with several fragments per pixel, by its own camera. ``shade``
 then looks up the picture where a point is seen, between four fragments. So camera rays, film and
-noise are those of every other heuristic. Fragments that triangles leave empty at an outline take the nearest colour.
-"""
+noise are those of every other heuristic. Fragments that triangles leave empty at an outline take
+the nearest colour.
 
 from dataclasses import dataclass
 from functools import cache
@@ -64,7 +64,6 @@ def _declared(name: str, kind: str) -> Heuristic:
         label,
         frozenset({"position"}),
         prepare=lambda scene: prepared(scene, kind),
-        form="blinn",
         refuse=_refused,
         code=f"{browser.version()} {kind}",
     )

@@ -6,8 +6,9 @@ three.js (MeshPhongMaterial) computes, of a light of intensity ``I``, at a dista
     F = specular + (1 - specular) 2^((-5.55473 V.H - 6.98316) V.H),
 
 where the power of two is close to Schlick's ``(1 - V.H)^5``. So a light gets ``pi I_p``, ``color``
-is ``k_d``, and ``specular`` is ``8 k_s / (n + 2)``: both lobes are then equal where light, viewer
-and normal coincide, but for 0.02 % of Schlick's.
+is ``k_d``, the exponent of a lobe about the mirrored vector becomes ``4 n``, since the half vector
+turns half as fast, and ``specular`` is ``8 k_s / (n + 2)``: both lobes are then as wide, and equal
+where light, viewer and normal coincide, but for 0.02 % of Schlick's.
 """
 
 import base64
@@ -78,8 +79,8 @@ def _material(given: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
     }
     if kind == "lambert":
         return found
-    n = given["n"]
-    scale = terms.normalisation(given["form"], n) if given["normalised"] else 1.0
+    scale = terms.normalisation(given["form"], given["n"]) if given["normalised"] else 1.0
+    n = given["n"] * {"phong": 4, "blinn": 1}[given["form"]]
     return found | {"specular": (8 * scale * k_s / (n + 2)).tolist(), "shininess": n}
 
 
