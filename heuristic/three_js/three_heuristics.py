@@ -4,6 +4,7 @@
 then looks up the picture where a point is seen, between four fragments. So camera rays, film and
 noise are those of every other heuristic. Fragments that triangles leave empty at an outline take
 the nearest colour.
+"""
 
 from dataclasses import dataclass
 from functools import cache

@@ -8,7 +8,7 @@ from comparisons.exports.exported import Exported
 from heuristic.scene_data import Triangles
 
 NEAR = 1e-3
-"""``fade_distance``: POV-Ray's 2 / (1 + (d / NEAR)^2) is the inverse square but for NEAR^2 / d^2."""
+"""``fade_distance``: 2 / (1 + (d / NEAR)^2) is the inverse square but for NEAR^2 / d^2."""
 
 
 def translated(scene: Exported) -> str:
@@ -53,9 +53,10 @@ def _texture(material: dict, ambient: tuple[float, ...]) -> str:
     pigment = k_d if k_d.any() else np.ones(3)
     lit = np.array(material["k_i"]) + np.array(material["k_a"]) * ambient
     own = np.divide(lit, pigment, out=np.zeros(3), where=pigment > 0)
+    k_s, n = np.mean(material["k_s"]), material["n"]
     return (
         f"pigment {{ rgb {_triple(pigment)} }} finish {{ ambient {_triple(own)}"
-        f" diffuse {float(k_d.any())} phong {np.mean(material['k_s'])} phong_size {material['n']} }}"
+        f" diffuse {float(k_d.any())} phong {k_s} phong_size {n} }}"
     )
 
 
