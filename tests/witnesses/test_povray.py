@@ -81,7 +81,7 @@ def test_a_whole_scene_is_that_of_povray(rgb, name, tmp_path):
     assert inside.sum() > 0.3 * SIZE**2
     relative = np.abs(kernel / np.maximum(witness, 0.01) - 1)[inside]
     assert np.percentile(relative, 90) < 5e-3
-    assert kernel[inside].mean() == pytest.approx(witness[inside].mean(), rel=1e-3)
+    assert np.median(relative) < 1e-3
 
 
 def scaled(right, factor, **changes):
