@@ -39,6 +39,33 @@ def test_nothing_is_told_of_right_shaders_and_other_models(rgb, path):
     assert told(path) == ()
 
 
+OTHER = {
+    "lambert": ("0", "material.k_d * cosine"),
+    "rim": ("0.3 * (1 - dr.dot(point.normal, point.view))", "material.k_d * cosine"),
+    "blinn": ("0", "material.k_d * cosine + material.k_s * dr.select(cosine > 0,"
+              " dr.maximum(dr.dot(point.normal, half), 1e-6) ** (4 * material.n), 0)"),
+    "white": ("1", "0 * cosine"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_nothing_is_told_of_models_of_another_kind(rgb, tmp_path, name):
+    first, light = OTHER[name]
+    path = tmp_path / "other.py"
+    path.write_text(
+        "import drjit as dr\nimport mitsuba as mi\n"
+        "def shade(point):\n"
+        f"    material, value = point.material, mi.Spectrum({first})\n"
+        "    for each in point.lights:\n"
+        "        cosine = dr.maximum(dr.dot(point.normal, each.toward), 0)\n"
+        "        half = dr.normalize(each.toward + point.view)\n"
+        f"        value += each.intensity * ({light})\n"
+        "    return value\n",
+        encoding="utf-8",
+    )
+    assert told(path) == ()
+
+
 def test_the_model_written_out_is_the_kernel(rgb):
     for name, along in (("phong", mistakes.mirrored), ("blinn", mistakes.halfway)):
         points = diagnosis._points(along)

@@ -61,7 +61,7 @@ def _told(heuristic: Heuristic) -> Iterator[str]:
     along = halfway if heuristic.form == "blinn" else mirrored
     points = _points(along)
     seen = _asked(heuristic, points)
-    is_cut = seen.max() == 1 and np.count_nonzero(seen == 1) > 3
+    is_cut = seen.max() == 1 and 3 < np.count_nonzero(seen == 1) < seen.size / 2
     counts = seen < 1 if is_cut else np.ones_like(seen, bool)
     found = _explained(points, seen, counts)
     if found is None:
