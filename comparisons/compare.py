@@ -25,6 +25,7 @@ from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.records import Pixels
 from comparisons.terms import tracing
+from heuristic import heuristics
 from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
@@ -226,6 +227,7 @@ def _compare(source, options, progress, command, kept):
         command=command,
         noise_target=estimates.stop,
         picture=picture,
+        suspicions=_suspicions(options),
         **numbers,
     )
     return Comparison(made, images, terms, no_terms)
@@ -260,6 +262,15 @@ def _picture(place, options, images):
     )
     given = images.heuristic, images.reference, images.counted
     return structs.replace(found, odd=tuple(suspicions.told(found, *given)))
+
+
+def _suspicions(options):
+    """Return what seems to be wrong with a user's own heuristic."""
+    if options.image or heuristics.named(options.heuristic).is_own:
+        return ()
+    from comparisons.audit import diagnosis
+
+    return diagnosis.told(options.heuristic)
 
 
 def _measure(estimates, surface, options, exact):

@@ -294,4 +294,7 @@ class ComparisonRecord(Record, kw_only=True):
     command: Annotated[str, Meta(description="What repeats this comparison.")]
     noise_target: NoiseTarget | None = None
     picture: PictureRecord | None = None
+    suspicions: Annotated[
+        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to have, in words.")
+    ] = ()
     record_version: int = VERSION

@@ -2,16 +2,20 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 
+from comparisons.audit import diagnosis
 from comparisons.case import Request, open_case
 from comparisons.compare import compare
 from comparisons.departure.metrics import LEADING
 from comparisons.record import Comparison
+from heuristic.errors import InputError
 from reports.terminal.tables import markdown
+from tests.wrong_shaders import WRONG, Wrong
 
 SHADERS = Path(__file__).parent / "shaders"
 NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
@@ -35,6 +39,23 @@ def pictures(found: dict[tuple[str, str], Comparison]) -> dict[str, np.ndarray]:
     """Return the images of one scene, by what shaded it."""
     shown = {name: found[name, PICTURED].images.heuristic for name in NAMES}
     return shown | {"reference": found[NAMES[0], PICTURED].images.reference}
+
+
+def mistakes() -> Iterator[str]:
+    """Yield the table of shaders that are wrong on purpose, with what is told of each."""
+    rows = [
+        (wrong.name, wrong.language, f"`{wrong.wrong.strip()}`", _told(wrong)) for wrong in WRONG
+    ]
+    yield from markdown([("Mistake", "In", "Written as", "What is told"), *rows], right=4)
+
+
+def _told(wrong: Wrong) -> str:
+    with TemporaryDirectory() as folder:
+        path = wrong.write(Path(folder))
+        try:
+            return " ".join(diagnosis.told(str(path)))
+        except InputError as error:
+            return f"Refused: {str(error).replace(str(path), path.name)}"
 
 
 def _compared(name: str, scene: str) -> Comparison:

@@ -77,6 +77,7 @@ def main(words):
     _example()
     _witnesses()
     _shaders()
+    _renderers()
     _audits()
     _notebook()
 
@@ -233,8 +234,20 @@ def _shaders():
 
     found = examples.comparisons()
     replace("shaders.md", "shaders", examples.table(found))
+    replace("shaders.md", "mistakes", examples.mistakes())
     shown = examples.pictures(found)
     _sheet("shaders.png", list(shown), [list(shown.values())])
+
+
+def _renderers():
+    """Render scenes by four programs."""
+    import renderers  # beside this script
+
+    found = renderers.rendered()
+    replace("renderers.md", "renderers", renderers.table(found))
+    programs = next(iter(found.values())).images
+    rows = [[one.images[program] for one in found.values()] for program in programs]
+    _sheet("renderers.png", list(found), rows)
 
 
 def _notebook():

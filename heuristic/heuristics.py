@@ -29,6 +29,10 @@ RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "
 """Parameters of the integrator ``heuristic``, which those of heuristics stand beside."""
 
 
+THREE = "three:"
+"""How the names of three.js' heuristics begin."""
+
+
 @dataclass(frozen=True)
 class Range:
     """The bounds of a number, both allowed."""
@@ -87,7 +91,7 @@ class Heuristic:
     ----------
     name
         In commands, records and messages: lower case, digits and hyphens; or ``FILE.py:function``
-        or ``FILE.glsl`` of one in a file.
+        or ``FILE.glsl`` of one in a file, or ``three:KIND`` of three.js'.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
@@ -138,7 +142,8 @@ class Heuristic:
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
+        word = self.name.removeprefix(THREE).replace("-", "")
+        is_word = word.isalnum() and self.name == self.name.lower()
         if not is_word and not in_file(self.name):
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
@@ -229,6 +234,10 @@ def named(name: str) -> Heuristic:
         from heuristic.glsl import shader_files
 
         return shader_files.opened(name)
+    if name.startswith(THREE):
+        from heuristic.three_js import three_heuristics
+
+        return three_heuristics.opened(name)
     if in_file(name):
         from heuristic import shading_files
 

@@ -132,7 +132,7 @@ def rendering_options(command):
                      help="Samples per pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=resolution, metavar="WxH",
                      help="Width and height in place of the film's own."),
-        click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl",
+        click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl|three:phong",
                      help="Which heuristic shades: phong, blinn, what engines use (such as"
                      " mean-ambient), one that a package declares, or a function shade(point) of a"
                      " file. [default: phong]"),

@@ -364,3 +364,43 @@ def test_without_a_driver_it_says_what_to_install(monkeypatch):
 @opengl
 def test_the_doctor_names_the_renderer():
     assert doctor.shaded().startswith(f"runs on {gpu.device().renderer}")
+
+
+WRAPPED = """uniform float wrap = 0.5;  // 0 to 1
+uniform float unused = 2; // 1e-1 to 1e1
+vec3 shade(Point point) {
+    vec3 value = vec3(0);
+    for (int i = 0; i < point.lights.length(); ++i) {
+        float cosine = (dot(point.normal, point.lights[i].toward) + wrap) / (1.0 + wrap);
+        value += point.material.base_color * point.lights[i].intensity * max(cosine, 0.0);
+    }
+    return value + point.ambient * point.material.base_color;
+}
+"""
+
+
+@opengl
+def test_a_uniform_with_bounds_is_a_parameter(rgb, tmp_path):
+    path = tmp_path / "wrapped.glsl"
+    path.write_text(WRAPPED, encoding="utf-8")
+    found = [named(name).parameters for name in (str(path), str(SHADERS / "wrapped.py"))]
+    assert found[0][0] == found[1][0]
+    assert (found[0][1].low, found[0][1].high) == (0.1, 10)
+    images = []
+    for name in (str(path), str(SHADERS / "wrapped.py")):
+        case = open_case("plastic-spheres", Request(heuristic=name, resolution=(24, 24)))
+        half = prepare(case.source, case.options).heuristic
+        for wrap in (0.5, 0.1):
+            half.integrator.parameters["wrap"] = mi.Float(wrap)
+            images.append(np.array(half.render(1)))
+    np.testing.assert_allclose(images[:2], images[2:], rtol=1e-4, atol=1e-5)
+    assert abs(images[0] - images[1]).mean() > 0.01
+
+
+@opengl
+@pytest.mark.parametrize("line", ["uniform float wrap;", "uniform vec3 tint = vec3(1); // 0 to 1"])
+def test_a_uniform_without_bounds_is_refused(tmp_path, line):
+    path = tmp_path / "x.glsl"
+    path.write_text(f"{line}\nvec3 shade(Point point) {{ return vec3(0.5); }}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 1: a uniform here is a parameter"):
+        named(str(path))

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import mitsuba as mi
 
 from comparisons import record
-from comparisons.audit import angles, scattering, shaded
+from comparisons.audit import angles, diagnosis, scattering, shaded
 from comparisons.audit.audit_record import Audit, Checked, Curve
 from comparisons.audit.extremes import values
 from comparisons.audit.gradients import gradients
@@ -43,6 +43,7 @@ def audit(kind: Kind, name: str, given: Mapping[str, Any], command: str = "") ->
         angles=angles.ANGLES,
         curves=curves,
         checks=checks_of(subject, curves),
+        suspicions=diagnosis.told(name) if kind == "heuristic" else (),
         command=command,
         versions=record.versions(),
     )

@@ -62,6 +62,9 @@ class Audit(Record, kw_only=True):
     angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
     curves: tuple[Curve, ...]
     checks: tuple[Checked, ...]
+    suspicions: Annotated[
+        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to have, in words.")
+    ] = ()
     command: str
     versions: Versions
 

@@ -11,7 +11,7 @@ import numpy as np
 from comparisons.audit.subject import Setting, Subject, Tuned
 from comparisons.hard import furnace
 from heuristic import heuristics, terms
-from heuristic.errors import unknown
+from heuristic.errors import InputError, unknown
 from heuristic.heuristics import Heuristic
 from heuristic.lights import DirectionalLight, PointLight
 from heuristic.materials import PairedMaterial
@@ -68,6 +68,11 @@ class Shaded(Subject):
 
     def __init__(self, heuristic: Heuristic, given: Mapping[str, float]) -> None:
         self.heuristic = heuristic
+        if heuristic.needs == {"position"}:
+            raise InputError(
+                f"heuristic {heuristic.name} reads positions alone, as a picture does, and cannot"
+                " be asked from all directions. Compare it on a scene."
+            )
         known = {each.name: each for each in heuristic.parameters}
         for name in given:
             if name not in known:

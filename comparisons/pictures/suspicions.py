@@ -1,20 +1,15 @@
 """What is odd about a picture as a whole, in words: exposure, white, encoding, channels."""
 
 from collections.abc import Iterator
-from itertools import permutations
-from math import pi
 
 import numpy as np
 
 from comparisons.comparison import PictureRecord
-from comparisons.pictures import picture_files
+from comparisons.pictures.readings import READINGS, factor_of_pi
 from comparisons.pictures.registration import TURNED
 
 SHIFT = 0.5
 """Pixels from which a shift is told."""
-
-NEAR_PI = 0.05
-"""Relative distance from a factor of pi that is taken for one."""
 
 LEVEL = 2.0
 """Factor of brightness from which the exposure is told."""
@@ -104,13 +99,9 @@ def _place(found: PictureRecord) -> Iterator[str]:
 
 def _level(found: PictureRecord) -> Iterator[str]:
     level = float(np.mean(found.ratio))
-    for factor, mistake in (
-        (pi, "a missing division by pi"),
-        (1 / pi, "a division by pi too many"),
-    ):
-        if abs(level / factor - 1) < NEAR_PI:
-            yield f"The picture is {level:.3g} times as bright as the reference: {mistake}?"
-            return
+    if mistake := factor_of_pi(level):
+        yield f"The picture is {level:.3g} times as bright as the reference: {mistake}?"
+        return
     if not 1 / LEVEL < level < LEVEL:
         yield f"The picture is {level:.3g} times as bright as the reference: another exposure?"
 
@@ -121,16 +112,8 @@ def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarr
     if plain < 1e-3:
         return ""
     readings = {
-        "Its values look sRGB-encoded: state --transfer srgb, or write linear values.": (
-            picture_files.decoded(picture)
-        ),
-        "Its values look decoded twice: state --transfer linear.": picture_files.encoded(picture),
+        f"Its {each.told}{each.cure and f': {each.cure}'}.": each.undo(picture) for each in READINGS
     }
-    names = ("red", "green", "blue")
-    for order in permutations(range(3)):
-        if order != (0, 1, 2):
-            shown = ", ".join(names[place] for place in order)
-            readings[f"Its channels look like {shown}, in this order."] = picture[..., list(order)]
     for how, turn in TURNED.items():
         readings[f"It looks {how}, or lit from the other side."] = turn(picture)
     distances = {

@@ -2,7 +2,7 @@
 
 import os
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from heuristic.errors import InstallationError
@@ -18,10 +18,20 @@ _kept = threading.local()
 
 @dataclass(frozen=True, eq=False)
 class Device:
-    """An OpenGL context of moderngl's, and the renderer's own name."""
+    """An OpenGL context of moderngl's, the renderer's own name, and buffers that are kept."""
 
     context: Any
     renderer: str
+    kept: dict[int, Any] = field(default_factory=dict)
+
+    def buffer(self, number: int, size: int) -> Any:
+        """Return the buffer of a binding, of so many bytes at least; a new one takes long."""
+        found = self.kept.get(number)
+        if found is None or found.size < size:
+            if found is not None:
+                found.release()
+            found = self.kept[number] = self.context.buffer(reserve=size)
+        return found
 
     @property
     def is_software(self) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from heuristic import trial
 from heuristic.errors import InputError
 from heuristic.glsl import gpu, shader_text
-from heuristic.heuristics import Heuristic
+from heuristic.heuristics import Heuristic, Parameter
 from heuristic.points import INPUTS, LightAtPoint, Point
 
 SIGNATURE = "vec3 shade(Point point)"
@@ -81,12 +81,15 @@ class Shader:
         floats = self._floats(point, lights)
         count = dr.width(point.given.position)
         program, device = self._program(max(len(lights), 1))
+        for name, value in vars(point.parameters).items():
+            if name in program:  # compilers drop what is not used
+                program[name] = float(np.ravel(value)[0])
         colours = np.empty((count, 3), np.float32)
         step = max(min(POINTS, FLOATS // len(floats)), 1)
         for start in range(0, count, step):
             part = slice(start, min(start + step, count))
             chunk = [each if len(each) == 1 else each[part] for each in floats]
-            colours[part] = _run(device.context, program, chunk, part.stop - start)
+            colours[part] = _run(device, program, chunk, part.stop - start)
         return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
 
     def compile(self, lights: int = 2) -> None:
@@ -167,6 +170,7 @@ def tried(word: str, text: str) -> Heuristic:
         shader,
         label,
         frozenset(name for name in INPUTS if name in shader.words),
+        parameters=tuple(Parameter(*each) for each in shader_text.parameters(text)),
         traced=False,
         remarks=remarks,
     )
@@ -200,24 +204,23 @@ def _columns(value: Any, size: int) -> list[np.ndarray]:
     return [np.array(part, np.float32).reshape(-1) for part in parts]
 
 
-def _run(context: Any, program: Any, floats: list[np.ndarray], count: int) -> np.ndarray:
+def _run(device: gpu.Device, program: Any, floats: list[np.ndarray], count: int) -> np.ndarray:
     """Return the colours (points, 3) of a chunk of points."""
+    context = device.context
     lengths = np.array([len(each) for each in floats])
     offsets = np.concatenate([[0], np.cumsum(lengths)[:-1]])
     places = np.stack([offsets, lengths > 1], axis=1).astype(np.int32)
-    sent = [np.concatenate(floats), places]
-    buffers = [context.buffer(np.ascontiguousarray(each).tobytes()) for each in sent]
-    buffers.append(context.buffer(reserve=12 * count))
-    try:
-        for number, buffer in enumerate(buffers):
-            buffer.bind_to_storage_buffer(number)
-        program["fotismos_count"] = count
-        program.run(group_x=-(-count // shader_text.GROUP))
-        context.memory_barrier()
-        colours = np.frombuffer(buffers[-1].read(), np.float32).reshape(count, 3)
-        if (said := context.error) != "GL_NO_ERROR":
-            raise InputError(f"the shader failed on the graphics card: {said}. Does it end?")
-        return colours
-    finally:
-        for buffer in buffers:
-            buffer.release()
+    sizes = 4 * int(lengths.sum()), places.nbytes, 12 * count
+    values, at, colours = (device.buffer(number, size) for number, size in enumerate(sizes))
+    for column, offset in zip(floats, offsets, strict=True):  # a copy less than all at once
+        values.write(column, offset=4 * int(offset))
+    at.write(places)
+    for number, buffer in enumerate((values, at, colours)):
+        buffer.bind_to_storage_buffer(number)
+    program["fotismos_count"] = count
+    program.run(group_x=-(-count // shader_text.GROUP))
+    context.memory_barrier()
+    found = np.frombuffer(colours.read(sizes[-1]), np.float32).reshape(count, 3)
+    if (said := context.error) != "GL_NO_ERROR":
+        raise InputError(f"the shader failed on the graphics card: {said}. Does it end?")
+    return found

@@ -24,6 +24,11 @@ Mesa 22 has the number of the source string right in some of its messages alone.
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
 _PLACE = re.compile(r"(?<![\w.])\d+(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+_NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
+_PARAMETER = re.compile(
+    rf"\s*uniform\s+float\s+(\w+)\s*=\s*{_NUMBER}\s*;\s*//\s*{_NUMBER}\s+to\s+{_NUMBER}\s*$"
+)
+_UNIFORM = re.compile(r"\s*(?:layout\s*\(.*\)\s*)?uniform\b")
 _REFUSED = {
     re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader here is one file: put what is included in"
     " its place",
@@ -102,8 +107,22 @@ void main() {{
 """
 
 
+def parameters(text: str) -> list[tuple[str, float, float, float]]:
+    """Return name, default and bounds of ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
+    found = (each for line in text.splitlines() if (each := _PARAMETER.match(line)))
+    return [(each[1], *map(float, each.groups()[1:])) for each in found]
+
+
 def refusal(text: str) -> tuple[int, str] | None:
     """Return the line of what no shader here may have, and what to do; None where all is well."""
+    for number, (line, own) in enumerate(
+        zip(text.splitlines(), bare(text).splitlines(), strict=False), 1
+    ):
+        if _UNIFORM.match(own) and not _PARAMETER.match(line):
+            return number, (
+                "a uniform here is a parameter: write its default and bounds, as in"
+                " `uniform float wrap = 0.5;  // 0 to 1`"
+            )
     code = bare(text)
     for pattern, advice in _REFUSED.items():
         if found := pattern.search(code):

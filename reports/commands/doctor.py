@@ -52,6 +52,7 @@ def examine(variants):
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
         yield f"GLSL            {pool.do(Task('GLSL', shaded, ()))}"
+        yield f"three.js        {pool.do(Task('three.js', drawn, ()))}"
         apart = pool.do(Task("colour differences", compared, ()))
         yield f"metrics         at most {apart:.0e} from those of colour-science"
 
@@ -78,6 +79,19 @@ def shaded():
         return f"cannot be run, which is needed for --heuristic FILE.glsl alone: {error}"
     shader_files.tried("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
     return f"runs on {device.renderer}{', a software GPU' if device.is_software else ''}"
+
+
+def drawn():
+    """Draw nothing with three.js, and say by which version; or what is to be installed."""
+    from heuristic.three_js import browser
+
+    identity = [[float(row == column) for column in range(4)] for row in range(4)]
+    empty = {"meshes": [], "lights": [], "view": identity, "projection": identity}
+    try:
+        browser.draw(empty | {"width": 2, "height": 2})
+    except InstallationError as error:
+        return f"cannot be run, which is needed for --heuristic three:phong alone: {error}"
+    return f"draws, version {browser.version()}"
 
 
 def compared():

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.exports.exported import Exported, Triangles
+from comparisons.exports.exported import Exported
+from heuristic.scene_data import Triangles
 
 FLOAT, UINT = 5126, 5125
 VERTICES, INDICES = 34962, 34963

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from comparisons.exports.exported import Exported, Triangles
+from comparisons.exports.exported import Exported
+from heuristic.scene_data import Triangles
 
 
 def obj(scene: Exported) -> str:

@@ -13,6 +13,8 @@ def lines(record: Audit) -> Iterator[str]:
     yield f"{record.subject}{given and ', '}{given}: {verdict(record)}"
     yield ""
     yield from tables.printed(_rows(record))
+    if record.suspicions:
+        yield from ("", *record.suspicions)
 
 
 def verdict(record: Audit) -> str:

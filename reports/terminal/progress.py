@@ -100,6 +100,7 @@ def summary(records):
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
+            yield from record.suspicions
         if record.noise_target:
             yield _noise(record)
         guard = record.plan.guard

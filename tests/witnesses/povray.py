@@ -31,8 +31,13 @@ def render(scene: dict, size: int, folder: Path) -> np.ndarray:
     RuntimeError
         With what POV-Ray says, where it cannot.
     """
+    return drawn(translated(scene), size, folder)
+
+
+def drawn(text: str, size: int, folder: Path) -> np.ndarray:
+    """Return the picture (size, size, 3) of a text in POV-Ray's language; see :func:`render`."""
     source, picture = folder / "figure.pov", folder / "figure.exr"
-    source.write_text(translated(scene), encoding="ascii")
+    source.write_text(text, encoding="ascii")
     command = [PROGRAM, f"+I{source}", f"+O{picture}", f"+W{size}", f"+H{size}", *OPTIONS]
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=120)
     if done.returncode:

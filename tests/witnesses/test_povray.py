@@ -6,9 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from comparisons.case import Request, open_case
+from comparisons.compare import prepare
+from comparisons.exports.exported import exported
 from comparisons.gallery.builtin import SCENES
 from heuristic import shading
-from tests.witnesses import povray
+from tests.witnesses import povray, povray_scenes
 
 pytestmark = pytest.mark.skipif(
     povray.PROGRAM is None, reason="POV-Ray is not installed; as root: apt-get install povray"
@@ -64,6 +67,21 @@ def require_agreement(name, folder):
 @pytest.mark.parametrize("name", FIGURES + OTHERS)
 def test_a_figure_is_that_of_povray_to_half_float_rounding(rgb, name, tmp_path):
     require_agreement(name, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["fig-8-9", "lambert-sphere"])
+def test_a_whole_scene_is_that_of_povray(rgb, name, tmp_path):
+    """As triangles, whose normals are a little apart from the sphere's, and with its materials."""
+    case = open_case(name, Request(resolution=(SIZE, SIZE), spp=64, tessellation=48))
+    text = povray_scenes.translated(exported(case.source, case.options))
+    witness = povray.drawn(text, SIZE, tmp_path)
+    ready = prepare(case.source, case.options)
+    kernel = np.array(ready.heuristic.render(1), float)
+    inside = (kernel.max(axis=2) > 0.05) & (witness.max(axis=2) > 0.05)
+    assert inside.sum() > 0.3 * SIZE**2
+    relative = np.abs(kernel / np.maximum(witness, 0.01) - 1)[inside]
+    assert np.percentile(relative, 90) < 5e-3
+    assert np.median(relative) < 1e-3
 
 
 def scaled(right, factor, **changes):

@@ -1,0 +1,84 @@
+"""What docs/renderers.md shows: figures and scenes by the kernel, POV-Ray, three.js and Mitsuba."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+
+from comparisons.case import Case, Request, open_case
+from comparisons.compare import compare, leading_distance
+from comparisons.exports.exported import exported
+from reports.terminal.tables import markdown
+from tests.witnesses import povray, povray_scenes
+
+SCENES = ("fig-8-9", "fig-8-8c", "lambert-sphere", "plastic-spheres")
+SIDE, SAMPLES = 192, 256
+FINER = 4
+"""POV-Ray's rays along each side of a pixel."""
+
+KERNEL, POVRAY, THREE, MITSUBA = "kernel", "POV-Ray", "three.js", "Mitsuba"
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """The images (H, W, 3) of a scene by renderer, and the mean departures of all but the last."""
+
+    images: dict[str, np.ndarray]
+    departures: dict[str, float]
+    from_kernel: dict[str, float]
+
+
+def rendered() -> dict[str, Rendered]:
+    """Render all scenes, by name."""
+    return {name: _rendered(name) for name in SCENES}
+
+
+def table(found: dict[str, Rendered]) -> Iterator[str]:
+    """Yield the table: the mean departure from Mitsuba, and in brackets from the kernel."""
+    rows = [
+        (name, *(_cell(one, renderer) for renderer in (KERNEL, POVRAY, THREE)))
+        for name, one in found.items()
+    ]
+    yield from markdown([("Scene", KERNEL, POVRAY, THREE), *rows], right=1)
+
+
+def _cell(one: Rendered, renderer: str) -> str:
+    shown = f"{one.departures[renderer]:.2f}"
+    return shown if renderer == KERNEL else f"{shown} ({one.from_kernel[renderer]:.2f})"
+
+
+def _rendered(name: str) -> Rendered:
+    asked = Request(resolution=(SIDE, SIDE), spp=SAMPLES)
+    case = open_case(name, asked)
+    kernel = compare(case.source, case.options).images
+    three = open_case(name, Request(**asked.stated() | {"heuristic": "three:phong"}))
+    images = {
+        KERNEL: kernel.heuristic,
+        POVRAY: _povray(case),
+        THREE: compare(three.source, three.options).images.heuristic,
+        MITSUBA: kernel.reference,
+    }
+    departure = leading_distance(case.options.viewing)
+
+    def mean(renderer: str, other: str) -> float:
+        one, two = (images[each][kernel.counted].astype(float) for each in (renderer, other))
+        return float(departure(one, two).mean())
+
+    drawn = (KERNEL, POVRAY, THREE)
+    return Rendered(
+        images,
+        {each: mean(each, MITSUBA) for each in drawn},
+        {each: mean(each, KERNEL) for each in drawn},
+    )
+
+
+def _povray(case: Case) -> np.ndarray:
+    fine = case.asking(tessellation=48)
+    with TemporaryDirectory() as folder:
+        text = povray_scenes.translated(exported(fine.source, fine.options))
+        picture = povray.drawn(text, FINER * SIDE, Path(folder))
+    return picture.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))

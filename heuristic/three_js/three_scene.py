@@ -1,0 +1,135 @@
+"""A scene in three.js' terms, and in words what three.js has no term for.
+
+three.js (MeshPhongMaterial) computes, of a light of intensity ``I``, at a distance ``d``:
+
+    I / d^decay  N.L  (color / pi + F (n + 2) / (8 pi) (N.H)^n),
+    F = specular + (1 - specular) 2^((-5.55473 V.H - 6.98316) V.H),
+
+where the power of two is close to Schlick's ``(1 - V.H)^5``. So a light gets ``pi I_p``, ``color``
+is ``k_d``, the exponent of a lobe about the mirrored vector becomes ``4 n``, since the half vector
+turns half as fast, and ``specular`` is ``8 k_s / (n + 2)``: both lobes are then as wide, and equal
+where light, viewer and normal coincide, but for 0.02 % of Schlick's.
+"""
+
+import base64
+from collections.abc import Iterator
+from math import pi, radians
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic import scene_data, terms
+from heuristic.errors import InputError
+
+FINENESS = 96
+"""Tessellation: a sphere is 384 by 192 cells, at most 7e-5 of its radius inside itself."""
+
+FAR = 1e3
+"""Distance of a light without a place, of which three.js uses the direction alone."""
+
+
+def said(scene: mi.Scene, kind: str) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return a scene for :func:`heuristic.three_js.browser.draw`, and what it leaves out, in words.
+
+    Parameters
+    ----------
+    scene
+        A heuristic half, in RGB.
+    kind
+        ``phong`` or ``lambert``.
+    """
+    camera = scene_data.camera(scene)
+    point = dr.zeros(mi.SurfaceInteraction3f)
+    ambient = np.array(scene_data.numbers(mi.Color3f(scene.integrator().ambient.eval(point))))
+    materials = [scene_data.material_of(shape.bsdf(), 0, scene) for shape in scene.shapes()]
+    emitters = [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+    lights = [scene_data.light_of(emitter, point) for emitter in emitters]
+    meshes = [
+        _mesh(shape, material, ambient, kind)
+        for shape, material in zip(scene.shapes(), materials, strict=True)
+    ]
+    made = {key: camera[key] for key in ("view", "projection", "width", "height")}
+    made |= {"meshes": meshes, "lights": [_light(light) for light in lights]}
+    return made, tuple(dict.fromkeys([*_lost(materials, kind), *_lost_of(lights)]))
+
+
+def _mesh(shape: mi.Shape, material: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
+    found = scene_data.triangles_of(shape, 0, FINENESS)
+    normals = None if found.normals is None else _packed(found.normals, np.float32)
+    return {
+        "positions": _packed(found.positions, np.float32),
+        "normals": normals,
+        "faces": _packed(found.faces, np.uint32),
+        "material": _material(material, ambient, kind) | {"flat": normals is None},
+    }
+
+
+def _packed(array: np.ndarray, kind: type) -> str:
+    return base64.b64encode(np.ascontiguousarray(array, kind).tobytes()).decode()
+
+
+def _material(given: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
+    k_i, k_a, k_s = (np.array(given[name]) for name in ("k_i", "k_a", "k_s"))
+    found = {
+        "type": {"phong": "MeshPhongMaterial", "lambert": "MeshLambertMaterial"}[kind],
+        "color": given["k_d"],
+        "emissive": (k_i + ambient * k_a).tolist(),
+    }
+    if kind == "lambert":
+        return found
+    scale = terms.normalisation(given["form"], given["n"]) if given["normalised"] else 1.0
+    n = given["n"] * {"phong": 4, "blinn": 1}[given["form"]]
+    return found | {"specular": (8 * scale * k_s / (n + 2)).tolist(), "shininess": n}
+
+
+def _light(given: dict) -> dict[str, Any]:
+    """Return a light as three.js has it, in candela and lux.
+
+    Raises
+    ------
+    InputError
+        For one that falls off as no power of the distance.
+    """
+    found = {"color": given["intensity"], "intensity": pi}
+    if given["type"] == "directional":
+        direction = np.array(given["direction"]) / np.linalg.norm(given["direction"])
+        place = -FAR * direction
+        return found | {"type": "DirectionalLight", "position": place.tolist(), "target": [0, 0, 0]}
+    powers = [power for power, value in enumerate(given["attenuation"]) if value]
+    if len(powers) > 1:
+        raise InputError(
+            f"light {given['name']!r} has the attenuation {given['attenuation']}, and three.js has"
+            " one power of the distance. Give one of k0, k1 and k2 alone."
+        )
+    (power,) = powers
+    found |= {
+        "intensity": pi / given["attenuation"][power],
+        "decay": power,
+        "position": given["position"],
+    }
+    if given["type"] == "point":
+        return found | {"type": "PointLight"}
+    target = np.array(given["position"]) + np.array(given["direction"])
+    angle = radians(min(given["cutoff"], 90.0))
+    return found | {"type": "SpotLight", "angle": angle, "target": target.tolist()}
+
+
+def _lost(materials: list[dict], kind: str) -> Iterator[str]:
+    for material in materials:
+        if material["varies"]:
+            names = ", ".join(material["varies"])
+            yield f"{material['name']}: {names} is a texture; its middle is taken everywhere"
+        if kind == "lambert" and any(material["k_s"]):
+            yield f"{material['name']}: its highlight, which MeshLambertMaterial does not have"
+
+
+def _lost_of(lights: list[dict]) -> Iterator[str]:
+    for light in lights:
+        if light.get("exponent"):
+            yield f"{light['name']}: a fall-off within its cone, by the power of the cosine"
+        if light.get("cutoff", 0) > 90:
+            yield f"{light['name']}: what it sends beyond 90 degrees"
+        if light.get("clamped"):
+            yield f"{light['name']}: that its attenuation ends at 1"
