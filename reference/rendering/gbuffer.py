@@ -13,6 +13,14 @@ GRID = 192
 
 
 @dataclass(frozen=True)
+class Owners:
+    """What each pixel (H, W) sees, as its place among ids; -1 for nothing."""
+
+    places: np.ndarray
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class GBuffer:
     """The first surface on a regular grid of camera rays, in world space.
 
@@ -22,11 +30,15 @@ class GBuffer:
         (H, W, 3); the unit shading normal of the side that is seen. Zero where nothing is hit.
     hit
         (H, W), whether the ray meets a surface.
+    shape, bsdf
+        Whose surface it is, and of which material.
     """
 
     position: np.ndarray
     normal: np.ndarray
     hit: np.ndarray
+    shape: Owners
+    bsdf: Owners
 
     def mean_irradiance(self, light_position, falloff):
         """Return the mean of ``(N.L)+ falloff(d, travel)`` over the surface, for a unit light.
@@ -87,4 +99,14 @@ def gbuffer(scene, width=GRID, height=GRID, sensor=0):
         np.array(dr.select(hit, vector, 0)).T.reshape(height, width, 3)
         for vector in (mi.Vector3f(si.p), normal)
     )
-    return GBuffer(points, normals, np.array(hit).reshape(height, width))
+    seen = np.array(hit).reshape(height, width)
+    shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
+    return GBuffer(points, normals, seen, _owners(shape, seen), _owners(si.bsdf(), seen))
+
+
+def _owners(pointers, seen):
+    """Return the :class:`Owners` of an array of pointers, one a pixel."""
+    numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
+    found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
+    names = tuple(pointers[int(at)].id() or "unnamed" if n else "" for n, at in zip(found, first))
+    return Owners(np.where(seen, places.reshape(seen.shape), -1), names)

@@ -66,11 +66,11 @@ FORMS = {"number": number, "parameter": parameter, "seconds": seconds, "percent"
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
-STYLES = ("base", "verdict", "overview", "scene", "viewer", "print")
+STYLES = ("base", "verdict", "overview", "scene", "viewer", "switchboard", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "effects", "painting", "fragment", "address",
     "viewport", "drawing", "inspector", "pointer", "viewer", "keyboard", "overview", "charts",
-    "verdict", "main",
+    "verdict", "switchboard", "objects", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
+from reports.page import switchboard
 from reports.page.embedding import Embedded
+from reports.page.lit import Lit
+from reports.page.switchboard import Sheet
 
 
 class EffectMap(Record):
@@ -28,10 +33,16 @@ class CostView(Record):
     images: dict[str, bytes]
     noise: str
     effects: EffectMap
+    sheet: Sheet | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""
         return self.images[picture_name(kind, name)]
+
+    @property
+    def switchboard(self) -> dict[str, Any]:
+        """What the script of the switchboard needs, where there is a sheet."""
+        return switchboard.data(self.record, self.sheet)
 
 
 class SceneView(Record):
@@ -49,6 +60,8 @@ class SceneView(Record):
         Paths relative to the page by label, shown as links.
     charts, cost
         Of what accuracy costs, where that was studied.
+    lit
+        Which shape and which material each pixel sees.
     """
 
     record: ComparisonRecord
@@ -58,6 +71,7 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
+    lit: Lit | None = None
 
 
 def picture_name(kind, name):

@@ -48,6 +48,8 @@ function openScene(scene) {
   const section = byId(`scene=${scene.id}`);
   void viewer.open(scene, section);
   void enliven(section);
+  void makeSwitchboard(section);
+  void makeObjects(section);
 }
 
 /** @param {string} id @returns {HTMLElement} */
