@@ -109,7 +109,7 @@ def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total
 
 
 def bounds(mask: NDArray) -> dict[str, int]:
-    """Return ``x, y, width, height`` of the box around the pixels of a mask (H, W), one at least."""
+    """Return ``x, y, width, height`` of the box around a mask (H, W) of one pixel at least."""
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
     return {"x": int(x[0]), "y": int(y[0]), "width": width, "height": height}

@@ -1,4 +1,4 @@
-"""The corners of a lattice of effects: some of them simulated, the others as the heuristic has them.
+"""The corners of a lattice of effects: some simulated, the others as the heuristic has them.
 
 A page shows the picture of each corner that was rendered, with what it leaves and what it costs.
 """
@@ -6,6 +6,7 @@ A page shows the picture of each corner that was rendered, with what it leaves a
 from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta
 
 from comparisons.records import Record
@@ -22,7 +23,7 @@ class Corner(Record):
     error
         Mean ΔE2000 against the reference, without the part of noise; noise may leave it below 0.
     seconds
-        Mean time of one rendering.
+        Median time of one rendering.
     """
 
     effects: Annotated[tuple[str, ...], Meta(description="Those that are simulated.")]
@@ -48,7 +49,7 @@ def corners(
         Of a set: errors (R + 1, N) whose first row is of all replicates, and times (R,).
     """
     found = [
-        Corner(labels(players, each), float(error(each)[0].mean()), float(seconds(each).mean()))
+        Corner(labels(players, each), float(error(each)[0].mean()), float(np.median(seconds(each))))
         for each in rendered
     ]
     return tuple(sorted(found, key=lambda corner: (len(corner.effects), corner.effects)))

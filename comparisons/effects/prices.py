@@ -102,7 +102,7 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
             )
         )
     departure, left = (_filled(error(each)[0], counted) for each in (nothing, everything))
-    found_corners = corners(effects, errors, error, time)
+    reached = corners(effects, errors, error, time)
     previews = {labels(effects, each): image(each).preview for each in errors}
     own = lattice.of("reference")
     priced = Prices(
@@ -114,12 +114,11 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
         spp=lattice.spp,
         replicates=lattice.replicates,
         orders=shares.orders,
-        corners=found_corners,
+        corners=reached,
     )
     mean = _jackknife(error(everything).mean(axis=1))
     closure = Closure(mean=mean.value, low=mean.low, high=mean.high)
-    shown = {corner.effects: previews[corner.effects] for corner in found_corners}
-    return Priced(priced, closure, maps, departure, left, shown)
+    return Priced(priced, closure, maps, departure, left, previews)
 
 
 def _jackknife(values):

@@ -108,5 +108,6 @@ def _owners(pointers, seen):
     """Return the :class:`Owners` of an array of pointers, one a pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
-    names = tuple(pointers[int(at)].id() or "unnamed" if n else "" for n, at in zip(found, first))
+    named = zip(found, first, strict=True)
+    names = tuple((pointers[int(at)].id() or "unnamed") if number else "" for number, at in named)
     return Owners(np.where(seen, places.reshape(seen.shape), -1), names)

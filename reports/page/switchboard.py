@@ -1,4 +1,4 @@
-"""The effect switchboard: previews of all corners of a scene's lattice of effects, in one picture."""
+"""The effect switchboard: a preview of each corner of a scene's lattice, in one picture."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def _verdict(views):
 def _compare(pool, record, places, folder, wanted, requests, views, failures):
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from comparisons.case import name_of
-    from reports.terminal import progress
+    from reports.terminal import carrier_lines, progress
 
     alone = len(places) == 1
     with progress.shown() as bar:
@@ -116,14 +116,14 @@ def _compare(pool, record, places, folder, wanted, requests, views, failures):
             views[task.name] = view
             for stage, seconds in spent.seconds.items():
                 record.add(stage, seconds)
-            verbosity.remark(progress.details(view.record))
+            verbosity.remark([*progress.details(view.record), *carrier_lines.lines(view.record)])
 
 
 def _write(run, folder, places, views, failures, with_figures, shown):
     """Write what is about all scenes, in the order of their places, and say what came of them."""
     from reports.run import output
     from reports.run.stages import Failure
-    from reports.terminal import progress, tables
+    from reports.terminal import carrier_lines, progress, tables
 
     # Of several processes the one with the shorter scene is ready first.
     views = [views[place] for place in places if place in views]
@@ -137,6 +137,7 @@ def _write(run, folder, places, views, failures, with_figures, shown):
     ]
     if views:
         steps.append(lambda: tables.write(folder / output.TABLES, records))
+        steps.append(lambda: carrier_lines.write(folder / output.TABLES, records))
     if views and with_figures:
         from reports.charts import figures
 

@@ -84,7 +84,10 @@ def view(study, made):
         noise=" ".join(each(study.record) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
         sheet=switchboard.sheet(
-            [images.tonemap(each, study.record.viewing.exposure) for each in study.previews.values()]
+            [
+                images.tonemap(study.previews[corner.effects], study.record.viewing.exposure)
+                for corner in study.record.prices.corners
+            ]
         ),
     )
 
