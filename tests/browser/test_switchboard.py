@@ -42,8 +42,11 @@ def colour(page, canvas, x=0.5, y=0.5):
     return page.evaluate(
         """([canvas, x, y]) => {
           const element = document.querySelector(`.scene.open canvas[${canvas}]`);
-          const at = [Math.floor(x * element.width), Math.floor(y * element.height)];
-          return [...element.getContext("2d").getImageData(...at, 1, 1).data.slice(0, 3)];
+          const copy = document.createElement("canvas");
+          copy.width = copy.height = 1;
+          const context = copy.getContext("2d", { willReadFrequently: true });
+          context.drawImage(element, ...[x * element.width, y * element.height].map((at) => -Math.floor(at)));
+          return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
         }""",
         [canvas, x, y],
     )
