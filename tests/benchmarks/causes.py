@@ -1,14 +1,7 @@
-"""The share of a comparison's CPU time that finding its causes takes, over the built-in scenes.
-
-::
-
-    python -m tests.benchmarks.causes [SCENE ...]
-"""
-
-import heuristic  # noqa: F401  isort: skip  finds LLVM before Mitsuba is imported
+"""The share of a comparison's CPU time that finding its causes takes, over the built-in scenes."""
 
 import os
-import sys
+from statistics import median
 
 from comparisons.case import Request, open_case
 from comparisons.compare import compare
@@ -24,20 +17,18 @@ def cpu_seconds():
     return used.user + used.system
 
 
-def main(names):
-    """Print a line for each scene, and the median of the shares."""
-    shares = []
-    for name in names or SCENES:
+def run(rounds):
+    """Return CPU seconds of each scene as a whole and of its causes, from one run of each."""
+    found = {}
+    for name in SCENES:
         case = open_case(name, Request.of({"resolution": (SIZE, SIZE)}))
         begin = cpu_seconds()
         compare(case.source, case.options)
         compared = cpu_seconds()
         quick(case.source, case.options)
         whole, causes = cpu_seconds() - begin, cpu_seconds() - compared
-        shares.append(causes / whole)
-        print(f"{name:20} {whole:6.1f} s, causes {causes:5.1f} s, {shares[-1]:.0%}", flush=True)
-    print(f"median {sorted(shares)[len(shares) // 2]:.0%}, largest {max(shares):.0%}")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+        found[name] = {"whole": whole, "causes": causes}
+        print(f"{name:20} {whole:6.1f} s, causes {causes:5.1f} s, {causes / whole:.0%}", flush=True)
+    shares = [each["causes"] / each["whole"] for each in found.values()]
+    print(f"median {median(shares):.0%}, largest {max(shares):.0%}")
+    return found

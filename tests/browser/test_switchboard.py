@@ -45,7 +45,8 @@ def colour(page, canvas, x=0.5, y=0.5):
           const copy = document.createElement("canvas");
           copy.width = copy.height = 1;
           const context = copy.getContext("2d", { willReadFrequently: true });
-          context.drawImage(element, ...[x * element.width, y * element.height].map((at) => -Math.floor(at)));
+          const [left, top] = [x * element.width, y * element.height].map(Math.floor);
+          context.drawImage(element, -left, -top);
           return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
         }""",
         [canvas, x, y],
