@@ -18,7 +18,7 @@ from comparisons.comparison import (
     Significant,
     TimeSpent,
 )
-from comparisons.departure import limits, marks, regions, statistics
+from comparisons.departure import limits, marks, objects, regions, statistics
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
 from comparisons.departure.statistics import histogram
 from comparisons.options import Options
@@ -298,6 +298,9 @@ def _measure(estimates, surface, options, exact):
     significant = marks.find(
         estimates.difference, test, counted, leading_distance(options.viewing), exact=exact
     )
+    error = maps[LEADING.name]
+    shapes, seen = objects.find(error, counted, surface.shape, surface.bsdf)
+    materials, made_of = objects.find(error, counted, surface.bsdf)
     images = Images(
         heuristic=test,
         reference=reference,
@@ -307,8 +310,12 @@ def _measure(estimates, surface, options, exact):
         maps=maps,
         significant=significant,
         counted=counted,
+        objects=seen,
+        materials=made_of,
     )
     numbers = {
+        "objects": shapes,
+        "materials": materials,
         "metrics": metrics,
         "log2_luminance": ratio,
         "significant": Significant(

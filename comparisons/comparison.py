@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from comparisons.departure.limits import LimitCounts
+from comparisons.departure.objects import Carrier
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
@@ -186,12 +187,22 @@ class Times(Record):
     compile_s: Annotated[Amount | None, Meta(description="Code generation and back end.")]
 
 
+CAUSES = "causes"
+"""The stage in which causes are found."""
+
+
 class TimeSpent(Record):
     """Times of both renderings, and of other work by its name."""
 
     heuristic: Times
     reference: Times
     stages: dict[str, float]
+
+    @property
+    def share_of_causes(self) -> float:
+        """Of the whole, what finding causes took."""
+        whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
+        return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
 
 
 class Unrepresentable(Record):
@@ -281,6 +292,11 @@ class ComparisonRecord(Record, kw_only=True):
         tuple[Region, ...],
         Meta(description="Boxes that hold most of dE2000, of greatest worth first."),
     ]
+    objects: Annotated[
+        tuple[Carrier, ...],
+        Meta(description="Shapes by their share of dE2000; the last may hold all others."),
+    ] = ()
+    materials: Annotated[tuple[Carrier, ...], Meta(description="The same for their BSDFs.")] = ()
     histograms: Annotated[
         dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratio.")
     ]

@@ -37,7 +37,8 @@ LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "flip-evaluator", "O
 class Images:
     """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
 
-    ``maps`` holds the perceptual metrics by name and ``log2_luminance``.
+    ``maps`` holds the perceptual metrics by name and ``log2_luminance``; ``objects`` and
+    ``materials`` the place in the record of what each pixel sees, -1 where nothing counts.
     """
 
     heuristic: np.ndarray
@@ -48,6 +49,8 @@ class Images:
     maps: dict[str, np.ndarray]
     significant: np.ndarray
     counted: np.ndarray
+    objects: np.ndarray
+    materials: np.ndarray
 
 
 @dataclass(frozen=True)

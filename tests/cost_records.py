@@ -12,6 +12,15 @@ WIDTH, HEIGHT = 12, 8
 DETERMINISTIC = {"monte_carlo": False, "family": "kernel"}
 RANDOM = {"monte_carlo": True, "family": "physical"}
 EFFECTS = ("occlusion", "microfacets and Fresnel", "interreflection")
+CORNERS = {
+    (): (8.765, 0.0012),
+    ("occlusion",): (5.432, 0.0234),
+    ("interreflection",): (4.321, 0.0345),
+    ("occlusion", "interreflection"): (0.271, 0.0456),
+    EFFECTS: (-0.0123, 0.0557),
+}
+"""Error and seconds of the corners that were rendered, by the effects that are simulated."""
+
 PARTS = ("implementation", "visibility", "BSDF form", "transport")
 
 
@@ -39,6 +48,10 @@ def study(scene="fig-8-9"):
         left=np.zeros(image.shape[:2]),
         reference=image,
         counted=counted,
+        previews={
+            each: np.full((2 * HEIGHT, 2 * WIDTH, 3), 0.1 * (place + 1))
+            for place, each in enumerate(CORNERS)
+        },
     )
 
 
@@ -100,7 +113,11 @@ def _record(scene):
             "reference_s": 0.0557,
             "spp": 16,
             "replicates": 4,
-            "orders": 0,
+            "orders": 8,
+            "corners": [
+                {"effects": each, "error": error, "seconds": seconds}
+                for each, (error, seconds) in CORNERS.items()
+            ],
         },
         "closure": {"mean": 0.0123, "low": -0.0145, "high": 0.0391},
         "split": {

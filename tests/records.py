@@ -65,7 +65,9 @@ def images(height, width, maps=None, **changes):
     random = {name: 20 * rng.random((height, width)) for name in (*drawn(), RATIO.name)}
     halves = {half: rng.random((height, width, 3)) for half in ("heuristic", "reference")}
     masks = {name: np.ones((height, width), bool) for name in ("significant", "counted")}
-    return Images(**vectors | halves | masks | {"maps": random | (maps or {})} | changes)
+    owners = {name: np.zeros((height, width), int) for name in ("objects", "materials")}
+    shown = {"maps": random | (maps or {})}
+    return Images(**vectors | halves | masks | owners | shown | changes)
 
 
 def comparison(height=4, width=6, **changes):

@@ -7,12 +7,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from comparisons.check.carried import carried
 from comparisons.check.check import Check
 from comparisons.check.diagnosis import causes
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences, moved
-from comparisons.check.objects import Seen, seen
 from comparisons.departure.spaces import DEFAULT_VIEWING
+from reference.rendering.gbuffer import Owners, gbuffer, image_size
 from tests.small_baselines import change
 
 pytestmark = pytest.mark.usefixtures("no_service")
@@ -61,7 +62,7 @@ def test_objects_are_told_by_pixels_or_else_by_blocks():
     found = check_of(reference=redder)
     places = np.zeros((16, 16), int)
     places[4:8, 8:10] = 1  # half of the block that moved
-    found = Check(**vars(found) | {"seen": Seen(("wall", "lamp"), places)})
+    found = Check(**vars(found) | {"seen": Owners(places, ("wall", "lamp"))})
     assert found.objects("reference") == pytest.approx({"wall": 0.5, "lamp": 0.5}, abs=0.01)
     before = found.pictures.reference.copy()
     before[places == 1] -= 0.1
@@ -69,7 +70,7 @@ def test_objects_are_told_by_pixels_or_else_by_blocks():
 
 
 def test_a_change_of_nothing_is_carried_by_nothing():
-    assert Seen(("a",), np.zeros((2, 2), int)).carried(np.zeros((2, 2))) == {}
+    assert carried(np.zeros((2, 2)), Owners(np.zeros((2, 2), int), ("a",))) == {}
 
 
 def test_each_pixel_knows_its_shape(rgb):
@@ -88,7 +89,7 @@ def test_each_pixel_knows_its_shape(rgb):
             },
         }
     )
-    found = seen(scene)
+    found = gbuffer(scene, *image_size(scene)).shape
     row = [found.names[place] if place >= 0 else "" for place in found.places[4]]
     assert set(row[:4]) - {""} == {"ball"}
     assert set(row[5:]) - {""} == {"plate"}

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
+from comparisons.check.carried import carried
 from comparisons.check.measurement import PASSES, Measurement, Pictures, block_edges, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
-from comparisons.check.objects import Seen, seen
 from comparisons.compare import guarded
 from comparisons.departure.spaces import luminance
 from heuristic.errors import InputError
+from reference.rendering.gbuffer import Owners, gbuffer, image_size
 from reference.scene.preparation import film_size
 
 LONGEST = 64
@@ -44,7 +45,7 @@ class Check:
     moved: tuple[Move, ...]
     level: float
     pictures: Pictures
-    seen: Seen | None = None
+    seen: Owners | None = None
 
     @property
     def passed(self):
@@ -68,7 +69,7 @@ class Check:
             spread = change.repeat(rows, axis=0).repeat(columns, axis=1)
         else:
             spread = luminance(np.abs(now - before))
-        return self.seen.carried(spread)
+        return carried(spread, self.seen)
 
     def p_values(self, half):
         """Return the least p-value of each block of a half, corrected for all that was tested."""
@@ -143,7 +144,7 @@ def check(source, options, before, level=LEVEL, progress=None):
         )
     moves = differences(before, after)
     found = tuple(moved(moves, level))
-    objects = seen(now.scene) if found else None
+    objects = gbuffer(now.scene, *image_size(now.scene)).shape if found else None
     return Check(before, now.measurement, moves, found, level, now.pictures, objects)
 
 

@@ -47,6 +47,8 @@ class Study:
         (H, W, 3).
     counted
         (H, W): the pixels that count.
+    previews
+        ``{effects that are simulated: (f H, f W, 3)}``, of every corner of the lattice, linear.
     """
 
     record: Cost
@@ -58,6 +60,7 @@ class Study:
     left: np.ndarray
     reference: np.ndarray
     counted: np.ndarray
+    previews: dict
 
 
 def cost(
@@ -154,6 +157,7 @@ def cost(
         left=priced.left,
         reference=reference.mean,
         counted=counted,
+        previews=priced.previews,
     )
 
 

@@ -6,6 +6,7 @@ from msgspec import Meta
 
 from comparisons.comparison import GuardRecord
 from comparisons.departure.spaces import Viewing
+from comparisons.effects.corners import Corner
 from comparisons.records import (
     VERSION,
     Amount,
@@ -186,6 +187,8 @@ class Prices(Record):
         Seconds that none of the effects and all of them take.
     spp, replicates, orders
         Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
+    corners
+        Every set of effects that was rendered.
     """
 
     effects: tuple[Price, ...]
@@ -196,6 +199,7 @@ class Prices(Record):
     spp: int
     replicates: int
     orders: int
+    corners: tuple[Corner, ...] = ()
 
 
 class Seen(Record):

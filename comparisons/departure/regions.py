@@ -100,14 +100,16 @@ def _pixels(cells: slice, side: int) -> slice:
 
 def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
     """The region of a box, drawn in to the counted pixels that it holds."""
-    inside = counted[rows, columns]
-    y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    inside = np.zeros_like(counted)
+    inside[rows, columns] = counted[rows, columns]
     held = error[rows, columns].sum(dtype=np.float64)
     return Region(
-        x=int(columns.start + x[0]),
-        y=int(rows.start + y[0]),
-        width=int(x[-1] - x[0] + 1),
-        height=int(y[-1] - y[0] + 1),
-        share=float(held / total),
-        mean_dE2000=float(held / inside.sum()),
+        share=float(held / total), mean_dE2000=float(held / inside.sum()), **bounds(inside)
     )
+
+
+def bounds(mask: NDArray) -> dict[str, int]:
+    """Return ``x, y, width, height`` of the box around a mask (H, W) of one pixel at least."""
+    y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
+    return {"x": int(x[0]), "y": int(y[0]), "width": width, "height": height}

@@ -42,7 +42,14 @@ def in_region(region, resolution, effects):
     effects
         ``{name: (H, W)}``: the ΔE2000 that each removes.
     """
-    means = {name: _mean(values, region, resolution) for name, values in effects.items()}
+    return in_words({n: _mean(values, region, resolution) for n, values in effects.items()})
+
+
+def in_words(means):
+    """Return the effect of the largest mean ``{name: ΔE2000}``, and a second one that has half.
+
+    None where no mean reaches :data:`LEAST`.
+    """
     first, *others = sorted(means, key=means.get, reverse=True) or [None]
     if first is None or means[first] < LEAST:
         return None

@@ -2,9 +2,12 @@
 
 Every image is rendered in a few replicates, each with a seed of its own, which all images share: so
 that differences between images keep little noise, and the spread of the replicates tells how much.
+
+A box filter allows a preview at no cost: the film has more and smaller pixels, each with fewer
+samples, and the mean over a block of them is the pixel that the larger film would have.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import mitsuba as mi
@@ -14,6 +17,7 @@ from comparisons.effects.between import Between
 from heuristic.interpolation import Interpolation
 from reference.effects import EFFECTS
 from reference.effects.kernel_terms import POLYGONS, SPECTRAL
+from reference.rendering.gbuffer import image_size, resize
 from reference.rendering.passes import Stream, passes
 from reference.rendering.renderer import Renderer, variant
 from reference.scene.sampler import with_sampler
@@ -21,12 +25,39 @@ from reference.scene.sampler import with_sampler
 KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
 
 
+PREVIEW = 192
+"""Pixels of a preview's longer side, at most."""
+
+LEAST_SPP = 4
+"""Samples per pixel of a preview's replicate, at least: fewer are not stratified."""
+
+
 @dataclass(frozen=True)
 class Replicates:
-    """The replicates of one image: (R, H, W, 3), and the seconds that each but the first took."""
+    """The replicates of one image.
+
+    Attributes
+    ----------
+    images
+        (R, H, W, 3).
+    seconds
+        What each but the first took.
+    preview
+        (f H, f W, 3): the mean of all in finer pixels, ``f`` in each direction for one of theirs.
+    """
 
     images: np.ndarray
     seconds: np.ndarray
+    preview: np.ndarray
+
+    def __add__(self, other):
+        return self._with(other, np.add)
+
+    def __sub__(self, other):
+        return self._with(other, np.subtract)
+
+    def _with(self, other, operation):
+        return Replicates(*map(operation, vars(self).values(), vars(other).values()))
 
 
 class Lattice:
@@ -50,12 +81,14 @@ class Lattice:
 
     def __init__(self, options, methods, replicates, spp, seed, size=None):
         self.ready, self.replicates = methods.ready, replicates
-        self.spp, self.seed, self.size = spp, seed, size
+        self.spp, self.seed = spp, seed
         self.variant = self.ready.reference.variant
         self.heuristic_variant = methods.heuristic_variant
         self._options, self._pairs = options, methods.pairs
         self._between = {self.variant: methods.between}
         self._known, self._glows = {}, {}
+        self._film = image_size(self.ready.scene)
+        self._size = size or self._film
 
     @cached_property
     def effects(self):
@@ -105,11 +138,7 @@ class Lattice:
             return self.of(REFERENCE)
         if POLYGONS not in self.effects or POLYGONS in effects:
             return self.of(effects - {POLYGONS})
-        found, kernels = self.of(effects), [self.of(key) for key in (KERNEL, PLAIN_KERNEL)]
-        return Replicates(
-            found.images + (kernels[0].images - kernels[1].images),
-            found.seconds + (kernels[0].seconds - kernels[1].seconds),
-        )
+        return self.of(effects) + (self.of(KERNEL) - self.of(PLAIN_KERNEL))
 
     def needed(self, effects):
         """Return what :meth:`simulating` needs rendered for a set of effects."""
@@ -151,35 +180,56 @@ class Lattice:
     def _replicates(self, key):
         """Render an image in the current variant, which is its own."""
         if isinstance(key, str):
-            return Replicates(*self._passes(self._end(key)))
+            return self._passes(self._end(key))
         between = self._between_here()
-        images, seconds = self._passes(between.travelling(key, self.spp))
-        # What a camera ray meets shows its emission at next to no cost in one rendering of both.
-        return Replicates(images + self._glow(between, key), seconds)
+        found = self._passes(between.travelling(key, self._finer_spp))
+        glow = self._glow(between, key)
+        return found + glow if glow else found
 
     def _end(self, key):
         """Return what renders one of the images that are a half, or nearly."""
         ready = self.ready
         if key == REFERENCE:
-            return Renderer(ready.scene, ready.reference.integrator, self.spp, "reference image")
+            integrator = ready.reference.integrator
+            return Renderer(ready.scene, integrator, self._finer_spp, "reference image")
         if key == KERNEL:
-            return Renderer(ready.heuristic.scene, None, self.spp, "image of the kernel")
+            return Renderer(ready.heuristic.scene, None, self._finer_spp, "image of the kernel")
         graph = with_sampler(self._pairs.plain().heuristic, ready.plan.sampler)
-        return Renderer(graph.instantiate(), None, self.spp, "image of the kernel")
+        return Renderer(graph.instantiate(), None, self._finer_spp, "image of the kernel")
 
     def _glow(self, between, key):
         """Return the replicates of what glows, which several images share."""
         glow = mi.variant(), between.glow_key(key)
         if glow not in self._glows:
-            renderer = between.glowing(key, self.spp)
-            self._glows[glow] = self._passes(renderer)[0] if renderer else np.float32(0)
+            renderer = between.glowing(key, self._finer_spp)
+            # What a camera ray meets shows its emission at next to no cost in a rendering of both.
+            self._glows[glow] = renderer and replace(self._passes(renderer), seconds=np.float64(0))
         return self._glows[glow]
 
+    @cached_property
+    def finer(self):
+        """Pixels of a preview in each direction for one of an image."""
+        film, factor = self.ready.scene.sensors()[0].film(), 1
+        if "Box" not in film.rfilter().class_name():
+            return factor
+        while (
+            2 * factor * max(self._size) <= PREVIEW and self.spp % (4 * factor**2 * LEAST_SPP) == 0
+        ):
+            factor *= 2
+        return factor
+
+    @property
+    def _finer_spp(self):
+        return self.spp // self.finer**2
+
     def _passes(self, renderer):
-        renderer.size = self.size
+        """Render the replicates on a film of the preview's size, which goes back to its own."""
+        renderer.size = tuple(self.finer * side for side in self._size)
         loop = passes([renderer], self.seed, self.replicates, stream=Stream.REPLICATES)
-        images = [np.array(one.images[0]) for one in loop]
-        return np.stack(images), np.array(renderer.times[1:])
+        images = np.stack([np.array(one.images[0]) for one in loop])
+        resize(renderer.scene, self._film)
+        seconds = np.array(renderer.times[1:])
+        return Replicates(_blocks(images, self.finer), seconds, images.mean(axis=0))
 
     def _between_here(self):
         if mi.variant() not in self._between:
@@ -187,3 +237,10 @@ class Lattice:
             physical = with_sampler(pair.physical, self.ready.plan.sampler).instantiate()
             self._between[mi.variant()] = Between(pair, self.ready.plan, physical)
         return self._between[mi.variant()]
+
+
+def _blocks(images, side):
+    """Return the means (R, H, W, 3) over square blocks of pixels."""
+    count, height, width, channels = images.shape
+    shape = count, height // side, side, width // side, side, channels
+    return images.reshape(shape).mean(axis=(2, 4))

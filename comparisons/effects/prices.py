@@ -17,6 +17,7 @@ import numpy as np
 from comparisons import intervals
 from comparisons.cost.cost_record import Closure, Price, Prices
 from comparisons.effects import shapley
+from comparisons.effects.corners import corners, labels
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Priced:
         (H, W): the ΔE2000 of the heuristic half, which the maps and what is left add up to.
     left
         (H, W): the ΔE2000 that is left where all effects are simulated.
+    previews
+        ``{labels of the effects that are simulated: (f H, f W, 3)}``, linear.
     """
 
     prices: Prices
@@ -42,6 +45,7 @@ class Priced:
     maps: dict
     departure: np.ndarray
     left: np.ndarray
+    previews: dict
 
 
 def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
@@ -63,23 +67,21 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
     if len(effects) <= exact_effects:
         lattice.render(key for each in shapley.subsets(effects) for key in lattice.needed(each))
     lattice.render([lattice.grafted])
-    errors, seconds = {}, {}
+    errors = {}
+
+    def image(simulated):
+        # Not the reference itself: what the edits of the scene leave would not be seen.
+        is_whole = simulated == everything
+        return lattice.of(lattice.grafted) if is_whole else lattice.simulating(simulated)
 
     def error(simulated):
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
-            if simulated == everything:
-                # Not the reference itself: what the edits of the scene leave would not be seen.
-                found = lattice.of(lattice.grafted)
-            else:
-                found = lattice.simulating(simulated)
-            errors[simulated] = noiseless.errors(found.images)
+            errors[simulated] = noiseless.errors(image(simulated).images)
         return errors[simulated]
 
     def time(simulated):
-        if simulated not in seconds:
-            seconds[simulated] = lattice.simulating(simulated).seconds
-        return seconds[simulated]
+        return lattice.simulating(simulated).seconds
 
     nothing = frozenset()
     shares = shapley.shares(effects, error, seed, exact_effects, orders)
@@ -99,6 +101,9 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
                 sampling_error=shares.sampling_error[place],
             )
         )
+    departure, left = (_filled(error(each)[0], counted) for each in (nothing, everything))
+    reached = corners(effects, errors, error, time)
+    previews = {labels(effects, each): image(each).preview for each in errors}
     own = lattice.of("reference")
     priced = Prices(
         effects=tuple(found),
@@ -109,11 +114,11 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
         spp=lattice.spp,
         replicates=lattice.replicates,
         orders=shares.orders,
+        corners=reached,
     )
-    departure, left = (_filled(error(each)[0], counted) for each in (nothing, everything))
     mean = _jackknife(error(everything).mean(axis=1))
     closure = Closure(mean=mean.value, low=mean.low, high=mean.high)
-    return Priced(priced, closure, maps, departure, left)
+    return Priced(priced, closure, maps, departure, left, previews)
 
 
 def _jackknife(values):

@@ -16,6 +16,14 @@ GRID = 192
 
 
 @dataclass(frozen=True)
+class Owners:
+    """What each pixel (H, W) sees, as its place among ids; -1 for nothing."""
+
+    places: np.ndarray
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class GBuffer:
     """The first surface on a regular grid of camera rays, in world space.
 
@@ -25,11 +33,15 @@ class GBuffer:
         (H, W, 3); the unit shading normal of the side that is seen. Zero where nothing is hit.
     hit
         (H, W), whether the ray meets a surface.
+    shape, bsdf
+        Whose surface it is, and of which material.
     """
 
     position: np.ndarray
     normal: np.ndarray
     hit: np.ndarray
+    shape: Owners
+    bsdf: Owners
 
     def mean_irradiance(
         self,
@@ -98,10 +110,23 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
         np.array(dr.select(hit, vector, 0)).T.reshape(height, width, 3)
         for vector in (mi.Vector3f(si.p), normal)
     )
-    return GBuffer(points, normals, np.array(hit).reshape(height, width))
+    seen = np.array(hit).reshape(height, width)
+    shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
+    return GBuffer(points, normals, seen, _owners(shape, seen), _owners(si.bsdf(), seen))
 
 
-def pixel_rays(scene, size, x, y, sensor=0):
+def _owners(pointers, seen):
+    """Return the :class:`Owners` of an array of pointers, one a pixel."""
+    numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
+    found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
+    named = zip(found, first, strict=True)
+    names = tuple((pointers[int(at)].id() or "unnamed") if number else "" for number, at in named)
+    return Owners(np.where(seen, places.reshape(seen.shape), -1), names)
+
+
+def pixel_rays(
+    scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray, sensor: int = 0
+) -> Any:
     """Return the camera rays through the centres of the cells in columns ``x`` and rows ``y``.
 
     ``size`` is the width and height of the film in cells.

@@ -63,12 +63,12 @@ FORMS = {form.__name__: form for form in (number, difference, parameter, seconds
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: The parts of the page's style and of its script, in their order.
-STYLES = ("base", "verdict", "overview", "scene", "viewer", "terms", "print")
+STYLES = ("base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
     "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving", "pointer",
     "controls", "viewer", "keyboard", "overview", "charts", "verdict", "vectors", "termrows",
-    "terms", "lazy", "main",
+    "terms", "switchboard", "objects", "lazy", "main",
 )  # fmt: skip
 
 #: Run before anything is drawn: what is for scripts alone is shown only where they run.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from msgspec import field
 
@@ -10,7 +11,10 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
+from reports.page import switchboard
 from reports.page.embedding import Embedded
+from reports.page.lit import Lit
+from reports.page.switchboard import Sheet
 from reports.page.terms_view import TermsView
 
 
@@ -31,10 +35,16 @@ class CostView(Record):
     images: dict[str, bytes]
     noise: str
     effects: EffectMap
+    sheet: Sheet | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""
         return self.images[picture_name(kind, name)]
+
+    @property
+    def switchboard(self) -> dict[str, Any]:
+        """What the script of the switchboard needs, where there is a sheet."""
+        return switchboard.data(self.record, self.sheet)
 
 
 class SceneView(Record):
@@ -54,6 +64,8 @@ class SceneView(Record):
         Whether it is a small preview, which a later writing of the page replaces.
     terms
         Of equation 8.10 at a grid of pixels.
+    lit
+        Which shape and which material each pixel sees.
     """
 
     record: ComparisonRecord
@@ -64,6 +76,7 @@ class SceneView(Record):
     cost: CostView | None = None
     is_coarse: bool = False
     terms: TermsView | None = None
+    lit: Lit | None = None
 
 
 @dataclass(frozen=True)

@@ -152,7 +152,7 @@ def _sketch(pool, growing, each, bar):
 
 def _compare(pool, record, growing, each, bar):
     """Collect the views of the scenes that are compared, and the errors of the others."""
-    from reports.terminal import progress
+    from reports.terminal import carrier_lines, progress
 
     left = {p: w for p, w in each.items() if p not in growing.views and p not in growing.failures}
     bar.begin("scenes", len(left), WHOLE, skipped=len(each) - len(left))
@@ -172,14 +172,14 @@ def _compare(pool, record, growing, each, bar):
         growing.views[task.name] = view
         for stage, seconds in spent.seconds.items():
             record.add(stage, seconds)
-        verbosity.remark(progress.details(view.record))
+        verbosity.remark([*progress.details(view.record), *carrier_lines.lines(view.record)])
         growing.offer()
 
 
 def _write(run, growing, with_figures, shown, is_interrupted=False):
     """Write what is about all scenes, in the order of their places, and say what came of them."""
     from reports.run import output
-    from reports.terminal import progress, tables
+    from reports.terminal import carrier_lines, progress, tables
 
     folder, run.failures = growing.folder, growing.failed()
     run.begin_page()
@@ -192,6 +192,7 @@ def _write(run, growing, with_figures, shown, is_interrupted=False):
     ]
     if views:
         steps.append(lambda: tables.write(folder / output.TABLES, records))
+        steps.append(lambda: carrier_lines.write(folder / output.TABLES, records))
     if views and with_figures:
         from reports.charts import figures
 

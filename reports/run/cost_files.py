@@ -6,6 +6,7 @@ from comparisons import records
 from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
 from reports.files import images, ownership
+from reports.page import switchboard
 from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.terminal.cost_tables import closure, noise
 
@@ -82,6 +83,12 @@ def view(study, made):
         },
         noise=" ".join(each(study.record) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
+        sheet=switchboard.sheet(
+            [
+                images.tonemap(study.previews[corner.effects], study.record.viewing.exposure)
+                for corner in study.record.prices.corners
+            ]
+        ),
     )
 
 

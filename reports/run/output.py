@@ -14,6 +14,7 @@ from comparisons.records import to_json
 from heuristic.errors import OutputError
 from reports.files import exr, holding, images, ownership
 from reports.page import embedding, page, terms_view
+from reports.page.lit import lit
 from reports.page.scene_view import SceneView
 from reports.run import finished
 from reports.run.places import FIGURES, PAGE, RUN, TABLES
@@ -121,6 +122,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
         charts=tuple(cost_files.figures(study.record)) if study else (),
         cost=cost_files.view(study, priced) if study else None,
         terms=terms_view.view(comparison.terms, comparison.no_terms),
+        lit=lit(shown, record.viewing.exposure),
     )
     with ownership.replacing_folder(folder / name) as place:
         for png_name, png in pictured.items():

@@ -118,15 +118,14 @@ def _explained(case, progress, comparison):
 
 
 def _priced(case, progress, comparison):
-    """Study what accuracy costs, and name the effects that dominate the comparison's regions."""
+    """Study what accuracy costs, and name the effects that dominate; say how long it took."""
+    from comparisons.comparison import CAUSES
     from comparisons.cost.cost import quick
-    from comparisons.effects.dominance import in_region
+    from comparisons.effects.naming import named
 
+    begin = perf_counter()
     study = quick(case.source, case.options, progress, case.command() + " --why")
-    record = comparison.record
-    regions = tuple(
-        structs.replace(region, effect=in_region(region, record.resolution, study.effects))
-        for region in record.regions
-    )
-    record = structs.replace(record, regions=regions)
-    return replace(comparison, record=record), study
+    record = named(comparison, study.effects)
+    stages = record.time.stages | {CAUSES: perf_counter() - begin}
+    time = structs.replace(record.time, stages=stages)
+    return replace(comparison, record=structs.replace(record, time=time)), study

@@ -11,17 +11,21 @@ from msgspec import structs
 from playwright.sync_api import sync_playwright
 
 from comparisons.cost.cost import Study
-from comparisons.departure import regions
+from comparisons.departure import objects, regions
 from comparisons.departure.metrics import drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
 from comparisons.departure.statistics import histogram
 from comparisons.record import Comparison
 from comparisons.records import Pixels, plain
+from reference.rendering.gbuffer import Owners
 from reports.run import output, places
 from reports.run.stages import Failure, Run
 from tests import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32
+
+#: Columns that one shape has, the other has those to the right.
+LEFT = 20
 
 #: Names that the page has to bear; the address knows them by plain characters.
 NOISY, EXACT, FAILED = "noisy & <b>", "exact", "lost"
@@ -110,12 +114,17 @@ def comparison(name, heuristic, reference, maps, significant):
     counted = np.ones((HEIGHT, WIDTH), bool)
     counted[0] = False
     first, *others = regions.find(maps["dE2000"], counted) or [None]
+    left = np.tile(np.arange(WIDTH) < LEFT, (HEIGHT, 1))
+    owners = Owners(np.where(left, 0, 1), ("left <b>", "right"))
+    carriers, places = objects.find(maps["dE2000"], counted, owners, owners)
     first = first and structs.replace(first, effect="interreflection")
     record = records.record(
         scene=name,
         resolution=(WIDTH, HEIGHT),
         pixels=Pixels(counted=int(counted.sum()), total=counted.size),
         regions=tuple(filter(None, (first, *others))),
+        objects=tuple(structs.replace(each, effect="occlusion") for each in carriers),
+        materials=carriers,
         histograms={key: histogram(maps[key][counted]) for key in drawn()},
     )
     images = records.images(
@@ -127,6 +136,8 @@ def comparison(name, heuristic, reference, maps, significant):
         reference_stderr=0.01 * np.abs(reference),
         significant=significant,
         counted=counted,
+        objects=places,
+        materials=places,
     )
     return Comparison(record, images)
 

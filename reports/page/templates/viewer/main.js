@@ -49,6 +49,8 @@ function openScene(scene) {
   void terms.open(scene, section);
   void viewer.open(scene, section);
   watchCharts(section);
+  void makeSwitchboard(section);
+  void makeObjects(section);
 }
 
 /** @param {string} id @returns {HTMLElement} */

@@ -1,0 +1,23 @@
+"""Which shape of a scene carries a change."""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from reference.rendering.gbuffer import Owners
+
+
+def carried(change: NDArray, owners: Owners) -> dict[str, float]:
+    """Return the share that each shape has of a change (H, W) ≥ 0, the largest first.
+
+    What no shape is seen for is left out; a change of nothing has no shares.
+    """
+    total = change.sum()
+    if not total > 0.0:
+        return {}
+    shares = {
+        name: float(change[owners.places == place].sum() / total)
+        for place, name in enumerate(owners.names)
+    }
+    ordered = sorted(shares.items(), key=lambda item: -item[1])
+    return {name: share for name, share in ordered if name and share > 0.0}

@@ -1,0 +1,74 @@
+"""Which shape, and which material, carries how much of the departure.
+
+Every counted pixel belongs to the first surface that the ray through its centre meets, so the
+shares of all shapes add up to 1, and so do those of all materials.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.departure.regions import Region, bounds
+from comparisons.records import Size
+from reference.rendering.gbuffer import Owners
+
+MOST = 24
+"""Rows, the last of which holds all others where there are more."""
+
+
+class Carrier(Region, kw_only=True):
+    """A shape or a material: the box of its pixels, and what is in them.
+
+    Attributes
+    ----------
+    name
+        Its id in the scene.
+    pixels
+        Counted pixels that see it.
+    material
+        Id of a shape's material; empty for a material itself.
+    """
+
+    name: str
+    pixels: Size
+    material: str = ""
+
+
+def find(
+    error: NDArray, counted: NDArray, owners: Owners, materials: Owners | None = None
+) -> tuple[tuple[Carrier, ...], NDArray]:
+    """Return the carriers of a map of ΔE2000 (H, W), of greatest share first, and a map of them.
+
+    The map (H, W) has the place of each pixel's carrier, and -1 where nothing is counted. With the
+    owners ``materials`` the carriers are shapes, and name theirs.
+    """
+    places = np.where(counted, owners.places, -1)
+    seen = np.unique(places[places >= 0])
+    sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
+    ranked = sorted(seen, key=lambda place: -sums[place])
+    if len(ranked) > MOST:
+        ranked = ranked[: MOST - 1]
+    rows = np.full(len(owners.names) + 1, len(ranked))
+    rows[ranked], rows[-1] = np.arange(len(ranked)), -1
+    found = rows[places]
+    names = [owners.names[place] for place in ranked]
+    if len(seen) > len(names):
+        names.append(f"{len(seen) - len(names)} others")
+    total = error[counted].sum(dtype=np.float64)
+    return tuple(
+        _carrier(name, error, found == row, total, materials) for row, name in enumerate(names)
+    ), found
+
+
+def _carrier(name, error, mask, total, materials):
+    own = np.unique(materials.places[mask]) if materials else ()
+    held = error[mask].sum(dtype=np.float64)
+    return Carrier(
+        name=name,
+        material=materials.names[own[0]] if len(own) == 1 else "several" if len(own) else "",
+        pixels=int(mask.sum()),
+        share=float(held / total) if total > 0 else 0.0,
+        mean_dE2000=float(held / mask.sum()),
+        **bounds(mask),
+    )

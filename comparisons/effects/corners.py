@@ -1,0 +1,60 @@
+"""The corners of a lattice of effects: some simulated, the others as the heuristic has them.
+
+A page shows the picture of each corner that was rendered, with what it leaves and what it costs.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from comparisons.records import Record
+from reference.effects.effect import Effect
+
+
+class Corner(Record):
+    """The image in which some effects are simulated.
+
+    Attributes
+    ----------
+    effects
+        Labels of the effects that are simulated.
+    error
+        Mean ΔE2000 against the reference, without the part of noise; noise may leave it below 0.
+    seconds
+        Median time of one rendering.
+    """
+
+    effects: Annotated[tuple[str, ...], Meta(description="Those that are simulated.")]
+    error: float
+    seconds: float
+
+
+def corners(
+    players: Sequence[Effect],
+    rendered: Iterable[frozenset[Effect]],
+    error: Callable,
+    seconds: Callable,
+) -> tuple[Corner, ...]:
+    """Return the corners that were rendered, fewest effects first.
+
+    Parameters
+    ----------
+    players
+        All effects, in their order.
+    rendered
+        Sets of them.
+    error, seconds
+        Of a set: errors (R + 1, N) whose first row is of all replicates, and times (R,).
+    """
+    found = [
+        Corner(labels(players, each), float(error(each)[0].mean()), float(np.median(seconds(each))))
+        for each in rendered
+    ]
+    return tuple(sorted(found, key=lambda corner: (len(corner.effects), corner.effects)))
+
+
+def labels(players: Sequence[Effect], simulated: frozenset[Effect]) -> tuple[str, ...]:
+    """Return the labels of those effects that are simulated, in their order."""
+    return tuple(effect.label for effect in players if effect in simulated)

@@ -1,0 +1,53 @@
+"""Names the effect that carries most of each region, shape and material of a comparison."""
+
+from functools import partial
+
+import numpy as np
+from msgspec import structs
+
+from comparisons.comparison import ComparisonRecord
+from comparisons.effects.dominance import in_region, in_words
+from comparisons.record import Comparison
+
+
+def named(comparison: Comparison, effects: dict) -> ComparisonRecord:
+    """Return the record of a comparison in which regions, shapes and materials name their effect.
+
+    ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes, perhaps in a smaller size.
+    """
+    record, images = comparison.record, comparison.images
+    regions = tuple(
+        structs.replace(region, effect=in_region(region, record.resolution, effects))
+        for region in record.regions
+    )
+    carried = partial(_carried, effects=effects)
+    return structs.replace(
+        record,
+        regions=regions,
+        objects=carried(record.objects, images.objects),
+        materials=carried(record.materials, images.materials),
+    )
+
+
+def _carried(carriers, places, effects):
+    """Name the effects of carriers, by the cell of the maps in which each of their pixels lies."""
+    seen = places >= 0
+    counts = np.bincount(places[seen], minlength=len(carriers))
+    sums = {
+        name: np.bincount(places[seen], _enlarged(values, places.shape)[seen], len(carriers))
+        for name, values in effects.items()
+    }
+    return tuple(
+        structs.replace(
+            carrier,
+            effect=in_words({name: each[row] / counts[row] for name, each in sums.items()}),
+        )
+        for row, carrier in enumerate(carriers)
+    )
+
+
+def _enlarged(values, shape):
+    rows, columns = (
+        np.arange(large) * small // large for large, small in zip(shape, values.shape, strict=True)
+    )
+    return values[np.ix_(rows, columns)]

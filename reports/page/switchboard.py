@@ -1,0 +1,70 @@
+"""The effect switchboard: a preview of each corner of a scene's lattice, in one picture."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+from PIL import Image
+
+from comparisons.cost.cost_record import Cost
+from comparisons.records import Record
+from reports.terminal.printing import number, seconds
+
+#: Of the WebP file, from 0 to 100.
+QUALITY = 80
+
+#: Previews in a row of the picture.
+COLUMNS = 4
+
+#: ΔE2000: smaller means are rounding, or what is left of noise.
+LEAST = 0.01
+
+
+class Sheet(Record):
+    """Previews of `width` by `height` pixels in rows of `COLUMNS`, as one WebP file."""
+
+    width: int
+    height: int
+    webp: bytes
+
+
+def sheet(previews: Sequence[Image.Image]) -> Sheet | None:
+    """Return the sheet of previews of one size, in their order; None of fewer than two."""
+    if len(previews) < 2:
+        return None
+    width, height = previews[0].size
+    rows = -(-len(previews) // COLUMNS)
+    whole = Image.new("RGB", (width * COLUMNS, height * rows))
+    for place, preview in enumerate(previews):
+        row, column = divmod(place, COLUMNS)
+        whole.paste(preview, (column * width, row * height))
+    return Sheet(width, height, webp(whole))
+
+
+def webp(picture: Image.Image) -> bytes:
+    """Return the WebP file of a picture."""
+    buffer = BytesIO()
+    picture.save(buffer, "WEBP", quality=QUALITY, method=4)
+    return buffer.getvalue()
+
+
+def data(record: Cost, shown: Sheet) -> dict[str, Any]:
+    """Return what the page's script needs: the sheet, and what each of its pictures stands for."""
+    effects = [price.effect for price in record.prices.effects]
+    return {
+        "sheet": "data:image/webp;base64," + base64.b64encode(shown.webp).decode("ascii"),
+        "width": shown.width,
+        "height": shown.height,
+        "columns": COLUMNS,
+        "corners": [
+            {
+                "on": [effects.index(effect) for effect in corner.effects],
+                "error": number(corner.error) if corner.error >= LEAST else f"< {LEAST}",
+                "time": seconds(max(corner.seconds, 0.0)),
+            }
+            for corner in record.prices.corners
+        ],
+    }

@@ -1,0 +1,41 @@
+"""Shapes and materials by their part of the departure, as lines for a terminal and as rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from comparisons.comparison import ComparisonRecord
+from reports.files import ownership
+from reports.terminal.printing import number, percent
+from reports.terminal.tables import comma_separated, printed
+
+COLUMNS = "name", "material", "pixels", "share", "mean_dE2000", "effect"
+"""Fields of a carrier that a table has."""
+
+
+def lines(record: ComparisonRecord) -> Iterator[str]:
+    """Yield the table of a scene's shapes; nothing where there is but one."""
+    if len(record.objects) < 2:
+        return
+    rows = [("shape", "mostly", "departure", "pixels", "mean ΔE2000")]
+    for carrier in record.objects:
+        shares = percent(carrier.share), percent(carrier.pixels / record.pixels.counted)
+        rows.append((carrier.name, carrier.effect or "", *shares, number(carrier.mean_dE2000)))
+    yield from ("", *printed(rows, right=2))
+    yield f"  causes took {percent(record.time.share_of_causes)} of the time"
+
+
+def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
+    """Write ``carriers.csv``, the shapes and materials of a run with numbers in full."""
+    ownership.write(ownership.folder(folder) / "carriers.csv", comma_separated(_rows(records)))
+
+
+def _rows(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:
+    yield "scene", "kind", *COLUMNS
+    for record in records:
+        for kind, carriers in (("shape", record.objects), ("material", record.materials)):
+            for carrier in carriers:
+                values = (getattr(carrier, column) for column in COLUMNS)
+                yield record.scene, kind, *("" if value is None else value for value in values)

@@ -1,0 +1,175 @@
+"""Which shape and which material carries the departure, and by which effect."""
+
+import numpy as np
+import pytest
+
+from comparisons.case import Request, open_case
+from comparisons.compare import compare
+from comparisons.cost.cost import quick
+from comparisons.departure import objects
+from comparisons.effects.naming import named
+from reference.rendering.gbuffer import Owners, gbuffer
+from reports.terminal import carrier_lines
+from tests import records
+from tests.test_physics import look_at
+
+RADIUS, CENTRE = 0.7, np.array((0, 0, 1.6))
+
+
+def shadowed(size=24):
+    """A diffuse sphere above a floor, by direct light: the sphere is exact, its shadow is not."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 2},
+        "sensor": {
+            "type": "perspective",
+            "fov": 45.0,
+            "to_world": look_at((0, -6, 4)),
+            "film": {"type": "hdrfilm", "width": size, "height": size},
+        },
+        "sphere": {
+            "type": "sphere",
+            "to_world": transform().translate(CENTRE).scale(RADIUS),
+            "bsdf": {"type": "diffuse", "id": "chalk", "reflectance": 0.6},
+        },
+        "floor": {
+            "type": "rectangle",
+            "to_world": transform().scale(2),
+            "bsdf": {"type": "diffuse", "id": "slate", "reflectance": 0.3},
+        },
+        "light": {"type": "point", "position": (1, -1, 5), "intensity": 30.0},
+    }
+
+
+@pytest.fixture(scope="module")
+def compared():
+    case = open_case(shadowed(), Request.of({"resolution": (48, 48)}), "shadowed")
+    found = compare(case.source, case.options)
+    return found, named(found, quick(case.source, case.options).effects)
+
+
+@pytest.mark.guarantee(
+    "prices",
+    "Every shape and every region has the share of the departure that it carries, and its cause.",
+)
+def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
+    _, record = compared
+    floor, sphere = record.objects
+    assert (floor.name, sphere.name) == ("floor", "sphere")
+    assert floor.share > 0.99
+    assert floor.effect == "occlusion"
+    assert sphere.share < 0.01
+    assert sphere.effect is None
+    assert record.regions
+    assert {region.effect for region in record.regions} == {"occlusion"}
+
+
+def test_materials_are_those_of_the_shapes(compared):
+    _, record = compared
+    assert [each.material for each in record.objects] == ["slate", "chalk"]
+    assert [each.name for each in record.materials] == ["slate", "chalk"]
+    assert record.materials[0].effect == "occlusion"
+
+
+def test_pixels_belong_to_the_surface_that_their_ray_meets(compared):
+    """The sphere's are at its radius from its centre."""
+    found, record = compared
+    distance = np.linalg.norm(found.images.position - CENTRE, axis=-1)
+    on_sphere = found.images.counted & (abs(distance - RADIUS) < 1e-3)
+    np.testing.assert_array_equal(found.images.objects == 1, on_sphere)
+    sphere = record.objects[1]
+    assert sphere.pixels == on_sphere.sum()
+    rows, columns = np.nonzero(on_sphere)
+    assert (sphere.x, sphere.y) == (columns.min(), rows.min())
+    assert sphere.width == np.ptp(columns) + 1
+
+
+def test_shares_and_pixels_add_up_to_the_whole(compared):
+    _, record = compared
+    for carriers in (record.objects, record.materials):
+        assert sum(each.share for each in carriers) == pytest.approx(1)
+        assert sum(each.pixels for each in carriers) == record.pixels.counted
+        mean = sum(each.pixels * each.mean_dE2000 for each in carriers) / record.pixels.counted
+        assert mean == pytest.approx(record.metrics["dE2000"].mean, rel=1e-5)
+
+
+def test_an_instance_is_a_shape_of_its_own():
+    import mitsuba as mi
+
+    scene = shadowed()
+    sphere = scene.pop("sphere")
+    scene["group"] = {"type": "shapegroup", "ball": sphere}
+    for name, x in (("left", -1.0), ("right", 1.0)):
+        to_world = mi.ScalarTransform4f().translate((x, 0, 0))
+        scene[name] = {
+            "type": "instance",
+            "to_world": to_world,
+            "group": {"type": "ref", "id": "group"},
+        }
+    seen = gbuffer(mi.load_dict(scene), 32, 32)
+    names = np.array(seen.shape.names)[seen.shape.places[seen.hit]]
+    assert set(names) == {"left", "right", "floor"}
+    at_left = seen.position[seen.hit][:, 0] < 0
+    assert at_left[names == "left"].all()
+    assert not at_left[names == "right"].any()
+    materials = np.array(seen.bsdf.names)[seen.bsdf.places[seen.hit]]
+    np.testing.assert_array_equal(materials == "slate", names == "floor")
+
+
+def test_many_shapes_end_in_a_row_of_the_others():
+    rng = np.random.default_rng(3)
+    count = objects.MOST + 17
+    places = np.arange(count * 8).reshape(-1, 8) % count
+    error = rng.random(places.shape) * (1 + places)
+    counted = rng.random(places.shape) < 0.8
+    owners = Owners(places, tuple(f"shape {place}" for place in range(count)))
+    found, rows = objects.find(error, counted, owners)
+    assert len(found) == objects.MOST
+    assert found[-1].name == "18 others"
+    assert sum(each.share for each in found) == pytest.approx(1)
+    listed = [each.share for each in found[:-1]]
+    assert listed == sorted(listed, reverse=True)
+    first = int(found[0].name.split()[1])
+    np.testing.assert_array_equal(rows == 0, counted & (places == first))
+    assert (rows[~counted] == -1).all()
+    assert error[rows == len(found) - 1].sum() == pytest.approx(
+        found[-1].share * error[counted].sum()
+    )
+
+
+def test_nothing_is_carried_where_nothing_differs():
+    owners = Owners(np.zeros((2, 3), int), ("only",))
+    (only,), _ = objects.find(np.zeros((2, 3)), np.ones((2, 3), bool), owners)
+    assert (only.share, only.mean_dE2000, only.pixels) == (0.0, 0.0, 6)
+
+
+def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
+    """In maps of half the size, whose left column is bright by shadow, the right one by gloss."""
+    owners = Owners(np.repeat([[0, 0, 1, 1]], 4, axis=0), ("left", "right"))
+    error = np.where(owners.places, 5.0, 4.0)
+    counted = np.ones((4, 4), bool)
+    carriers, places = objects.find(error, counted, owners)
+    effects = {"shadow": np.array([[3.0, 0], [3, 0]]), "gloss": np.array([[0.0, 2], [0, 2]])}
+    images = records.images(4, 4, objects=places, materials=places)
+    record = records.record(objects=carriers, materials=carriers, regions=())
+    found = named(records.Comparison(record, images), effects)
+    assert {each.name: each.effect for each in found.objects} == {
+        "left": "shadow",
+        "right": "gloss",
+    }
+
+
+def test_the_terminal_and_the_table_have_every_shape(compared, tmp_path):
+    _, record = compared
+    text = "\n".join(carrier_lines.lines(record))
+    assert "floor" in text
+    assert "occlusion" in text
+    carrier_lines.write(tmp_path, [record])
+    heading, *rows = (tmp_path / "carriers.csv").read_text(encoding="utf-8").splitlines()
+    assert heading == "scene,kind,name,material,pixels,share,mean_dE2000,effect"
+    assert [row.split(",")[1:3] for row in rows] == [
+        ["shape", "floor"], ["shape", "sphere"], ["material", "slate"], ["material", "chalk"],
+    ]  # fmt: skip
