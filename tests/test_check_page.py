@@ -9,9 +9,9 @@ import pytest
 
 from comparisons.check.carried import carried
 from comparisons.check.check import Check
-from comparisons.check.diagnosis import causes
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences, moved
+from comparisons.check.suspects import causes
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from reference.rendering.gbuffer import Owners, gbuffer, image_size
 from tests.small_baselines import change

@@ -54,7 +54,7 @@ def test_a_report_grows_from_coarse_to_whole_to_hard_cases(run, small_report, pa
     assert ["hard_cases" in shown for _, shown in pages] == [False] * 5 + [True]
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "reload to see more" not in page
-    assert "Preview:" not in page
+    assert "<b>Preview:</b>" not in page
 
 
 def test_an_interrupted_report_keeps_its_page(run, small_report, tmp_path, monkeypatch):

@@ -4,8 +4,8 @@ import pytest
 from msgspec import structs
 
 from comparisons.departure.metrics import METRICS
-from comparisons.departure.ranking import FEWEST, rankings
 from reports.page import page
+from reports.ranking import FEWEST, rankings
 from tests import records
 
 

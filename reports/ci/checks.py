@@ -5,7 +5,7 @@ from pathlib import Path
 from time import perf_counter
 
 from comparisons import record
-from comparisons.check import baseline, check, diagnosis
+from comparisons.check import baseline, check, suspects
 from comparisons.check.check import Check
 from comparisons.check.measurement import HALVES
 from comparisons.check.moved import LEVEL
@@ -194,7 +194,7 @@ def _explained(found: Check, before):
     """Return causes and objects of a failure; ``before`` are the baseline's pictures, if any."""
     halves = (half for half in HALVES if any(move.half == half for move in found.moved))
     objects = {half: found.objects(half, before and before[half]) for half in halves}
-    return {"causes": tuple(diagnosis.causes(found)), "objects": objects}
+    return {"causes": tuple(suspects.causes(found)), "objects": objects}
 
 
 def _write_failure(result, before):

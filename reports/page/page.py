@@ -25,13 +25,13 @@ from markupsafe import Markup
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, METRICS
-from comparisons.departure.ranking import rankings
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
 from reports.page import overview, verdict_view, viewer_data
 from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
+from reports.ranking import rankings
 from reports.run.stages import Failure, Run
 from reports.terminal.printing import (
     NOTICEABLE,
