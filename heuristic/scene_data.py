@@ -105,6 +105,7 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
         for name, value in textures.items()
         if isinstance(value, mi.Texture) and value.is_spatially_varying()
     ]
+    values: dict[str, Any]
     values = {name: numbers(mi.Color3f(getattr(found, name))) for name in COEFFICIENTS}
     values |= {"n": numbers(found.n)[0], "base_color": numbers(mi.Color3f(found.base_color))}
     values |= {name: numbers(getattr(found, name))[0] for name in PHYSICAL[1:]}

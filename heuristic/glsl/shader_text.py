@@ -110,7 +110,7 @@ void main() {{
 def parameters(text: str) -> list[tuple[str, float, float, float]]:
     """Return name, default and bounds of ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
     found = (each for line in text.splitlines() if (each := _PARAMETER.match(line)))
-    return [(each[1], *map(float, each.groups()[1:])) for each in found]
+    return [(each[1], float(each[2]), float(each[3]), float(each[4])) for each in found]
 
 
 def refusal(text: str) -> tuple[int, str] | None:
