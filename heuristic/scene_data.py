@@ -5,6 +5,7 @@ Everything is in world space and in display-linear units, those of the kernel.
 
 from dataclasses import dataclass, fields
 from math import radians, tan
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
