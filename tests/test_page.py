@@ -1,6 +1,7 @@
 """The record's schema, and the page: its numbers are the record's and it loads nothing."""
 
 import copy
+import re
 from html.parser import HTMLParser
 
 import jsonschema
@@ -296,3 +297,17 @@ def test_verifications_are_printed(record, pictures):
     assert "96 × 80 pixels" in html
     assert HOSTILE not in html
     assert "Pruning" not in page.render([view])
+
+
+def test_no_name_is_declared_by_two_scripts():
+    """All scripts share one scope, and the second declaration would end the page."""
+    found = [
+        (name, path.name)
+        for path in (page.TEMPLATES / "viewer").glob("*.js")
+        for name in re.findall(
+            r"^(?:async )?(?:function\*?|class|const|let) +(\w+)", path.read_text(), re.M
+        )
+    ]
+    names = [name for name, _ in found]
+    assert len(names) > 100
+    assert [one for one in found if names.count(one[0]) > 1] == []
