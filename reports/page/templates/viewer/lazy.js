@@ -21,7 +21,7 @@ function drawPictures({ painter }) {
   for (const canvas of document.querySelectorAll(".scene.open canvas[data-picture]")) {
     const picture = /** @type {HTMLCanvasElement} */ (canvas);
     const name = picture.dataset.picture ?? "";
-    const isMap = painter.page.maps.some((/** @type {any} */ map) => map.name === name);
-    picture.getContext("2d")?.drawImage(isMap ? painter.map(name) : painter.rendering(name, "clip", 0), 0, 0);
+    const map = painter.page.maps.find((/** @type {any} */ one) => one.name === name);
+    picture.getContext("2d")?.drawImage(map ? painter.map(name, map.top) : painter.rendering(name, "clip", 1), 0, 0);
   }
 }

@@ -48,7 +48,7 @@ async function makeSwitchboard(section) {
       button.setAttribute("aria-disabled", String(!places.has(switched(effect).join())));
     });
     refused.hidden = true;
-    const gain = /** @type {HTMLElement} */ (element?.querySelector(".gain"));
+    const gain = /** @type {HTMLElement} */ (element?.querySelector(".remains"));
     gain.replaceChildren("ΔE2000 ", ...change(none.error, seen.error), ", ", ...change(none.time, seen.time));
   }
 
