@@ -170,8 +170,8 @@ def _measurements():
     for measure in (measured.baselines, measured.fits, measured.findings, measured.picture):
         measure()
     replace("../README.md", "cost", measured.prices())
-    replace("../README.md", "gains", measured.gains())
-    replace("../README.md", "speed", measured.speed())
+    replace("plans.md", "gains", measured.gains())
+    replace("speed.md", "speed", measured.speed())
 
 
 def _accuracy():

@@ -75,13 +75,13 @@ def prices() -> Iterator[str]:
     )
     closure = record.closure
     yield (
-        f"The textbook's kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
-        f" after {_time(kernel_point)}, and samples do not bring it nearer; the full plan is"
+        f"The textbook kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
+        f" after {_time(kernel_point)}, and more samples do not bring it nearer; the full plan is"
         f" {first.error:.1f} away after {_time(first)} and {last.error:.1f} after {_time(last)}."
-        f" Shadows alone give the kernel {shadows.error:.1f}, because the light between surfaces"
-        " that would fill them is missing. Over all orders of adding them, the effects remove, of"
-        f" {record.prices.departure:.1f}, with 95 % intervals: {prices}. With all of them"
-        f" {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) is left."
+        f" Adding shadows alone gives {shadows.error:.1f}, because the light between surfaces"
+        " that would fill them is missing. Averaged over all orders of adding them, the effects"
+        f" remove the following from {record.prices.departure:.1f} (95 % intervals): {prices}. With"
+        f" all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
     )
 
 
