@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.cost.timing import Judge
+from comparisons.cost.judging import Judge
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.effects.noiseless import Noiseless
