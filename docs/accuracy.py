@@ -1,6 +1,6 @@
-"""What docs/accuracy.md shows: studies of cost over many scenes, and what they have in common.
+"""The content of docs/accuracy.md: studies of cost over many scenes, and their common findings.
 
-``./run docs --accuracy`` measures, in half an hour on an idle machine, and writes the page.
+``./run docs --accuracy`` measures for half an hour on an idle machine, and writes the page.
 """
 
 from collections import Counter
@@ -40,7 +40,7 @@ def measured(
 
 
 def setting(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield where and how it was measured."""
+    """Yield the conditions of the measurement."""
     first = records[0]
     width, height = first.resolution
     yield (
@@ -77,7 +77,7 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
 
 
 def prices(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield each effect's price: where it matters, what it removes and adds there."""
+    """Yield each effect's price: the scenes where it matters, and its medians there."""
     worth: dict[str, list[tuple[float, float]]] = {}
     for record in records:
         for price in record.prices.effects:
@@ -98,7 +98,7 @@ def prices(records: Sequence[Cost]) -> Iterator[str]:
 
 
 def findings(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield what the studies have in common, each as an item of a list."""
+    """Yield the common findings of the studies, as list items."""
     for limit in TOLERANCES:
         yield f"- {_within(records, limit)}"
     yield f"- {_worth_most(records)}"
@@ -106,7 +106,7 @@ def findings(records: Sequence[Cost]) -> Iterator[str]:
 
 
 def _within(records, limit):
-    """Say where a kernel is enough for an error, and what it saves."""
+    """Return how many scenes need only a kernel for an error, and the time it saves."""
     enough, saved = [], []
     for record in records:
         chosen = cheapest(record.points, limit)
@@ -123,7 +123,7 @@ def _within(records, limit):
 
 
 def _worth_most(records):
-    """Say which effect has most of the departure, in how many scenes."""
+    """Return which effects are worth most, and in how many scenes."""
     first = Counter()
     for record in records:
         sure = [price for price in record.prices.effects if price.removes.low > 0]
@@ -136,7 +136,7 @@ def _worth_most(records):
 
 
 def _stand_ins(records):
-    """Say which stand-ins earn their place on a front."""
+    """Return which stand-ins are on a Pareto front, and in how many scenes."""
     names = [rung.name for rung in STAND_INS]
     on_front = Counter(
         name
@@ -150,7 +150,7 @@ def _stand_ins(records):
 
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:
-    """Return the points of a method, also where a scene cannot tell it from another."""
+    """Return the points of a method, even if a scene has merged it with another."""
     return record.points_of(next(rung.name for rung in record.rungs if name in rung.names))
 
 

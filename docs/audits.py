@@ -1,4 +1,4 @@
-"""What docs/audit.md shows: the audits of this project's shaders and of some of Mitsuba's BSDFs."""
+"""The content of docs/audit.md: audits of this project's shaders and some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +22,7 @@ BSDFS = (
 
 
 def audits() -> dict[str, Audit]:
-    """Return the audits of all, by what the table calls them."""
+    """Return all audits, by their names in the table."""
     found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn")}
     for path in sorted(SHADERS.glob("*.py")):
         if path.stem != PICTURED:
@@ -35,7 +35,7 @@ def audits() -> dict[str, Audit]:
 
 
 def table(found: dict[str, Audit]) -> Iterator[str]:
-    """Yield the table of checks: *holds*, or the worst that was found."""
+    """Yield the table of checks: *holds*, or the worst value found."""
     first = next(iter(found.values()))
     rows = [(name, *map(_cell, record.checks)) for name, record in found.items()]
     yield from markdown([("", *(check.name for check in first.checks)), *rows], right=1)

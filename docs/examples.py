@@ -1,4 +1,4 @@
-"""What docs/shaders.md shows of the shaders in docs/shaders: a table and a picture."""
+"""The tables and the picture of docs/shaders.md, from the shaders in docs/shaders."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +25,7 @@ SIDE, SAMPLES = 192, 256
 
 
 def comparisons() -> dict[tuple[str, str], Comparison]:
-    """Compare each shader on each scene, by the names of both."""
+    """Compare each shader on each scene; keys are the names of both."""
     return {(name, scene): _compared(name, scene) for name in NAMES for scene in SCENES}
 
 
@@ -36,17 +36,17 @@ def table(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
 
 
 def pictures(found: dict[tuple[str, str], Comparison]) -> dict[str, np.ndarray]:
-    """Return the images of one scene, by what shaded it."""
+    """Return the images of one scene, by shader."""
     shown = {name: found[name, PICTURED].images.heuristic for name in NAMES}
     return shown | {"reference": found[NAMES[0], PICTURED].images.reference}
 
 
 def mistakes() -> Iterator[str]:
-    """Yield the table of shaders that are wrong on purpose, with what is told of each."""
+    """Yield the table of shaders that are wrong on purpose, with the message for each."""
     rows = [
         (wrong.name, wrong.language, f"`{wrong.wrong.strip()}`", _told(wrong)) for wrong in WRONG
     ]
-    yield from markdown([("Mistake", "In", "Written as", "What is told"), *rows], right=4)
+    yield from markdown([("Mistake", "In", "Written as", "Message"), *rows], right=4)
 
 
 def _told(wrong: Wrong) -> str:
@@ -55,7 +55,7 @@ def _told(wrong: Wrong) -> str:
         try:
             return " ".join(diagnosis.told(str(path)))
         except InputError as error:
-            return f"Refused: {str(error).replace(str(path), path.name)}"
+            return f"Rejected: {str(error).replace(str(path), path.name)}"
 
 
 def _compared(name: str, scene: str) -> Comparison:

@@ -1,10 +1,10 @@
-"""The list of guarantees, docs/guarantees.md, from the tests that show them.
+"""The list of guarantees in docs/guarantees.md, from the tests that show them.
 
-A test, or a class or parametrised function of tests, states what it shows::
+A test, or a class or parametrised function of tests, states its guarantee::
 
     @pytest.mark.guarantee("marks", "Of images that differ by noise alone …")
 
-Tests are read, not imported.
+Tests are parsed, not imported.
 """
 
 import ast
@@ -25,12 +25,12 @@ AREAS = {
     "checks": "Regression checks",
     "runs": "Runs and files",
 }
-"""Areas of guarantees, in their order, and their headings."""
+"""Areas of guarantees in order, with their headings."""
 
 
 @dataclass(frozen=True)
 class Guarantee:
-    """A sentence, and the test that shows it; a slow one is left out of ``./run test``."""
+    """A sentence and the test that shows it; ``./run test`` omits slow ones."""
 
     area: str
     text: str
@@ -40,12 +40,12 @@ class Guarantee:
 
 
 def guarantees() -> list[Guarantee]:
-    """Return all guarantees that tests state, by area and file.
+    """Return the guarantees of all tests, sorted by area and file.
 
     Raises
     ------
     ValueError
-        For an area that is not known, or a mark whose words cannot be read.
+        If an area is unknown, or a mark is not made of literals.
     """
     files = sorted((ROOT / "tests").rglob("test_*.py"))
     found = [each for path in files for each in _of_file(path)]
@@ -54,7 +54,7 @@ def guarantees() -> list[Guarantee]:
 
 
 def lines() -> Iterator[str]:
-    """Yield the lines of the page's list."""
+    """Yield the lines of the list."""
     area, found = None, guarantees()
     for each in found:
         if each.area != area:
@@ -73,7 +73,9 @@ def _of_file(path: Path) -> Iterator[Guarantee]:
             mark = marks["pytest.mark.guarantee"]
             area, text = (ast.literal_eval(argument) for argument in mark.args)
             if area not in AREAS:
-                raise ValueError(f"{path.name}: area {area!r} is none of {', '.join(AREAS)}")
+                raise ValueError(
+                    f"{path.name}: area {area!r} is unknown; known: {', '.join(AREAS)}"
+                )
             is_slow = "pytest.mark.slow" in marks
             where = path.relative_to(ROOT).as_posix()
             yield Guarantee(area, text, where, node.name, is_slow)

@@ -1,7 +1,7 @@
-"""Makes what the documentation takes from the code: ``./run docs``; ``--all`` measures again, too.
+"""Makes the generated parts of the documentation: ``./run docs``; ``--all`` also measures again.
 
-Pictures and tables come from renderings with fixed seeds; the index of equations comes from the
-docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced, the rest is
+Pictures and tables come from renderings with fixed seeds. The index of equations comes from the
+docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced; the rest is
 written by hand.
 """
 
@@ -44,7 +44,7 @@ SHEETS = {
 """Pictures of docs/models.md: heuristic above, reference below."""
 
 LOBES = {"sharp": (31, 88), "dull": (157, 94)}
-"""Pixels of the plastic spheres, in the highlights of the first and of the last."""
+"""Pixels in the highlights of the first and the last of the plastic spheres."""
 
 POLYGONS = (
     ("fig-6-10", Interpolation.FLAT),
@@ -56,7 +56,7 @@ POLYGONS = (
 
 
 def main(words):
-    """Make everything; with ``--all`` what takes long, too, with ``--accuracy`` one page alone."""
+    """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
     set_variant("llvm_ad_rgb")
     if words == ["--accuracy"]:
         return _accuracy()
@@ -83,7 +83,7 @@ def main(words):
 
 
 def replace(page, part, lines):
-    """Replace what stands between a page's marks for a part."""
+    """Replace the text between the marks of a part of a page."""
     path = DOCS / page
     text = path.read_text(encoding="utf-8")
     begin, end = marks(part)
@@ -93,12 +93,12 @@ def replace(page, part, lines):
 
 
 def marks(part):
-    """Return what a part of a page begins and ends with."""
+    """Return the marks at the beginning and end of a part of a page."""
     return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
 
 
 def equation_table():
-    """Yield the index of equations in Markdown; neighbours that say the same share a row."""
+    """Yield the index of equations in Markdown; equal neighbours share a row."""
     rows = []
     for (home, meaning), entries in groupby(equations.index(), lambda e: (e.home, e.meaning)):
         numbers = [entry.number for entry in entries]
@@ -107,7 +107,7 @@ def equation_table():
 
 
 def rules():
-    """Yield the rules of pruning: what each leaves out, why, and what that rests on."""
+    """Yield the rules of pruning: what each omits, its proof, and its premises."""
     for rule in RULES:
         yield f"### {rule.name[0].upper()}{rule.name[1:]}"
         yield from ("", f"*What is absent:* {rule.absent}.", "", f"*Proof.* {rule.proof}")
@@ -140,7 +140,7 @@ def _images(name, interpolation=None):
 
 
 def _sheet(name, titles, rows):
-    """Write rows of pictures with a title above each column."""
+    """Write rows of pictures, with a title above each column."""
     columns, inch = len(titles), SIDE / 100
     figure = Figure(figsize=(columns * inch, len(rows) * inch + 0.25))
     axes = figure.subplots(len(rows), columns, squeeze=False)
@@ -156,7 +156,7 @@ def _sheet(name, titles, rows):
 
 
 def _lobes():
-    """Draw the vectors and the lobes in the highlights of two of the plastic spheres."""
+    """Draw the vectors and lobes in the highlights of two plastic spheres."""
     options = Options(spp=SAMPLES, resolution=(SIDE, SIDE))
     grid = compare(builtin("plastic-spheres").source(), options).terms
     for name, place in LOBES.items():
@@ -164,19 +164,19 @@ def _lobes():
 
 
 def _measurements():
-    """Measure again all that documents say of errors and times; it takes a quarter of an hour."""
-    import measured  # beside this script
+    """Measure all errors and times in the documents again, for a quarter of an hour."""
+    import measured  # next to this script
 
     for measure in (measured.baselines, measured.fits, measured.findings, measured.picture):
         measure()
     replace("../README.md", "cost", measured.prices())
-    replace("../README.md", "gains", measured.gains())
-    replace("../README.md", "speed", measured.speed())
+    replace("plans.md", "gains", measured.gains())
+    replace("speed.md", "speed", measured.speed())
 
 
 def _accuracy():
-    """Study what accuracy costs over many scenes; half an hour on an idle machine."""
-    import accuracy  # beside this script
+    """Study what accuracy costs over many scenes, for half an hour on an idle machine."""
+    import accuracy  # next to this script
 
     records = accuracy.measured()
     for part in ("setting", "findings", "methods", "prices", "pictures"):
@@ -187,21 +187,21 @@ def _accuracy():
 
 def _guarantees():
     """List what the tests guarantee."""
-    import guarantees  # beside this script
+    import guarantees  # next to this script
 
     replace("guarantees.md", "guarantees", guarantees.lines())
 
 
 def _architecture():
     """Draw the rooms that one comparison passes through."""
-    import rooms  # beside this script
+    import rooms  # next to this script
 
     found = rooms.rooms(rooms.way())
     atomic.write(DOCS / "architecture.svg", figures.drawn(rooms.picture(found), "svg"))
 
 
 def _example():
-    """Write the worked example of docs/reading.md: one scene with few samples and with many."""
+    """Write the example of docs/reading.md: one scene with few and with many samples."""
     results = []
     for samples in (16, 256):
         options = Options(spp=samples, resolution=(256, 256))
@@ -211,7 +211,7 @@ def _example():
 
 
 def _witnesses():
-    """Run the cases of docs/witnesses.md, and write what they show."""
+    """Run the cases of docs/witnesses.md, and write their results."""
     plugins.register()
     direct.register()
     for part in ("closed_forms", "figures", "elsewhere"):
@@ -220,7 +220,7 @@ def _witnesses():
 
 def _audits():
     """Audit the shaders and some BSDFs."""
-    import audits  # beside this script
+    import audits  # next to this script
 
     plugins.register()
     found = audits.audits()
@@ -230,7 +230,7 @@ def _audits():
 
 def _shaders():
     """Compare the shaders of docs/shaders."""
-    import examples  # beside this script
+    import examples  # next to this script
 
     found = examples.comparisons()
     replace("shaders.md", "shaders", examples.table(found))
@@ -240,8 +240,8 @@ def _shaders():
 
 
 def _renderers():
-    """Render scenes by four programs."""
-    import renderers  # beside this script
+    """Render scenes with four programs."""
+    import renderers  # next to this script
 
     found = renderers.rendered()
     replace("renderers.md", "renderers", renderers.table(found))
@@ -251,7 +251,7 @@ def _renderers():
 
 
 def _notebook():
-    """Execute the tutorial, and keep what its cells show but not when they ran."""
+    """Execute the tutorial; keep the output of its cells, but not their times."""
     path = DOCS / "tutorial.ipynb"
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()

@@ -1,6 +1,6 @@
-"""What documents say of measurements: ``./run docs --all`` measures again, and writes it.
+"""Measurements for the documents: ``./run docs --all`` measures and writes them again.
 
-Times are of the machine that it runs on. Nothing else should run beside it.
+Times belong to the machine; nothing else should run at the same time.
 """
 
 import subprocess
@@ -43,7 +43,7 @@ CHAPTER_8 = (
 
 
 def baselines() -> None:
-    """Measure the baselines of the tests again: all of them, not only those that moved."""
+    """Measure all baselines of the tests again, not only those that moved."""
     for file in (ROOT / "tests" / "baselines").glob("*.json"):
         file.unlink()
     _run("pytest", "-q", "tests/test_baselines.py", "--fotismos-update")
@@ -60,7 +60,7 @@ def findings() -> None:
 
 
 def prices() -> Iterator[str]:
-    """Study the cost of accuracy, draw its chart, and yield what the README says of it."""
+    """Study the cost of accuracy, draw its chart, and yield the README's sentence."""
     case = open_case(COST_SCENE, Request())
     record = cost(case.source, case.options).record
     atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(error_over_time(record)))
@@ -75,18 +75,18 @@ def prices() -> Iterator[str]:
     )
     closure = record.closure
     yield (
-        f"The textbook's kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
-        f" after {_time(kernel_point)}, and samples do not bring it nearer; the full plan is"
+        f"The textbook kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
+        f" after {_time(kernel_point)}, and more samples do not bring it nearer; the full plan is"
         f" {first.error:.1f} away after {_time(first)} and {last.error:.1f} after {_time(last)}."
-        f" Shadows alone give the kernel {shadows.error:.1f}, because the light between surfaces"
-        " that would fill them is missing. Over all orders of adding them, the effects remove, of"
-        f" {record.prices.departure:.1f}, with 95 % intervals: {prices}. With all of them"
-        f" {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) is left."
+        f" Adding shadows alone gives {shadows.error:.1f}, because the light between surfaces"
+        " that would fill them is missing. Averaged over all orders of adding them, the effects"
+        f" remove the following from {record.prices.departure:.1f} (95 % intervals): {prices}. With"
+        f" all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
     )
 
 
 def gains() -> Iterator[str]:
-    """Verify plans, and yield the table of what they save."""
+    """Verify plans, and yield the table of their savings."""
     names = ("sampler", "integrator", "pruning", "all")
     rows = []
     for scene in VERIFIED:
@@ -103,7 +103,7 @@ def _factor(factor: Factor) -> str:
 
 
 def speed() -> Iterator[str]:
-    """Yield the table of the kernel's speed, and what it says of many lights."""
+    """Yield the table of the kernel's speed, and a sentence on many lights."""
     data, many = kernel.run(ROUNDS), lights.run(ROUNDS)
     times, ratios = data["times"], data["ratios"]
 
@@ -117,7 +117,7 @@ def speed() -> Iterator[str]:
             ("", "Time", "The kernel is"),
             row("Dr.Jit kernel", "Dr.Jit", ""),
             row(
-                "memory copy of the bytes that it must read and write",
+                "memory copy of the bytes that it reads and writes",
                 fastest,
                 f"{ratios['memory copy']:.1f} times that",
             ),
@@ -139,14 +139,14 @@ def speed() -> Iterator[str]:
     unrolled = np.median([row["unrolled_ns"] for row in many])
     yield ""
     yield (
-        f"With many lights it takes {min(each):.2f} to {max(each):.2f} ns per light and point from"
-        f" 1,000 to 10,000 lights, where eight lights unrolled take {unrolled:.2f} ns; compile time"
-        f" stays under {max(row['compile_s'] for row in many):.1g} s."
+        f"With 1,000 to 10,000 lights it takes {min(each):.2f} to {max(each):.2f} ns per light and"
+        f" point; eight unrolled lights take {unrolled:.2f} ns. Compile time stays under"
+        f" {max(row['compile_s'] for row in many):.1g} s."
     )
 
 
 def picture() -> None:
-    """Draw both halves of a scene and ΔE2000, for the head of the README."""
+    """Draw both halves of a scene and ΔE2000, for the top of the README."""
     case = open_case(PICTURED, Request(resolution=(512, 300), spp=1024))
     found = compare(case.source, case.options).images
     error = images.error_map(found.maps[LEADING.name], LEADING.map_range[1])
@@ -158,7 +158,7 @@ def picture() -> None:
 
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:
-    """Return the points of a method, also where a scene cannot tell it from another."""
+    """Return the points of a method, even if a scene has merged it with another."""
     (rung,) = [rung.name for rung in record.rungs if name in rung.names]
     return record.points_of(rung)
 

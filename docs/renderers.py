@@ -1,4 +1,4 @@
-"""What docs/renderers.md shows: figures and scenes by the kernel, POV-Ray, three.js and Mitsuba."""
+"""The content of docs/renderers.md: scenes by the kernel, POV-Ray, three.js and Mitsuba."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ KERNEL, POVRAY, THREE, MITSUBA = "kernel", "POV-Ray", "three.js", "Mitsuba"
 
 @dataclass(frozen=True)
 class Rendered:
-    """The images (H, W, 3) of a scene by renderer, and the mean departures of all but the last."""
+    """The images (H, W, 3) of a scene by renderer, and mean departures of all but the last."""
 
     images: dict[str, np.ndarray]
     departures: dict[str, float]
@@ -33,12 +33,12 @@ class Rendered:
 
 
 def rendered() -> dict[str, Rendered]:
-    """Render all scenes, by name."""
+    """Render all scenes; keys are their names."""
     return {name: _rendered(name) for name in SCENES}
 
 
 def table(found: dict[str, Rendered]) -> Iterator[str]:
-    """Yield the table: the mean departure from Mitsuba, and in brackets from the kernel."""
+    """Yield the table: the mean departure from Mitsuba; in brackets, from the kernel."""
     rows = [
         (name, *(_cell(one, renderer) for renderer in (KERNEL, POVRAY, THREE)))
         for name, one in found.items()

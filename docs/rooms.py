@@ -1,7 +1,7 @@
 """The way of one scene through the rooms, for docs/architecture.md.
 
-A room is a folder of modules. Calls are watched while ``fotismos compare`` runs: the picture shows
-the code as it is.
+A room is a folder of modules. Calls are traced while ``fotismos compare`` runs, so the picture
+shows the actual code.
 """
 
 import sys
@@ -25,7 +25,7 @@ FILLS = ("#e8eef7", "#e9f4ea", "#fdf3e1", "#f6e9f2")
 
 @contextmanager
 def watched() -> Iterator[list[str]]:
-    """Collect the files whose functions are called in the block, one entry per change of file."""
+    """Collect the files of the functions called in the block, one entry per change of file."""
     files: list[str] = []
 
     def note(frame, event, _):
@@ -43,9 +43,9 @@ def watched() -> Iterator[list[str]]:
 
 
 def way() -> list[str]:
-    """Compare a scene in a small size, and return the modules that it passes through, in order.
+    """Compare a small scene, and return the modules that it passes through, in order.
 
-    It is compared twice, and the second time watched: the first imports what is needed.
+    The second of two comparisons is traced, because the first one runs imports.
     """
     from reports import cli
 
@@ -61,7 +61,7 @@ def way() -> list[str]:
 
 
 def rooms(modules: list[str]) -> dict[str, list[str]]:
-    """Return the modules of each room, rooms and modules in the order in which they are entered."""
+    """Return the modules of each room; both are in the order of entry."""
     found: dict[str, list[str]] = {}
     for module in modules:
         path = Path(module)
@@ -72,7 +72,7 @@ def rooms(modules: list[str]) -> dict[str, list[str]]:
 
 
 def picture(found: dict[str, list[str]]) -> Figure:
-    """Draw the rooms from top to bottom as they are entered, each floor a column."""
+    """Draw the rooms from top to bottom in order of entry, with one column per floor."""
     figure = Figure(figsize=(9, 0.5 + 0.5 * len(found)))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_xlim(-0.2, 4.05)

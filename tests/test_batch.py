@@ -117,7 +117,7 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
         assert finished.load(place, key) is None
 
 
-@pytest.mark.guarantee("runs", "A scene that kills its process takes no other along.")
+@pytest.mark.guarantee("runs", "A scene that kills its process does not affect the others.")
 def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
     (folder / "c.py").write_text(GOOD)
@@ -273,7 +273,7 @@ def test_a_killed_batch_goes_on_to_the_results_of_a_whole_one(box_filtered, tmp_
     assert [path.parent.name for path in kept] == ["a"]
 
 
-@pytest.mark.guarantee("runs", "Batches that are killed at any moment lose no finished scene.")
+@pytest.mark.guarantee("runs", "A batch killed at any moment loses no finished scene.")
 @pytest.mark.slow
 def test_fifty_killed_batches_lose_nothing(box_filtered, tmp_path):
     random = Random(50)

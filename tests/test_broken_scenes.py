@@ -155,8 +155,8 @@ def changed(before, after):
 
 @pytest.mark.guarantee(
     "runs",
-    "A scene with values that cannot be meant, or of which nothing is in view, is refused by the"
-    " name of the element.",
+    "A scene with impossible values, or with nothing in view, is rejected with a message that"
+    " names the element.",
 )
 @pytest.mark.parametrize(("before", "after", "message"), BROKEN.values(), ids=BROKEN.keys())
 def test_what_cannot_be_meant_is_refused_by_name(rgb, tmp_path, before, after, message):

@@ -123,7 +123,10 @@ def test_an_unchanged_scene_alarms_no_more_than_stated(rgb):
     check_alarms(SCENES["plastic-spheres"].make, (16, 16), 10, (0.05,))
 
 
-@pytest.mark.guarantee("checks", "Checks of an unchanged scene alarm no more often than stated.")
+@pytest.mark.guarantee(
+    "checks",
+    "Checks of an unchanged scene raise alarms no more often than stated.",
+)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plastic-spheres", "cornell-box"])
 def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):

@@ -64,7 +64,7 @@ def test_normal_noise_alarms_at_the_stated_rate(level):
     assert least <= alarms(normal, 1000, level) <= most
 
 
-@pytest.mark.guarantee("checks", "Noise of heavy tails alarms no more often than stated.")
+@pytest.mark.guarantee("checks", "Heavy-tailed noise raises alarms no more often than stated.")
 @pytest.mark.parametrize("draw", [fireflies, skewed])
 def test_noise_of_heavy_tails_alarms_no_more_than_stated(draw):
     assert alarms(draw, 500, 0.05) <= bounds(500, 0.05)[1]

@@ -70,7 +70,7 @@ def test_films_keep_their_size():
 
 @pytest.mark.guarantee(
     "prices",
-    "A preview of the switchboard shows what simulating its effects gives.",
+    "A preview of the switchboard equals a rendering that simulates its effects.",
 )
 def test_the_corner_of_shadows_is_the_kernel_with_shadows():
     """By the kernel's own shadow rays, where the corner has Mitsuba's direct light."""

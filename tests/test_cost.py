@@ -90,7 +90,7 @@ def sharp(request):
 
 @pytest.mark.guarantee(
     "prices",
-    "With all effects simulated nothing is left of the departure: the closure's interval holds 0.",
+    "With all effects simulated no departure remains: the closure's interval contains 0.",
 )
 def test_with_all_effects_nothing_is_left(rgb, sharp):
     closure = sharp.closure
@@ -100,7 +100,8 @@ def test_with_all_effects_nothing_is_left(rgb, sharp):
 
 @pytest.mark.guarantee(
     "prices",
-    "On the Cornell box intervals of prices hold the converged price in 35 of 40 runs or more.",
+    "On the Cornell box, intervals of prices contain the converged price in at least 35 of 40"
+    " runs.",
 )
 @pytest.mark.slow
 def test_intervals_of_prices_hold_the_converged_price(rgb, capsys):

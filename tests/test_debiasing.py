@@ -39,7 +39,7 @@ def without_noise(test, passes):
 
 @pytest.mark.guarantee(
     "means",
-    "Intervals of mean ΔE2000 hold the truth at departures of 0, 1 and 5.",
+    "Intervals of mean ΔE2000 contain the truth at departures of 0, 1 and 5.",
 )
 @pytest.mark.parametrize("count", [4, 16])
 @pytest.mark.parametrize(("factor", "about"), [(1.0, 0), (1.045, 1), (1.245, 5)])
@@ -78,7 +78,10 @@ def test_shares_of_visible_pixels_are_within_their_intervals(rgb):
     assert np.mean(inside, axis=0).min() >= 0.75
 
 
-@pytest.mark.guarantee("means", "A tenth more brightness on a plain grey does not pass as noise.")
+@pytest.mark.guarantee(
+    "means",
+    "A brightness error of a tenth on plain grey does not pass as noise.",
+)
 @pytest.mark.parametrize("spread", [0.3, 0.45])
 def test_a_tenth_more_brightness_is_no_noise_on_a_plain_grey(rgb, spread):
     """The mean is at its floor, up to 1.1 times, which says nothing: noise hides the departure."""

@@ -90,7 +90,7 @@ def _estimate(made, integrator, stream):
 
 @pytest.mark.guarantee(
     "reference",
-    "A light that is found by way of a mirror or glass counts as in Mitsuba's `path`.",
+    "Light found through a mirror or glass counts as in Mitsuba's `path`.",
 )
 @pytest.mark.parametrize("light", ["area", "constant", "point"])
 @pytest.mark.parametrize("ball", BALLS)

@@ -22,7 +22,7 @@ def told(path):
         return (str(error),)
 
 
-@pytest.mark.guarantee("runs", "Mistakes that shaders are known for are each named in words.")
+@pytest.mark.guarantee("runs", "Well-known shader mistakes are each named in words.")
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong.name)
 def test_a_wrong_shader_is_told_what_is_wrong(rgb, tmp_path, wrong):
     if wrong.suffix == GLSL and MISSING:

@@ -116,8 +116,8 @@ def states(folder):
 
 @pytest.mark.guarantee(
     "runs",
-    "Whichever writing fails, earlier results stay whole, and nothing half written is left "
-    "after the next run.",
+    "If any write fails, earlier results stay intact, and no partial file is left after the "
+    "next run.",
 )
 @pytest.mark.parametrize("stays_full", [False, True])
 @pytest.mark.parametrize("earlier", [False, True])

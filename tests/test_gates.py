@@ -25,7 +25,8 @@ def judged(low, high, bound):
 
 
 @pytest.mark.guarantee(
-    "checks", "A gate fails only where the interval's lower end is above its bound."
+    "checks",
+    "A gate fails only if the interval's lower end is above its bound.",
 )
 def test_a_gate_fails_only_where_noise_is_no_reason():
     assert judged(0.3, 0.5, bound=0.2) == ["failed"] * 2

@@ -42,8 +42,8 @@ def view(name, is_coarse=False):
 
 @pytest.mark.guarantee(
     "runs",
-    "A report's page is written with the first pictures, shows all scenes in a coarse form before"
-    " one is refined, and says how many are refined until it is finished.",
+    "A report's page appears with the first pictures, shows all scenes coarsely before "
+    "refining any, and says how many are refined until it is finished.",
 )
 def test_a_report_grows_from_coarse_to_whole_to_hard_cases(run, small_report, pages, tmp_path):
     assert run("report", "-o", tmp_path / "out", *WORDS)[0] == 0

@@ -22,7 +22,8 @@ SLIGHTLY_WRONG = {"an anisotropic sphere"}
 
 @pytest.mark.guarantee(
     "plans",
-    "The guard catches each wrong plan of a fifth of the light or more at default settings.",
+    "At default settings the guard catches each plan that is wrong by a fifth of the light or"
+    " more.",
 )
 @pytest.mark.parametrize("name", sorted(set(SCENES) - SLIGHTLY_WRONG))
 def test_a_wrong_plan_is_caught(rgb, name, monkeypatch):
@@ -145,7 +146,7 @@ def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
 
 @pytest.mark.guarantee(
     "plans",
-    "Noise alone makes the guard disagree in one scene of a thousand at most.",
+    "Noise alone makes the guard disagree in at most one scene in a thousand.",
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [normal, fireflies])

@@ -33,7 +33,7 @@ def test_the_naive_formula_violates_the_bound(outcomes, case):
 
 @pytest.mark.guarantee(
     "kernel",
-    "Hard cases keep a bound of error that the formula as printed breaks.",
+    "Hard cases stay within an error bound that the formula as printed breaks.",
 )
 @ALL
 def test_ours_keeps_the_bound(outcomes, case):

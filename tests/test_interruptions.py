@@ -55,8 +55,8 @@ def test_an_interrupted_command_leaves_nothing_broken(name):
 
 @pytest.mark.guarantee(
     "runs",
-    "Ctrl-C and SIGTERM at any moment leave no torn file and no orphan, and the same command then"
-    " gives the results of an undisturbed one.",
+    "Ctrl-C and SIGTERM at any moment leave no torn file and no orphan; the same command then"
+    " gives the results of an undisturbed run.",
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - {"compare without causes"}))

@@ -37,7 +37,10 @@ def holder(tmp_path):
         process.kill()
 
 
-@pytest.mark.guarantee("runs", "Of two commands in one folder the second says who holds it.")
+@pytest.mark.guarantee(
+    "runs",
+    "The second of two commands in one folder reports which process holds it.",
+)
 def test_the_second_command_says_who_holds_the_folder(run, scene_file, tmp_path, holder):
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     for command in ("compare", "cost", "fit"):

@@ -179,7 +179,7 @@ def check_mean(samples, truth, other=0.0):
 
 @pytest.mark.guarantee(
     "reference",
-    "Lights that are picked in proportion to what they give have the mean of all of them.",
+    "Lights that are picked in proportion to their contribution have the mean of all lights.",
 )
 def test_picked_lights_have_the_mean_of_all(rgb):
     made = mi.load_dict(floor(**lights(point, 150), **lights(spot, 100), **lights(directional, 50)))

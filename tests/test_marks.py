@@ -64,7 +64,7 @@ def test_few_passes_leave_everything_open(rgb):
     assert (noisy.found(differences, 2 * truth) == UNDETERMINED).all()
 
 
-@pytest.mark.guarantee("marks", "Pixels that no light has reached are undetermined, not marked.")
+@pytest.mark.guarantee("marks", "Pixels that no light reached are undetermined, not marked.")
 def test_pixels_that_no_light_has_reached_are_left_open(rgb):
     """Both a whole image, and a corner of one where rare large contributions come elsewhere."""
     dark = np.zeros((8, 16, 16, 3))
@@ -142,8 +142,8 @@ def check(name, samples, passes, runs, size=noisy.SIZE):
 
 @pytest.mark.guarantee(
     "marks",
-    "On the Cornell box at 16 passes of 16 samples nine tenths of the pixels beyond a ΔE2000 "
-    "of 3 are marked.",
+    "On the Cornell box, with 16 passes of 16 samples, nine tenths of the pixels above a "
+    "ΔE2000 of 3 are marked.",
 )
 def test_the_cornell_box_has_few_false_marks_and_most_true_ones(rgb):
     pool = check("cornell", 16, 16, 20, 24)

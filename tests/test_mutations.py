@@ -120,7 +120,7 @@ def name_of(mutation):
     return mutation.__name__
 
 
-@pytest.mark.guarantee("kernel", "Kernels that are wrong on purpose are found out.")
+@pytest.mark.guarantee("kernel", "Kernels that are wrong on purpose are detected.")
 @pytest.mark.parametrize("mutate", MUTATIONS, ids=name_of)
 def test_the_oracle_finds_a_wrong_kernel(monkeypatch, mutate):
     mutate(monkeypatch)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.cost.timing import Judge
+from comparisons.cost.judging import Judge
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.effects.noiseless import Noiseless
@@ -42,8 +42,8 @@ def true(value):
 
 @pytest.mark.guarantee(
     "prices",
-    "Errors behind prices are without noise: nothing is left where nothing differs, and two "
-    "fifths at most near the noise.",
+    "Errors behind prices exclude noise: none of it remains where nothing differs, and at "
+    "most two fifths near the noise.",
 )
 @pytest.mark.parametrize("draw", [normal, skewed])
 @pytest.mark.parametrize("value", [0.3, 0.31, 0.36])

@@ -53,7 +53,7 @@ def compared():
 
 @pytest.mark.guarantee(
     "prices",
-    "Every shape and every region has the share of the departure that it carries, and its cause.",
+    "Every shape and every region is listed with its share of the departure, and its cause.",
 )
 def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
     _, record = compared

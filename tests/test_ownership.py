@@ -144,8 +144,7 @@ def test_a_failed_check_clears_away_its_own_pictures_alone(tmp_path):
 
 @pytest.mark.guarantee(
     "runs",
-    "Whatever is written in whatever order, no file that fotismos did not make is replaced "
-    "or removed.",
+    "No file that fotismos did not make is replaced or removed, whatever the order of writes.",
 )
 @pytest.mark.parametrize("seed", range(8))
 def test_random_writings_never_lose_what_is_not_ours(tmp_path, seed):
@@ -236,7 +235,8 @@ print(at)
 
 
 @pytest.mark.guarantee(
-    "runs", "What a user puts where a killed command was about to write stays the user's."
+    "runs",
+    "A file that a user puts where a killed command was about to write stays the user's.",
 )
 def test_what_is_put_where_a_killed_run_was_about_to_write_is_not_ours(tmp_path):
     """Killed at every call that changes the disk; the user's file comes before the next run."""

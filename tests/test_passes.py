@@ -44,7 +44,7 @@ def arrays(result):
     return [*halves, images.significant, *images.maps.values()]
 
 
-@pytest.mark.guarantee("runs", "A run that was killed goes on to the same image, bit for bit.")
+@pytest.mark.guarantee("runs", "A killed run resumes to the same image, bit for bit.")
 def test_a_killed_run_goes_on_to_the_same_image_bit_for_bit(rgb, tmp_path):
     file = tmp_path / "passes.npz"
     assert python("-c", INTERRUPTED, file).returncode == -signal.SIGKILL

@@ -128,7 +128,7 @@ EXACT = {
 }
 
 
-@pytest.mark.guarantee("pairing", "Both halves of an exact pair differ by noise alone.")
+@pytest.mark.guarantee("pairing", "The halves of an exact pair differ by noise alone.")
 @pytest.mark.parametrize("everything", [False, True], ids=["planned", "everything"])
 @pytest.mark.parametrize("name", EXACT)
 def test_an_exact_pair_differs_by_the_noise_alone(rgb, name, everything):

@@ -53,7 +53,8 @@ def picture_of(scene, words, **more):
 
 
 @pytest.mark.guarantee(
-    "runs", "A picture that another run wrote has that run's departure, to the file's precision."
+    "runs",
+    "A picture from another run has that run's departure, to the file's precision.",
 )
 @pytest.mark.parametrize("scene", ["fig-8-9", "plastic-spheres"])
 def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch, scene):
@@ -220,7 +221,8 @@ ODD = {
 
 
 @pytest.mark.guarantee(
-    "runs", "Twelve mistakes in the making of a picture are each named by the comparison."
+    "runs",
+    "The comparison names each of twelve mistakes in how a picture was made.",
 )
 @pytest.mark.parametrize("name", ODD)
 def test_a_mistake_in_a_picture_is_named(rgb, tmp_path, cornell, name):

@@ -51,8 +51,8 @@ def kernel(ready, grid):
 
 @pytest.mark.guarantee(
     "kernel",
-    "The terms of 8.10 that a page shows add up to the kernel's value, in every built-in scene that"
-    " is shaded by it.",
+    "The terms of 8.10 on a page add up to the kernel's value, in every built-in scene that "
+    "it shades.",
 )
 @pytest.mark.parametrize("name", [n for n, s in SCENES.items() if s.interpolation == "phong"])
 def test_the_terms_add_up_to_what_the_kernel_has(name):

@@ -51,7 +51,10 @@ def assigned(folder, *wanted):
     return list(found)
 
 
-@pytest.mark.guarantee("runs", "Commands on scenes of one name replace nothing of each other's.")
+@pytest.mark.guarantee(
+    "runs",
+    "Commands on different scenes of the same name never replace each other's results.",
+)
 def test_commands_on_one_name_replace_nothing_of_each_other(run, tmp_path):
     """`study kitchen.toml`, `compare kitchen.xml`, and scenes called as a command or a file is."""
     out = tmp_path / "out"

@@ -130,10 +130,7 @@ def die_once(path):
     return "done"
 
 
-@pytest.mark.guarantee(
-    "runs",
-    "A process that is killed loses nothing: another one does its task.",
-)
+@pytest.mark.guarantee("runs", "A killed process loses nothing: another one does its task.")
 def test_a_process_that_somebody_kills_loses_nothing(tmp_path):
     with Pool(2) as pool:
         tasks = [Task("equal", die_once, (tmp_path / str(i // 2),)) for i in range(6)]
@@ -277,7 +274,10 @@ def beat(times, pause, progress):
     return "alive"
 
 
-@pytest.mark.guarantee("runs", "What makes progress goes on; what makes none is ended.")
+@pytest.mark.guarantee(
+    "runs",
+    "A task that makes progress continues; one that makes none is ended.",
+)
 def test_progress_is_a_sign_of_life():
     with Pool(1, limit_s=3.0) as pool:
         pool.start()

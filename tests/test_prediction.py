@@ -144,7 +144,8 @@ def test_errors_of_nothing_but_edges_vanish_no_faster_than_they():
 
 
 @pytest.mark.guarantee(
-    "prices", "Intervals of predicted times and errors hold nine of ten that are measured later."
+    "prices",
+    "Intervals of predicted times and errors contain nine of ten later measurements.",
 )
 def test_intervals_of_errors_hold_as_often_as_they_say():
     rng = np.random.default_rng(3)

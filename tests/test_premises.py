@@ -42,8 +42,8 @@ def means(description):
 
 @pytest.mark.guarantee(
     "plans",
-    "Each rule of pruning is refused where a premise is not known to hold, as in the scenes "
-    "that it once got wrong.",
+    "A pruning rule is rejected if a premise is not known to hold, as in the scenes that it "
+    "once got wrong.",
 )
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):

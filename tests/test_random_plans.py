@@ -27,7 +27,7 @@ def test_it_is_in_other_variants(variant, tmp_path, seed):
     assert found.state in RIGHT, found
 
 
-@pytest.mark.guarantee("plans", "A wrong plan among random scenes is found out.")
+@pytest.mark.guarantee("plans", "A wrong plan among random scenes is detected.")
 def test_wrong_plans_are_found(rgb, tmp_path, monkeypatch):
     """With every premise taken for true: seed 3 has shadows, or light reflected twice."""
     monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
@@ -48,8 +48,8 @@ def test_the_scenes_differ_in_what_is_called_for(rgb, tmp_path):
 
 @pytest.mark.guarantee(
     "plans",
-    "Of 2,000 random scenes none is planned wrongly: the plan's mean is that of stock "
-    "Mitsuba, to 1 % or 4 standard errors.",
+    "None of 2,000 random scenes is planned wrongly: the plan's mean equals stock Mitsuba's "
+    "to 1 % or 4 standard errors.",
 )
 @pytest.mark.slow
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def test_each_pixel_has_one_sample_in_each_stratum_and_cell(make, count):
 
 @pytest.mark.guarantee(
     "reference",
-    "A sample of the sampler is uniform in all dimensions together, so that estimates are "
-    "unbiased at any number of samples per pass.",
+    "A sample is uniform in all dimensions jointly: estimates are unbiased at any number of "
+    "samples per pass.",
 )
 @pytest.mark.parametrize("count", [3, 16])
 def test_one_sample_is_uniform_in_all_dimensions_together(make, count):
@@ -103,7 +103,7 @@ def test_a_clone_goes_on_with_the_same_numbers_and_a_fork_begins_again(make):
 @pytest.mark.guarantee(
     "reference",
     "Inside a sphere of albedo 0.5 to 0.95 the reference is within 0.3 % of the closed form, "
-    "at default settings and at `--spp 64`.",
+    "at default settings and with `--spp 64`.",
 )
 @pytest.mark.parametrize(
     ("reflectance", "spp"), [(0.5, None), (0.8, None), (0.9, None), (0.95, None), (0.9, 64)]

@@ -186,7 +186,9 @@ LIGHTS = {
 
 
 @pytest.mark.guarantee(
-    "kernel", "Gradients are finite at a zero normal, a zero view and a light's own position."
+    "kernel",
+    "Gradients are finite for a zero normal, a zero view vector and a point at a light's own "
+    "position.",
 )
 @pytest.mark.parametrize("where", WHERE.values(), ids=WHERE.keys())
 @pytest.mark.parametrize("make", LIGHTS.values(), ids=LIGHTS.keys())

@@ -106,7 +106,8 @@ def require_alike(scene, heuristic):
 
 @three
 @pytest.mark.guarantee(
-    "kernel", "What three.js draws of a sphere and a plane is the closed form of its shading."
+    "kernel",
+    "three.js draws a sphere and a plane as the closed form of its shading says.",
 )
 @pytest.mark.parametrize("light", LIGHTS)
 def test_three_js_is_its_closed_form(rgb, light):

@@ -44,7 +44,7 @@ GREY = "def shade(point):\n    return point.ambient * 0 + 0.25\n"
 
 @pytest.mark.guarantee(
     "kernel",
-    "Phong's model, written as a user's function in a file, gives the kernel's image to 1e-5.",
+    "Phong's model, written as a function in a file, gives the kernel's image to 1e-5.",
 )
 @pytest.mark.parametrize("interpolation", ["phong", "gouraud", "flat"])
 @pytest.mark.parametrize("scene", ["fig-8-9", "fig-8-11-n3", "fig-6-5-m40", "fig-6-14"])
@@ -361,7 +361,7 @@ MISTAKES = {
 
 @pytest.mark.guarantee(
     "runs",
-    "A mistake in a user's heuristic is one message, with the file, the line and the remedy.",
+    "A mistake in your heuristic gives one message, with the file, the line and the remedy.",
 )
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_told_with_file_and_line(rgb, written, mistake):
@@ -437,9 +437,7 @@ def record_of(folder):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.guarantee(
-    "runs", "A result is not found again when a file changed that its heuristic is made of."
-)
+@pytest.mark.guarantee("runs", "A result is not reused if a file of its heuristic has changed.")
 def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, written, tmp_path):
     """Finished results are found again as long as no file changes that the heuristic is made of."""
     written("LEVEL = 0.25\n", "level.py")

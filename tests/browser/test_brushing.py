@@ -69,7 +69,8 @@ def values(report, name="dE2000"):
 
 
 @pytest.mark.guarantee(
-    "means", "A rectangle that is drawn in the picture gets its mean, its share and its cause."
+    "means",
+    "A rectangle drawn in the picture gets its mean, its share and its cause.",
 )
 def test_a_rectangle_has_the_numbers_of_its_pixels(visitor, report):
     page = visitor.open(SCENE)

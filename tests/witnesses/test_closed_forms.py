@@ -18,8 +18,8 @@ def require_agreement(found):
 
 @pytest.mark.guarantee(
     "reference",
-    "At default settings the reference meets 25 closed forms (docs/witnesses.md); a bias of "
-    "0.3 % fails.",
+    "At default settings the reference matches 25 closed forms (docs/witnesses.md); a bias of"
+    " 0.3 % fails.",
 )
 @cases
 def test_the_reference_is_the_closed_form(rgb, witness):
