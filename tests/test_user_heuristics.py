@@ -287,7 +287,7 @@ MISTAKES = {
     ),
     "shape": (
         "def shade(point): return (1, 2, 3)\n",
-        r"^mine.py, line 1: .* returned a tuple of 3; expected is one colour for each point",
+        r"^mine.py, line 1: .* returned a tuple of 3; return one colour per point",
     ),
     "two components": (
         "import mitsuba as mi\ndef shade(point): return mi.Point2f(point.uv)\n",
@@ -329,7 +329,7 @@ MISTAKES = {
     "bounds": (
         "from heuristic import Range\n"
         "def shade(point, gloss: Range(0, 1) = 2): return gloss\n",
-        r"^mine.py, line 2: gloss = 2.0 is not allowed: give one from 0 to 1",
+        r"^mine.py, line 2: gloss = 2.0 is not allowed: give a value from 0 to 1",
     ),
     "a reserved name": (
         "def shade(point, ambient=1.0): return ambient\n",
