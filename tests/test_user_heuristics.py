@@ -273,7 +273,7 @@ MISTAKES = {
     ),
     "not finite": (
         "def shade(point): return point.ambient / 0\n",
-        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*expected are .* finite",
+        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*components must be .* finite",
     ),
     "root of what is negative": (
         "import drjit as dr\n\n"
@@ -283,7 +283,7 @@ MISTAKES = {
     "negative": (
         "import drjit as dr\n"
         "def shade(point): return dr.dot(point.normal, point.lights[1].toward)\n",
-        r"^mine.py, line 2: .* expected are components that are 0 or more.*drjit.maximum\(cosine",
+        r"^mine.py, line 2: .* components must be 0 or more.*drjit.maximum\(cosine",
     ),
     "shape": (
         "def shade(point): return (1, 2, 3)\n",

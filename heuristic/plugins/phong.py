@@ -233,8 +233,7 @@ def define() -> None:
             return dr.select(total > 0, specular / total, 0.5)
 
         def _through_probability(self, ctx, si, active):
-            """Share of samples that pass straight through: the transmittance's part of the
-            light."""
+            """Share of samples that pass straight through."""
             if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
                 return mi.Float(0)
             clear = dr.mean(self.transmittance.eval(si, active))

@@ -1,4 +1,4 @@
-"""Where Mitsuba's integrators agree: on every light in the place of one, and on masks."""
+"""Cases in which Mitsuba's integrators agree: every light instead of one, and masks."""
 
 from reference.pairing import lights
 from reference.pairing.halves import Pair
@@ -45,7 +45,7 @@ def _many(facts: Facts) -> str | None:
     count = len(facts.structure.lights)
     if count <= MOST_ASKED:
         return None
-    return f"{count:,} lights: {PICKS} a sample are picked, in proportion to what they give"
+    return f"{count:,} lights: {PICKS} per sample are picked, in proportion to what they give"
 
 
 EVERY_LIGHT = Pruning(
@@ -65,11 +65,11 @@ EVERY_LIGHT = Pruning(
 
 
 def loses_light(integrator: str, pair: Pair) -> bool:
-    """Tell whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
+    """Return whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
 
-    A camera ray that passes straight through everything that it meets, and ends in nothing that is
-    shown, counts as black, with what it gathered at the surfaces on its way. Of a closed mask of
-    opacity ``o`` before nothing, the share ``(1 - o)^2`` is lost. ``volpath`` keeps it.
+    A camera ray that passes straight through every surface, and ends in nothing visible, counts as
+    black, including the light gathered on its way. A closed mask of opacity ``o`` before nothing
+    loses the share ``(1 - o)^2``. ``volpath`` keeps it.
     """
     graph = pair.physical
     passing = any(graph.plugin(index) in ("mask", "null") for index in graph.nodes(BSDF))

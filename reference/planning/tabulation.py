@@ -17,7 +17,7 @@ def _not_one(facts: Facts) -> str | None:
     if shapes != 1:
         return f"{shapes} shapes"
     if bsdfs - len(wrapped) != 1:
-        return "two sides that reflect each in their own way"
+        return "two sides that reflect differently"
     return None
 
 
@@ -26,7 +26,7 @@ def _not_uniform(facts: Facts) -> str | None:
     extended = [kind for kind in kinds if not kind.exact]
     if len(extended) == 1 and extended[0].uniform:
         return None
-    return f"{facts.lights_in_words}: not one constant environment, and else points and directions"
+    return f"{facts.lights_in_words}: not one constant environment plus points and directions"
 
 
 def _textured(facts: Facts) -> str | None:
