@@ -66,7 +66,7 @@ class LLVMInfo:
     path
         The library; None if unknown.
     source
-        Where it came from: the user's variable, the wheel, or Dr.Jit's search of the system.
+        Its origin: the user's variable, the wheel, or Dr.Jit's search of the system.
     note
         What a person should know about it; may be empty.
     """

@@ -86,7 +86,7 @@ def common_wavelength_count(values: Mapping[str, Any]) -> int:
 
 
 def as_array(value: Any, vector_type: type) -> Colour:
-    """Turn a checked value into what the kernel multiplies with.
+    """Convert a checked value into a factor for the kernel.
 
     Numbers and Dr.Jit arrays stay unchanged; a tuple of three or fewer becomes a fixed array of
     the backend and precision of ``vector_type``, a longer one a dynamic array.

@@ -4,7 +4,7 @@ The chapter interpolates twice along straight lines: along two edges to the poin
 scan line meets them (6.35, 6.37), then along the scan line (6.36, 6.38). On a triangle this is the
 same as weighting the three vertices by barycentric coordinates, for every direction of the scan
 line. Renderers use the latter, on the surface itself; the chapter's scan lines lie in the image,
-where perspective would have to be corrected for.
+where perspective would need a correction.
 
 This module holds the equations. :mod:`heuristic.mesh_shading` applies them to Mitsuba's meshes.
 """

@@ -14,7 +14,7 @@ from heuristic.numerics import Cosine
 def lobe(
     material: Material, normal: Vector, view: Vector
 ) -> Callable[[Light, Position, Direction, Number], Cosines]:
-    """Return a function that gives the lobe's cosine for a light, 0 where it is below the horizon.
+    """Return a function that gives the lobe's cosine for a light, 0 for lights below the horizon.
 
     ``R.V`` (8.9), or ``N.H`` for the form ``blinn``. Whatever depends only on the normal and the
     view is computed once for all lights.

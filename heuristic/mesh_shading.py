@@ -128,7 +128,7 @@ def stored_shade(
 ) -> Colour:
     """Read what :func:`shade_mesh` stored, at the surface interactions of rays.
 
-    A face shows its front where the ray meets the side to which its vertices are anticlockwise,
+    A face shows its front if the ray hits the side from which its vertices are anticlockwise,
     whatever its vertex normals say. Its back is black, or with ``twosided`` has its stored value.
     Shapes without stored values read as black.
 

@@ -126,8 +126,8 @@ def unit_cross(a: Vector, b: Vector) -> Direction:
 def cross(a: Vector, b: Vector) -> Vector:
     """Return ``a x b`` such that ``b x a`` is its exact opposite.
 
-    ``dr.cross`` fuses one product of each pair and rounds the other, so that two opposing faces
-    would not cancel.
+    ``dr.cross`` fuses one product of each pair and rounds the other, so two opposing faces would
+    not cancel.
     """
     return type(a)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
@@ -143,7 +143,7 @@ def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
     """Return two of the three edges of a closed triangle, in order, leaving out the longest.
 
     Any two give the same cross product. In a needle the two long edges are nearly parallel, and
-    their product is lost to rounding, while the short one meets both at a large angle.
+    their product is lost to rounding, while the short one is at a large angle to both.
     """
     square_a, square_b, square_c = (dr.squared_norm(edge) for edge in (a, b, c))
     omit_a = (square_a > square_b) & (square_a > square_c)
@@ -164,7 +164,7 @@ def _latitude(v):
 
 
 def _scaled(vector):
-    """Return a vector over its largest component, so that its square cannot leave the range."""
+    """Return a vector over its largest component, whose square stays in the range."""
     return _over(vector, _largest(vector))
 
 

@@ -166,7 +166,7 @@ def inverse_length(square: Number) -> Number:
 def at_least(value: Any, low: Number) -> Number:
     """Return the larger of two, and NaN for NaN.
 
-    This form is one instruction; ``dr.maximum`` is four, because it tells -0 from 0.
+    This form is one instruction; ``dr.maximum`` is four, because it distinguishes -0 from 0.
     """
     return dr.select(value < low, low, value)
 

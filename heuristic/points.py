@@ -13,7 +13,7 @@ from heuristic.errors import InputError
 from heuristic.materials import Material
 
 INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "visible")
-"""What a heuristic may need of a point; ``visible`` is a shadow ray to a light."""
+"""The possible needs of a heuristic; ``visible`` is a shadow ray to a light."""
 
 Array = Any
 """A Dr.Jit array of the current variant, one entry per point; a plain number if all are equal."""
@@ -71,7 +71,7 @@ def _input(read: Callable[["Point"], Any]) -> cached_property:
 
 @dataclass(frozen=True)
 class Point:
-    """The points to shade, all at once: what a heuristic reads.
+    """The points to shade, all at once, as read by a heuristic.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class Point:
 
     @_input
     def material(self) -> Material:
-        """What the surface is made of, a :class:`heuristic.materials.PairedMaterial`.
+        """The material of the surface, a :class:`heuristic.materials.PairedMaterial`.
 
         ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
         ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.

@@ -1,6 +1,6 @@
 """The heuristic half of a scene as plain data: camera, triangles, materials, lights.
 
-Everything is in world space and in display-linear units, those of the kernel.
+Everything is in world space and in the kernel's display-linear units.
 """
 
 from dataclasses import dataclass, fields
@@ -77,7 +77,7 @@ def camera(scene: mi.Scene) -> dict:
 
 
 def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Triangles:
-    """Return a shape as triangles, those of :func:`heuristic.meshes.to_mesh`."""
+    """Return a shape as the triangles of :func:`heuristic.meshes.to_mesh`."""
     mesh = meshes.to_mesh(shape, tessellation or meshes.RESOLUTION)
     values = mi.traverse(mesh)
     normals = not mesh.has_face_normals() and mesh.has_vertex_normals()

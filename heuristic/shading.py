@@ -46,7 +46,8 @@ def shade(
         ``I_a``: a number, RGB, one value per wavelength, or a Dr.Jit array.
     visible : callable, optional
         ``visible(toward, distance)`` returns a mask of the points that a light in that direction,
-        at that distance, reaches. The chapters' model has no shadows; without it nothing is hidden.
+        at that distance, reaches. The chapters' model has no shadows; if omitted, nothing is
+        hidden.
 
     Returns
     -------

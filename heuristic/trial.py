@@ -102,7 +102,7 @@ class _Trial(Point):
         return _Watched(found, lambda name: self.prepared.setdefault(name))
 
 
-_Trial.__name__ = "Point"  # for a user's AttributeError
+_Trial.__name__ = "Point"  # for users' AttributeErrors
 
 
 def _points(heuristic: "Heuristic", read: dict[str, None]) -> tuple[Point, Callable[[int], str]]:

@@ -66,7 +66,7 @@ class Shader:
         self._programs: dict[int, tuple[gpu.Device, Any]] = {}
 
     def __call__(self, point: Point) -> Any:
-        """Return the colours (3, points) as a Dr.Jit colour; see the module for what is raised."""
+        """Return the colours (3, points) as a Dr.Jit colour; raise InputError if it cannot run."""
         if dr.flag(dr.JitFlag.SymbolicScope):
             raise InputError(
                 f"{self.file}: Dr.Jit cannot record a shader in GLSL, so it cannot run in a"

@@ -32,7 +32,7 @@ Parameter       Type (default)       Meaning
 ==============  ===================  ===============================================================
 
 Neither term is reflection, so a BSDF cannot hold them. Attached to a shape, this emitter
-shows ``k_i + I_a k_a`` where a camera ray meets the shape, and lights nothing: in the model,
+shows ``k_i + I_a k_a`` where a camera ray hits the shape, and lights nothing: in the model,
 emission and ambient light do not travel.
 """
 
@@ -89,7 +89,7 @@ def define() -> None:
                     self._keep(props, name, mi.Float, default)
 
         def parameters_changed(self, keys=()):
-            """Make edited numbers opaque, so that a new value compiles nothing."""
+            """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(*(getattr(self, name) for name in self.numbers))
             if coefficients.keys() & set(keys):
                 self.unattenuated = False

@@ -1,4 +1,4 @@
-"""The integrator plugin ``heuristic``: shading at the first surface that a camera ray meets.
+"""The integrator plugin ``heuristic``: shading at the first surface that a camera ray hits.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
@@ -12,8 +12,8 @@ Parameter           Type (default)      Meaning
 ``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
                                         chapters' model does not
 ``prune``           boolean (true)      trace only the terms that some material of the scene has
-``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
-                                        nothing
+``hide_emitters``   boolean (false)     show black instead of the environment where a ray
+                                        hits nothing
 ==================  ==================  ===========================================================
 
 The parameters that the heuristic declares are additional floats.
@@ -188,7 +188,7 @@ def define() -> None:
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
-            """Make edited numbers opaque, so that a new value compiles nothing."""
+            """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(self.parameters)
             prepared = [known.name for known in self.model.parameters if known.prepared]
             self._prepared_with = {name: float(self.parameters[name][0]) for name in prepared}

@@ -98,7 +98,7 @@ def openness(image: DepthImage, position: Any, normal: Any, view: Any, reach: An
     found, whole = mi.Float(0), mi.Float(0)
     shift, turn = hashed(position)
     right, up = (dr.gather(mi.Vector3f, image.axes, mi.UInt32(axis)) for axis in (0, 1))
-    reach = mi.Float(reach)  # a loop may widen what it is given
+    reach = mi.Float(reach)  # a loop may widen its argument
     for number in range(SLICES):
         sine, cosine = dr.sincos((number + turn) * (pi / SLICES))
         across = right * cosine + up * sine

@@ -65,7 +65,7 @@ class Gathered:
     normal
         (N, 3).
     arriving
-        (N, K): ``E / pi``, what a white surface would show.
+        (N, K): ``E / pi``, the value of a white surface.
     k_d
         (N, K): the weight of each in the image.
     """

@@ -28,7 +28,7 @@ MANY = 64
 """Rays for the mean openness, which calibrates the ambient light."""
 
 REACH = Parameter("reach", 0.5, 0.01, 100.0, prepared=True)
-"""How far away things hide light, in units of the size of what the camera sees (:func:`reach_of`).
+"""How far away things hide light, in units of the size of the visible scene (:func:`reach_of`).
 Without a bound a closed room would be dark."""
 
 
@@ -59,7 +59,7 @@ def openness(visible: Callable, position: Any, normal: Any, distance: Any, rays:
     """
     frame = mi.Frame3f(normal)
     shift, turn = hashed(position)
-    distance, rays = mi.Float(distance), dr.round(mi.Float(rays))  # loops widen what they are given
+    distance, rays = mi.Float(distance), dr.round(mi.Float(rays))  # loops widen their arguments
     count, number = mi.Float(0), mi.UInt32(0)
     while mi.Float(number) < rays:
         square = (mi.Float(number) + shift) / rays
@@ -72,7 +72,7 @@ def openness(visible: Callable, position: Any, normal: Any, distance: Any, rays:
 
 
 def reach_of(scene: Any, reach: float) -> float:
-    """Return a share of the size of what the camera sees, in units of the scene.
+    """Return a share of the size of the visible scene, in units of the scene.
 
     The size is the median distance of the points seen from their median: a floor or wall much
     larger than the objects in front of it does not change it.

@@ -31,7 +31,7 @@ FAR = 1e3
 
 
 def said(scene: mi.Scene, kind: str) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a scene for :func:`heuristic.three_js.browser.draw`, and a list of what it leaves out.
+    """Return a scene for :func:`heuristic.three_js.browser.draw`, and a list of omissions.
 
     Parameters
     ----------
@@ -130,6 +130,6 @@ def _lost_of(lights: list[dict]) -> Iterator[str]:
         if light.get("exponent"):
             yield f"{light['name']}: a fall-off within its cone, by the power of the cosine"
         if light.get("cutoff", 0) > 90:
-            yield f"{light['name']}: what it sends beyond 90 degrees"
+            yield f"{light['name']}: its light beyond 90 degrees"
         if light.get("clamped"):
-            yield f"{light['name']}: that its attenuation ends at 1"
+            yield f"{light['name']}: the limit of 1 on its attenuation"

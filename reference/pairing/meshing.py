@@ -51,8 +51,8 @@ def replace_shapes(
         given = graph.props(index)
         if given.id() not in shapes or graph.plugin(index) == "instance":
             raise InputError(
-                f"{graph.name}: {graph.label(index)}: instances and their groups cannot be made"
-                " into meshes of their own. Use --interpolation phong."
+                f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
+                " separate meshes. Use --interpolation phong."
             )
         mesh = meshes.to_mesh(shapes[given.id()], resolution or meshes.RESOLUTION)
         if mesh.has_face_normals():

@@ -45,7 +45,7 @@ def _many(facts: Facts) -> str | None:
     count = len(facts.structure.lights)
     if count <= MOST_ASKED:
         return None
-    return f"{count:,} lights: {PICKS} per sample are picked, in proportion to what they give"
+    return f"{count:,} lights: {PICKS} per sample are picked, in proportion to their light"
 
 
 EVERY_LIGHT = Pruning(

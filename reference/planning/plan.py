@@ -1,7 +1,7 @@
 """The cheapest correct reference, chosen by the effects that a scene needs.
 
 ======================================  ===========================================================
-What the scene calls for                What is simulated
+The scene needs                         Simulated
 ======================================  ===========================================================
 neither occlusion nor interreflection   ``direct_all`` without shadow rays; a constant environment
                                         from a table of the BSDF's albedo if there is one BSDF
@@ -12,8 +12,8 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
-thousands of lights, in any case      ``direct_all``, which picks some of them for each sample in
-                                        proportion to what they give; ``path`` picks them evenly
+thousands of lights, in any case        ``direct_all``, which picks some of them for each sample in
+                                        proportion to their light; ``path`` picks them evenly
 a BSDF that may let light through       ``path``, whatever the depth
 participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
                                         or its extinction is coloured

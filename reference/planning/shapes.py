@@ -111,7 +111,7 @@ def _facts(graph: Graph, index: int | None, shape: mi.Shape, found: Geometry) ->
     """Return the facts of a shape, given its node in the graph (None if it has none)."""
     box = shape.bbox()
     nested = graph.children(index, BSDF) if index is not None else []
-    bsdf = nested[0][1] if nested else None  # an instance has those of its group
+    bsdf = nested[0][1] if nested else None  # an instance has its group's
     plugins, front, back = _sides(graph, bsdf)
     return ShapeFacts(
         name=shape.id(),

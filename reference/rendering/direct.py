@@ -15,13 +15,13 @@ Parameter           Type (default)      Meaning
 ``shadows``         boolean (true)      trace shadow rays; off if nothing can be hidden, or
                                         to leave shadows out
 ``bsdf_samples``    integer (1)         samples of the BSDF that look for lights, 0 or 1. Such a
-                                        ray meets what hides a light: without shadows, 0 where
-                                        something does. Mirrors and glass take theirs all the same,
-                                        since nothing else finds a light in them
-``light_samples``   integer (0)         lights that are picked at random for each sample, of points
-                                        and directions and of the others, where there are more, and
+                                        ray hits what hides a light: without shadows, 0 if something
+                                        does. Mirrors and glass still take theirs, since nothing
+                                        else finds a light in them
+``light_samples``   integer (0)         lights picked at random for each sample, of points
+                                        and directions and of the others, if there are more, and
                                         more than 16 (:mod:`reference.rendering.light_choice`); 0
-                                        asks each
+                                        evaluates each
 ``max_depth``       integer (2)         as in Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================

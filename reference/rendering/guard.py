@@ -129,7 +129,7 @@ def examine_plan(
     Parameters
     ----------
     plan
-        What is simulated.
+        The plan.
     scene
         The physical half, instantiated.
     hide_emitters

@@ -1,6 +1,6 @@
 """Which of thousands of lights to evaluate: picked in proportion to their contribution.
 
-``N`` lights are picked for a sample, light ``i`` with the chance ::
+``N`` lights are picked per sample, light ``i`` with the chance ::
 
     p_i = (1 - u) g_i / sum_k g_k + u / n,    g_i = mean over points x of |cos theta| E_i(x)
 
@@ -24,7 +24,7 @@ MOST_ASKED = 4096
 """Up to this many lights each is evaluated at every sample."""
 
 PICKS = 16
-"""Lights picked for a sample if there are more."""
+"""Lights picked per sample if there are more."""
 
 PROBES = 1024
 UNIFORM_SHARE = 0.1
@@ -40,7 +40,7 @@ class LightChoice:
     lights
         Emitters to choose from.
     picks
-        How many are picked for a sample, ``N``.
+        How many are picked per sample, ``N``.
 
     Attributes
     ----------

@@ -146,7 +146,7 @@ class Renderer:
         """See the class."""
         return self._replayed is not None
 
-    def sampled(self, spp):
+    def sampled(self, spp: int) -> "Renderer":
         """Return the same renderer with another number of samples."""
         other = copy(self)
         other.spp, other.times, other.compilation = spp, [], 0.0

@@ -175,7 +175,7 @@ def _table(text: str) -> np.ndarray | None:
 
 
 def _transform(matrix: np.ndarray, of_texture: bool) -> Iterator[str]:
-    """Yield what is wrong with a transform.
+    """Yield the faults of a transform.
 
     A texture may be stretched without end, which makes stripes. Everything else uses the inverse,
     which must exist in single precision.

@@ -75,7 +75,7 @@ class Graph:
         part.folders, part.kinds, part.resolver = list(self.folders), self.kinds, self.resolver
         given = [index, *(one for one in self.nodes_in_use(index) if one != index)]
         places = {one: place for place, one in enumerate(given)}
-        paths = list(self.state.node_paths)  # not those of files or added nodes
+        paths = list(self.state.node_paths)  # without files and added nodes
         if paths:
             part.state.node_paths = [paths[one] if one < len(paths) else "" for one in given]
         for one in given:
@@ -166,7 +166,7 @@ class Graph:
         return self.kinds[plugin]
 
     def _kind_of_object(self, index):
-        """Return the kind of a user's own plugin: the kind of the object that it makes."""
+        """Return the kind of a user's plugin: the kind of the object that it makes."""
         made = self.instantiate(index)
         for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
             if isinstance(made, getattr(mi, kind)):

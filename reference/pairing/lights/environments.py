@@ -1,8 +1,8 @@
 """Light from all around: ``constant``, ``envmap``, daylight, and the model's ambient light ``I_a``.
 
 Any other plugin whose light surrounds the scene counts as an ``envmap``. A light that is neither an
-environment nor of another kind is left out: it has no nearest form. Of ``sunsky`` and
-``timed_sunsky`` the sky is ``I_a``, and the sun a directional light.
+environment nor of another kind is left out: it has no nearest form. The sky of ``sunsky`` and
+``timed_sunsky`` is ``I_a``, and the sun a directional light.
 """
 
 from typing import Any

@@ -52,7 +52,7 @@ def mask(context: Context, index: int) -> Nearest:
 def blend(context: Context, index: int) -> Nearest:
     """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
 
-    Exact where only one of the two has a lobe, or where the weight is 0 or 1.
+    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
     """
     graph = context.graph
     inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
