@@ -389,7 +389,7 @@ def test_an_unknown_name_lists_what_there_is(name):
         (lambda: Parameter("ambient", 0, 0, 1), "'ambient' is not allowed"),
         (lambda: Parameter("two words", 0, 0, 1), "'two words' is not allowed"),
         (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give a value from 0 to 1"),
-        (lambda: declare(Heuristic("phong", toon)), "'phong' is declared already"),
+        (lambda: declare(Heuristic("phong", toon)), "'phong' is already declared"),
     ],
 )
 def test_a_wrong_declaration_is_refused(make, message):

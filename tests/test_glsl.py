@@ -118,7 +118,7 @@ def test_any_number_of_lights(rgb, lights):
 
 @opengl
 def test_more_lights_than_the_record_holds_are_refused(rgb):
-    with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights, .* 64 at most"):
+    with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights; .* at most 64"):
         image(room(shader_files.LIGHTS + 1), PHONG)
 
 
@@ -254,7 +254,7 @@ MISTAKES = {
     ),
     "include": ('\n#include "x"\n' + returning("1"), r"mine\.glsl, line 2: .* one file"),
     "main": (returning("1") + "\nvoid main() {}", r"mine\.glsl, line 2: leave out `main`"),
-    "our names": (returning("fotismos_count"), r"mine\.glsl, line 1: .*are taken"),
+    "our names": (returning("fotismos_count"), r"mine\.glsl, line 1: .*are reserved"),
     "not a number": (returning("sqrt(-1.0 - point.uv.x)"), r"line 1: .* finite.* max\(x, 1e-6\)"),
     "infinite": (returning("1.0 / (point.uv.x * 0.0)"), "line 1: .* finite"),
     "negative": ("\n" + returning("point.normal"), r"line 2: .* 0 or more.* max\(cosine, 0\)"),

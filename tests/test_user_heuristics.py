@@ -273,7 +273,7 @@ MISTAKES = {
     ),
     "not finite": (
         "def shade(point): return point.ambient / 0\n",
-        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*components must be .* finite",
+        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*components must be finite",
     ),
     "root of what is negative": (
         "import drjit as dr\n\n"
@@ -291,7 +291,7 @@ MISTAKES = {
     ),
     "two components": (
         "import mitsuba as mi\ndef shade(point): return mi.Point2f(point.uv)\n",
-        r"^mine.py, line 2: .*Point2f; expected is .* of 3 components",
+        r"^mine.py, line 2: .*Point2f; return .* of 3 components",
     ),
     "a mask": ("def shade(point): return point.ambient > 0\n", r"line 1: .* returned a .*Array3b"),
     "NumPy": (

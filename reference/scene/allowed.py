@@ -209,7 +209,7 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
         kind, count = CHILDREN[plugin]
         found = len(graph.children(index, kind))
         if found != count:
-            yield f"it has {found} {kind.name} elements: give {count}."
+            yield f"it needs {count} {kind.name} elements, and has {found}."
 
 
 def _between(plugin: str, props: mi.Properties) -> Iterator[str]:
