@@ -116,7 +116,7 @@ NO_SHADOWS = Pruning(
     name="no shadow rays",
     absent="no shape can stand between a light and a reflecting surface",
     proof="Light from a point y reaches a surface point x along a segment, which lies in the box"
-    " around y and the shape of x. A shape whose box does not meet that one does not meet the"
+    " around y and the shape of x. A shape whose box does not touch that one does not touch the"
     " segment. The shape of x itself is not an obstacle: x lies on its outer side and is seen from"
     " outside, and a segment that passes through the shape arrives from behind, where an opaque"
     " BSDF returns nothing. A light that is flat, or convex and shines outwards, does not hide the"
@@ -124,7 +124,8 @@ NO_SHADOWS = Pruning(
     premises=(
         *KNOWN_SURFACES,
         Premise(
-            "No shape's box meets the box around a light and a shape that reflects, unless it lies"
+            "No shape's box touches the box around a light and a shape that reflects, unless it"
+            " lies"
             " behind that one's only reflecting side; no light hides itself.",
             _between,
         ),
@@ -162,7 +163,7 @@ NO_SECOND_REFLECTION = Pruning(
     absent="no point of a reflecting surface sees another one",
     proof="A second reflection needs two surface points that see each other, both on sides that"
     " reflect. Two points on the outer side of one convex shape never do, nor do two of a flat one."
-    " The inside of a closed shape is reached by no path that begins outside. Two points of"
+    " No path that begins outside reaches the inside of a closed shape. Two points of"
     " different shapes do not where one of the shapes is flat, reflects on one side, and the other"
     " lies behind it. A shape that reflects nothing takes no part.",
     premises=(

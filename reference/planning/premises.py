@@ -103,7 +103,7 @@ def _moving(facts: Facts) -> str | None:
     return None if facts.structure.camera.is_still else "the camera's shutter stays open"
 
 
-STILL = Premise("The shutter opens for an instant, so that nothing moves.", _moving)
+STILL = Premise("The shutter opens for an instant, so nothing moves.", _moving)
 
 
 def _seen_from_inside(facts: Facts) -> str | None:
@@ -117,8 +117,8 @@ def _seen_from_inside(facts: Facts) -> str | None:
 
 
 SEEN_FROM_OUTSIDE = Premise(
-    "No camera ray begins inside a closed shape that reflects there: near clip plane, lens and the"
-    " width of an orthographic camera included.",
+    "No camera ray begins inside a closed shape that reflects there, including near clip plane,"
+    " lens and the width of an orthographic camera.",
     _seen_from_inside,
 )
 
@@ -132,6 +132,6 @@ def _concave(facts: Facts) -> str | None:
 
 CONVEX = Premise(
     "Every side that reflects is flat, the outer side of a convex shape, or inside a closed one;"
-    " normals are those that Mitsuba renders with, flips included, and shading normals equal them.",
+    " normals are those of Mitsuba's renderings, including flips, and shading normals equal them.",
     _concave,
 )

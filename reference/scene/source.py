@@ -116,7 +116,7 @@ class Source:
         except (RuntimeError, ValueError) as error:  # the latter for bytes that are not UTF-8
             raise InputError(f"{self.name}: {error}") from error
         if state.root.type != mi.ObjectType.Scene:
-            raise InputError(f"{self.name} is not a scene. Its outermost element must be <scene>.")
+            raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
