@@ -46,7 +46,7 @@ from reference.scene.graph import Graph
 BSDF = mi.ObjectType.BSDF
 
 LARGEST_IOR = 4.0
-"""Largest measured index: germanium has 4."""
+"""Limit of measured indices: germanium has 4."""
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,13 @@ from heuristic.errors import InputError
 from reference.scene.graph import Graph
 
 LARGEST_ALPHA = 1000.0
-"""Largest roughness: far above it the plugins' arithmetic overflows, after all light is lost."""
+"""Largest roughness: arithmetic overflows far above it, and all light is lost far below it."""
 
 FILM = (768, 576)
 """Mitsuba's width and height for a film without its own."""
 
 SMALLEST_RATIO = 1e-14
-"""Least singular value of a matrix with rows and columns of length 1; less is rounding."""
+"""Ratio of singular values of a matrix with rows and columns of length 1; less is rounding."""
 
 LARGEST = float(np.finfo(np.float32).max)
 

@@ -93,7 +93,7 @@ class Context:
 class Rule:
     """How to find the nearest material of a BSDF, and what planning knows about the BSDF.
 
-    ``reflectances`` are the parameters, with defaults, that are all 0 if it reflects nothing; None
+    ``reflectances`` are parameters with defaults; it reflects nothing if all are 0. They are None
     unless it only reflects, on the side of the normal. ``wraps`` is whether it is made of other
     BSDFs.
     """
