@@ -47,7 +47,7 @@ def __getattr__(name: str) -> object:
 
 
 def register() -> None:
-    """Make the Mitsuba plugins known for the current variant (:mod:`heuristic.plugins`)."""
-    from heuristic import plugins  # the kernel alone needs no Mitsuba
+    """Register the Mitsuba plugins for the current variant (:mod:`heuristic.plugins`)."""
+    from heuristic import plugins  # the kernel alone does not need Mitsuba
 
     plugins.register()

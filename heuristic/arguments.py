@@ -1,4 +1,4 @@
-"""What :func:`heuristic.shade` is given, brought to what the kernel takes, or refused in words."""
+"""Arguments of :func:`heuristic.shade`, converted to what the kernel takes, or rejected."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
@@ -18,7 +18,7 @@ def vectors(position: Any, normal: Any, view: Any) -> tuple[Any, Any, Any]:
     """Return the three vectors as Dr.Jit arrays of floats of at least single precision.
 
     Three plain numbers, in a list, tuple or NumPy array, are one vector for all points; at least
-    one of the arguments has to be a Dr.Jit array. Half precision and integers become single.
+    one argument must be a Dr.Jit array. Half precision and integers become single.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def lights(given: Any) -> Sequence[Light]:
     Raises
     ------
     InputError
-        For one that is none, or something that is not an iterable of lights.
+        If it is not an iterable of lights.
     """
     if isinstance(given, (str, bytes, Mapping)) or not isinstance(given, Iterable):
         raise InputError(
@@ -66,12 +66,12 @@ def material(given: Any) -> Material:
 
 
 def visibility(given: Any) -> Callable[[Any, Any], Any] | None:
-    """Return a function that answers with masks, None for none.
+    """Return a function that returns masks, or None.
 
     Raises
     ------
     InputError
-        For what cannot be called, or, when it is called, an answer that is not a mask.
+        If it cannot be called, or, when called, does not return a mask.
     """
     if given is None:
         return None
@@ -84,19 +84,19 @@ def visibility(given: Any) -> Callable[[Any, Any], Any] | None:
     def visible(toward: Any, distance: Any) -> Any:
         seen = given(toward, distance)
         if not (isinstance(seen, bool) or (dr.is_array_v(seen) and dr.is_mask_v(seen))):
-            raise InputError(f"visible returned {_kind(seen)}: it has to return a mask.")
+            raise InputError(f"visible returned {_kind(seen)}: it must return a mask.")
         return seen
 
     return visible
 
 
 def require_one_size(values: Mapping[str, Any]) -> None:
-    """Reject named Dr.Jit arrays of different numbers of points; one point fits any number.
+    """Reject Dr.Jit arrays of different numbers of points; one point fits any number.
 
     Raises
     ------
     InputError
-        With the number of points of each that has more than one.
+        With the number of points of each array that has more than one.
     """
     if dr.flag(dr.JitFlag.SymbolicScope):
         return
@@ -105,8 +105,7 @@ def require_one_size(values: Mapping[str, Any]) -> None:
     if len(set(several.values())) > 1 or 0 in several.values():
         listing = ", ".join(f"{name} has {width}" for name, width in several.items())
         raise InputError(
-            f"Mixed numbers of points: {listing}. Give each array one entry, or all the same number"
-            " of entries."
+            f"Mixed numbers of points: {listing}. Give each array one entry, or the same number."
         )
 
 

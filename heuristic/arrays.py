@@ -1,16 +1,16 @@
-"""What arrays in signatures hold: one name per shape and unit.
+"""Types of arrays in signatures: one name per shape and unit.
 
-An array is Dr.Jit's of the variant in use, or NumPy's: its type is known only when it is made.
-So a checker sees ``Any``, and these names are for readers.
+An array belongs to Dr.Jit's current variant or to NumPy, so its type is known only at run time. A
+checker sees ``Any``; these names are for readers.
 """
 
 from typing import Any, TypeAlias
 
 Array: TypeAlias = Any
-"""Numbers of any shape, which the docstring gives."""
+"""Numbers of any shape; the docstring gives it."""
 
 Number: TypeAlias = Any
-"""One number per point, or one for all, a plain number too."""
+"""One number per point, or one for all, which may be a plain number."""
 
 Cosines: TypeAlias = Any
 """A :class:`heuristic.numerics.Cosine`, or the cosine alone, -1..1."""
@@ -31,7 +31,7 @@ Colour: TypeAlias = Any
 """A number, RGB, or one value per wavelength; coefficients 0..1, intensities display-linear."""
 
 Scene: TypeAlias = Any
-"""A ``mitsuba.Scene``; Mitsuba's classes are those of the variant in use."""
+"""A ``mitsuba.Scene``; Mitsuba's classes depend on the current variant."""
 
 Mesh: TypeAlias = Any
 """A ``mitsuba.Mesh``."""

@@ -1,9 +1,9 @@
-"""Finding LLVM, which Dr.Jit compiles every kernel with, and checking it before it is used.
+"""Find LLVM, with which Dr.Jit compiles every kernel, and check it before use.
 
-Dr.Jit reads ``DRJIT_LIBLLVM_PATH`` once, when it is first imported, and searches the system where
-the variable is not set. So `configure` runs before that import and points the variable at the
-LLVM that comes with the Python install, and `check` looks at what was found before anything is
-compiled: with LLVM 15 and 16 the first kernel aborts the whole process.
+Dr.Jit reads ``DRJIT_LIBLLVM_PATH`` once, when first imported, and searches the system if the
+variable is not set. So `configure` runs before that import and points the variable at the installed
+LLVM wheel. `check` examines the library found before anything is compiled: with LLVM 15 and 16 the
+first kernel aborts the whole process.
 """
 
 import glob
@@ -20,15 +20,15 @@ from typing import Literal
 from heuristic.errors import InstallationError
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
-"""Mitsuba's variants that are supported."""
+"""The supported variants of Mitsuba."""
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 WHEEL = "karellen-llvm-core"
 OLDEST_USABLE = 17
 
 FEWEST_THREADS = 2
-"""Of Dr.Jit in a process: with a single one Mitsuba waits for ever when it reads or writes images,
-for its own task to be done by another thread."""
+"""Threads of Dr.Jit in a process: with only one, Mitsuba waits forever when it reads or writes
+images, for another thread to do its task."""
 
 _HOW_TO_GET_IT = f"""\
   On Linux x86-64:  pip install {WHEEL}
@@ -37,7 +37,7 @@ _HOW_TO_GET_IT = f"""\
   Any other:  {VARIABLE}=/path/to/libLLVM.so (.dylib on macOS, .dll on Windows)
   ./run installs the first of these by itself."""
 
-# What the messages name as found where Dr.Jit says nothing; Dr.Jit does its own search.
+# Named in messages as found if Dr.Jit reports nothing; Dr.Jit does its own search.
 _USUAL_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
@@ -62,13 +62,13 @@ class LLVMInfo:
     Attributes
     ----------
     version
-        Such as ``(22, 1, 8)``; None where Dr.Jit found none.
+        Such as ``(22, 1, 8)``; None if Dr.Jit found none.
     path
-        The library, where it can be told.
+        The library; None if unknown.
     source
-        Where it came from: the user's variable, the wheel, or Dr.Jit's search of the system.
+        Its origin: the user's variable, the wheel, or Dr.Jit's search of the system.
     note
-        What a person should know about it; empty when there is nothing to say.
+        What a person should know about it; may be empty.
     """
 
     version: tuple[int, int, int] | None
@@ -78,10 +78,10 @@ class LLVMInfo:
 
 
 def configure() -> None:
-    """Point Dr.Jit at the LLVM wheel, unless the user chose another or there is no wheel.
+    """Point Dr.Jit at the LLVM wheel, unless the user chose another or none is installed.
 
-    Call it before anything imports Dr.Jit or Mitsuba. It starts no process and imports neither.
-    Where Dr.Jit was imported already it is too late; it warns if that leaves no usable LLVM.
+    Call it before anything imports Dr.Jit or Mitsuba. It starts no process and imports neither. If
+    Dr.Jit is already imported it is too late; it warns if that leaves no usable LLVM.
     """
     global _imported_too_early
     if os.environ.get(VARIABLE):
@@ -90,7 +90,7 @@ def configure() -> None:
     if library is None:
         return
     if "drjit" in sys.modules:
-        # Setting the variable now would change nothing, and make the report of it untrue.
+        # Setting the variable now would change nothing, and the report would be wrong.
         _imported_too_early = True
         if not _is_usable(_version()):
             warnings.warn(f"The first kernel will fail. {_TOO_EARLY}", RuntimeWarning, stacklevel=2)
@@ -99,7 +99,7 @@ def configure() -> None:
 
 
 def check() -> LLVMInfo:
-    """Say which LLVM Dr.Jit uses; raise `InstallationError` where it is none that works.
+    """Return the LLVM that Dr.Jit uses; raise `InstallationError` unless it works.
 
     Call it before the first kernel. It compiles nothing itself.
     """
@@ -110,9 +110,9 @@ def check() -> LLVMInfo:
 
 
 def use_threads(count: int | None = None) -> None:
-    """Let Dr.Jit compute with so many threads, at least :data:`FEWEST_THREADS`.
+    """Set the number of Dr.Jit's threads, at least :data:`FEWEST_THREADS`.
 
-    If omitted, with as many as it has, which on a machine of one core are too few.
+    If omitted, Dr.Jit keeps its own number, which is too few on a machine with one core.
     """
     import drjit as dr
 
@@ -122,7 +122,7 @@ def use_threads(count: int | None = None) -> None:
 
 
 def inspect() -> LLVMInfo:
-    """Say which LLVM Dr.Jit uses, usable or not."""
+    """Return the LLVM that Dr.Jit uses, usable or not."""
     source, path = _chosen()
     note = _TOO_EARLY if _imported_too_early else ""
     # Dr.Jit would print its own lines about a path that does not exist.
@@ -133,7 +133,7 @@ def inspect() -> LLVMInfo:
 
 
 def find_wheel() -> Path | None:
-    """Find the libLLVM of the installed LLVM wheel; None where there is none."""
+    """Find the libLLVM of the installed LLVM wheel; None if there is none."""
     try:
         files = importlib.metadata.files(WHEEL)
     except importlib.metadata.PackageNotFoundError:
@@ -158,7 +158,7 @@ def _best(libraries: Iterable[Path]) -> Path | None:
 
 
 def _chosen() -> tuple[Literal["DRJIT_LIBLLVM_PATH", "wheel", "system"], Path | None]:
-    """Say where Dr.Jit was told to look; a child process inherits what `configure` set."""
+    """Return who told Dr.Jit where to look; a child process inherits what `configure` set."""
     value = os.environ.get(VARIABLE)
     if not value:
         return "system", None
@@ -180,7 +180,7 @@ def _version() -> tuple[int, int, int] | None:
             "apt-get install libatomic1 (Debian, Ubuntu) or dnf install libatomic (Fedora)."
         ) from error
     major, minor, patch = drjit.detail.llvm_version()
-    # Dr.Jit answers -1 for no library, one that it cannot load, and one older than 15.
+    # Dr.Jit returns -1 for no library, one that it cannot load, and one older than 15.
     return None if major < 0 else (major, minor, patch)
 
 
@@ -196,10 +196,10 @@ def _loaded_library() -> Path | None:
 
 def _message(found: LLVMInfo) -> str:
     lines = [
-        "There is no LLVM that Dr.Jit can compile kernels with.",
+        "Dr.Jit cannot find an LLVM to compile kernels with.",
         f"Found: {_what_was_found(found)}.",
         f"Needed: LLVM {OLDEST_USABLE} or newer (15 and 16 abort at the first kernel; "
-        "Dr.Jit refuses older ones).",
+        "Dr.Jit rejects older ones).",
         "How to get it:",
         _HOW_TO_GET_IT,
     ]

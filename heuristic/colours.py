@@ -1,4 +1,4 @@
-"""Coefficients and intensities as numbers, RGB, or one value for each wavelength (8.11, 8.12)."""
+"""Coefficients and intensities as numbers, RGB, or one value per wavelength (8.11, 8.12)."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
@@ -12,10 +12,10 @@ from heuristic.errors import InputError
 
 
 def checked(name: str, value: Any) -> Any:
-    """Return ``value`` as a float, a tuple of floats, or the Dr.Jit array that it is.
+    """Return ``value`` as a float, a tuple of floats, or an unchanged Dr.Jit array.
 
-    Numbers and sequences must be finite and not negative. Dr.Jit arrays pass unread, because
-    looking at them would evaluate them.
+    Numbers and sequences must be finite and not negative. Dr.Jit arrays are not checked, because
+    that would evaluate them.
 
     Raises
     ------
@@ -27,8 +27,7 @@ def checked(name: str, value: Any) -> Any:
     components = _components(value)
     if components is None:
         raise InputError(
-            f"{name} = {value!r} is not a colour: give a number, RGB, or one value for each"
-            " wavelength."
+            f"{name} = {value!r} is not a colour: give a number, RGB, or one value per wavelength."
         )
     if not components:
         raise InputError(f"{name} = {value!r} is not allowed: give one value or more.")
@@ -39,7 +38,7 @@ def checked(name: str, value: Any) -> Any:
 
 
 def _components(value):
-    """Return the numbers of a value, None for what is not made of numbers."""
+    """Return the numbers of a value, or None if it is not made of numbers."""
     is_several = isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value)
     if isinstance(value, str) or not (is_several or isinstance(value, Real)):
         return None
@@ -50,7 +49,7 @@ def _components(value):
 
 
 def is_zero(value: Any) -> bool:
-    """Tell whether a checked value is zero by construction, so that its term need not be traced."""
+    """Return whether a checked value is zero by construction; its term is then not traced."""
     if isinstance(value, tuple):
         return not any(value)
     return isinstance(value, float) and value == 0
@@ -66,30 +65,30 @@ def wavelength_count(value: Any) -> int:
 
 
 def common_wavelength_count(values: Mapping[str, Any]) -> int:
-    """Return the number of components that all of ``values`` share; single ones fit any.
+    """Return the number of components that all ``values`` share; single ones fit any.
 
     ``values`` maps names to checked values.
 
     Raises
     ------
     InputError
-        When two values have different numbers of components, neither being 1.
+        If two values have different numbers of components, neither of them 1.
     """
     counts = {name: wavelength_count(value) for name, value in values.items()}
     several = {name: count for name, count in counts.items() if count > 1}
     if len(set(several.values())) > 1:
         listing = ", ".join(f"{name} has {count}" for name, count in several.items())
         raise InputError(
-            f"Mixed numbers of wavelengths: {listing}. Give each colour one value, or all the same"
-            " number of values."
+            f"Mixed numbers of wavelengths: {listing}. Give each colour one value, or the same"
+            " number."
         )
     return max(counts.values(), default=1)
 
 
 def as_array(value: Any, vector_type: type) -> Colour:
-    """Turn a checked value into what the kernel multiplies with.
+    """Convert a checked value into a factor for the kernel.
 
-    Numbers and Dr.Jit arrays stay as they are; a tuple of three or fewer becomes a fixed array of
+    Numbers and Dr.Jit arrays stay unchanged; a tuple of three or fewer becomes a fixed array of
     the backend and precision of ``vector_type``, a longer one a dynamic array.
     """
     if not isinstance(value, tuple):

@@ -9,15 +9,14 @@ faces a light of intensity ``I_p = 1`` has the value 1. A physical surface of re
 irradiance ``E`` has the radiance ``E / pi``. The two agree when ``E = pi * I_p``, and this factor
 is the only bridge between the two sets of units.
 
-*Facing.* A surface is shaded on the side that its normal points to; a material that is marked
-``twosided`` turns the normal towards the viewer. Mitsuba's ``diffuse`` and ``twosided`` do the
-same.
+*Facing.* A surface is shaded on the side that its normal points to; a material marked ``twosided``
+turns the normal towards the viewer. Mitsuba's ``diffuse`` and ``twosided`` do the same.
 """
 
 from math import pi
 
 IRRADIANCE_PER_INTENSITY = pi
-"""Irradiance at normal incidence that a heuristic intensity of 1 stands for."""
+"""Irradiance at normal incidence that a heuristic intensity of 1 represents."""
 
 RADIANCE_PER_IRRADIANCE = 1.0 / pi
 """Radiance of a white diffuse surface under unit irradiance; the inverse of the factor above."""

@@ -1,4 +1,4 @@
-"""Named declarations: the package's own, a program's, and those of installed packages."""
+"""Named declarations by the package itself, by programs, and by installed packages."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -13,7 +13,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """The word by which it is found."""
+        """The word that identifies it."""
         ...
 
 
@@ -26,12 +26,12 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     Parameters
     ----------
     kind
-        The word for one, in messages.
+        What messages call it.
     group
-        Of the entry points by which installed packages declare theirs. They are loaded once, when
-        the declarations are listed or a name is not known.
+        Group of the entry points by which installed packages declare theirs. They are loaded once,
+        when the declarations are listed or a name is not known.
     home
-        A package of our own whose import declares more; it is imported as late as those.
+        A package of fotismos whose import declares more; it is imported as late as those.
     """
 
     def __init__(self, kind: str, group: str, home: str = "") -> None:
@@ -46,46 +46,46 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         return declaration
 
     def declare(self, declaration: Declaration) -> Declaration:
-        """Declare something from outside, in place of what was so declared by its name; return it.
+        """Declare something from outside, replacing an earlier one of its name; return it.
 
         Raises
         ------
         InputError
-            When the name is one of the package's own.
+            If the package itself uses the name.
         """
         if declaration.name in self._all_own():
             raise InputError(
-                f"{self.kind} {declaration.name!r} is declared already, by fotismos itself: give"
-                " another name."
+                f"{self.kind} {declaration.name!r} is already declared by fotismos: give another"
+                " name."
             )
         self._others[declaration.name] = declaration
         return declaration
 
     def is_own(self, declaration: Declaration) -> bool:
-        """Tell whether a declaration is the package's own, as far as those were loaded."""
+        """Return whether a declaration is the package's own and loaded."""
         return self._own.get(declaration.name) is declaration
 
     @property
     def built_in(self) -> tuple[str, ...]:
-        """The names of the package's own."""
+        """The names of the package's own declarations."""
         return tuple(self._all_own())
 
     def others(self) -> tuple[Declaration, ...]:
-        """Return what was declared from outside.
+        """Return the declarations from outside.
 
         Raises
         ------
         InputError
-            When an entry point cannot be loaded, or its object not declared.
+            If an entry point cannot be loaded, or its object not declared.
         """
         if not self._loaded:
             for entry in entry_points(group=self.group):
                 try:
                     self.declare(entry.load())
-                except Exception as error:  # whatever the code of another package raises
+                except Exception as error:  # another package's code may raise anything
                     raise InputError(
                         f"{self.kind} {entry.name}: the entry point {entry.value} of {self.group}"
-                        f" cannot be loaded: {error}. Mend or uninstall the package that names it."
+                        f" cannot be loaded: {error}. Repair or uninstall its package."
                     ) from error
             self._loaded = True
         return tuple(self._others.values())
@@ -103,7 +103,7 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         return sum(1 for _ in self)
 
     def _all_own(self) -> dict[str, Declaration]:
-        """Return the package's own, those of its :attr:`home` among them."""
+        """Return the package's own declarations, including those of its :attr:`home`."""
         if self.home:
             import_module(self.home)
         return self._own

@@ -1,8 +1,7 @@
 """The index of the chapters' equations: each has one home function, or a written reason.
 
 A function is the home of an equation when its docstring begins with the number, as in ``Equations
-8.5, 8.6, 6.6, 6.7: ...``. The index is read from the docstrings, so that it cannot disagree with
-them.
+8.5, 8.6, 6.6, 6.7: ...``. The index is read from the docstrings, so it cannot disagree with them.
 """
 
 import importlib
@@ -26,7 +25,7 @@ WITHOUT_HOME = {
     "8.7": "the perfect mirror is the limit of 8.8 for large n; a test shows that off the mirror"
     " direction the lobe goes to 0",
 }
-"""Equations that no function computes, and why."""
+"""Equations that no function computes, with the reason."""
 
 _CLAIM = re.compile(r"Equations? ((?:\d+\.\d+(?:-\d+\.\d+)?(?:, )?)+):")
 _RANGE = re.compile(r"(\d+)\.(\d+)(?:-\d+\.(\d+))?")
@@ -53,9 +52,9 @@ def claims(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def homes() -> dict[str, list[tuple[str, Callable[..., Any]]]]:
-    """Return, for each equation number, the list of functions that claim it.
+    """Return the functions that claim each equation number.
 
-    Members of classes count by their qualified name. A test demands one each.
+    Members of classes have their qualified names. A test requires one function per equation.
     """
     found: dict[str, list[tuple[str, Callable[..., Any]]]] = {}
     for name, function in _functions():
@@ -78,7 +77,7 @@ def index() -> list[Entry]:
 
 
 def _functions() -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the qualified names and the functions of all modules of this room."""
+    """Yield the qualified names and the functions of all modules of this package."""
     for module_info in pkgutil.iter_modules(heuristic.__path__, "heuristic."):
         module = importlib.import_module(module_info.name)
         for name, member in vars(module).items():

@@ -5,12 +5,12 @@
     FotismosError
     ├── InputError         a scene, value or option that cannot be used     exit code 2
     ├── OutputError        a place that cannot be written to                exit code 2
-    ├── InstallationError  something that must be on the machine is not     exit code 2
+    ├── InstallationError  something required is not on the machine         exit code 2
     ├── NonFiniteError     a NaN or an infinity in an image                 exit code 1
-    └── LostProcessError   a process that work was given to is gone         exit code 1
+    └── LostProcessError   a process that had work to do is gone            exit code 1
 
-A message names the value, what is allowed and what to do next. The command line prints it without
-a traceback and leaves with the class's `exit_code`.
+A message names the value, what is allowed and what to do next. The command line prints it without a
+traceback and exits with the class's `exit_code`.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ class FotismosError(Exception):
 
 
 class InputError(FotismosError):
-    """A scene, a value or an option that cannot be used as it was given."""
+    """A scene, a value or an option that cannot be used as given."""
 
     exit_code = 2
 
@@ -36,25 +36,25 @@ class OutputError(FotismosError):
 
 
 class InstallationError(FotismosError):
-    """Something that must be on the machine is missing, or is there in an unusable version."""
+    """Something required on the machine is missing, or its version is unusable."""
 
     exit_code = 2
 
 
 class NonFiniteError(FotismosError):
-    """A NaN or an infinity in an image; the message says in which, and where."""
+    """A NaN or an infinity in an image; the message names the image and the place."""
 
     exit_code = 1
 
 
 class LostProcessError(FotismosError):
-    """A process, or a scheduler, that work was given to is gone; what it finished is kept."""
+    """A process or scheduler that had work to do is gone; the finished work is kept."""
 
     exit_code = 1
 
 
 def unknown(what: str, given: object, allowed: Iterable[str]) -> InputError:
-    """Return the error for a word that is not among those allowed.
+    """Return the error for a word that is not allowed.
 
     ``what`` stands before the word, such as ``loss`` or ``form =``.
     """
@@ -66,6 +66,6 @@ def unknown(what: str, given: object, allowed: Iterable[str]) -> InputError:
 
 
 def suggestion(given: object, allowed: Iterable[str]) -> str:
-    """Return the question whether the nearest of the words allowed is meant; empty if none is."""
+    """Return a question that suggests the nearest allowed word; empty if none is near."""
     near = get_close_matches(str(given), list(allowed), n=1)
     return f" (did you mean {near[0]}?)" if near else ""

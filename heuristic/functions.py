@@ -31,20 +31,20 @@ UNBOUNDED = Range(-inf, inf)
 
 
 def heuristic_of(given: Any, name: str, label: str = "") -> Heuristic:
-    """Return the heuristic that a function of a user's is, or that an object is, after a trial.
+    """Return a user's function or object as a heuristic, after a trial.
 
     Parameters
     ----------
     given
-        A function of a :class:`heuristic.points.Point`, and of numbers that have a default: the
-        parameters, with bounds where the annotation is a :class:`Range`. Or a :class:`Heuristic`.
+        A function of a :class:`heuristic.points.Point` and of numbers with a default. These are the
+        parameters; a :class:`Range` as annotation gives their bounds. Or a :class:`Heuristic`.
     name, label
-        Of the heuristic; an object keeps its own label.
+        Name and label of the heuristic; an object keeps its own label.
 
     Raises
     ------
     InputError
-        When it is neither, has another signature, or fails on trial.
+        If it is neither, has another signature, or fails the trial.
     """
     if isinstance(given, Heuristic):
         found = replace(given, name=name)
@@ -68,7 +68,7 @@ def heuristic_of(given: Any, name: str, label: str = "") -> Heuristic:
 
 
 def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
-    """Return the parameters of a function: what it takes beside the point."""
+    """Return the parameters of a function: its arguments besides the point."""
     try:
         signature = inspect.signature(function, eval_str=True)
     except (TypeError, ValueError, NameError) as error:
@@ -97,7 +97,6 @@ def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Paramete
 
 def _refused(function: Callable[..., Any], reason: str) -> InputError:
     return InputError(
-        f"{defined(function)}: {reason}. A heuristic is a function such as"
-        f" `{function.__name__}(point, gloss: Range(0, 1) = 0.5)`: it takes the points, and numbers"
-        " with a default."
+        f"{defined(function)}: {reason}. Write a function such as `{function.__name__}(point,"
+        " gloss: Range(0, 1) = 0.5)`: it takes the points, and numbers with a default."
     )

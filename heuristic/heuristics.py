@@ -1,11 +1,10 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. A user's own is a function in a
-file (:mod:`heuristic.shading_files`, :mod:`heuristic.glsl`); a program declares its own with
-:func:`declare`, a package by an entry point of the group :data:`GROUP` whose object is a
-:class:`Heuristic`. Flat and Gouraud shading are not heuristics: they interpolate whatever heuristic
-there is (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. Users write a function in a file
+(:mod:`heuristic.shading_files`, :mod:`heuristic.glsl`); a program calls :func:`declare`; a package
+has an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud
+shading are not heuristics: they interpolate any heuristic (:mod:`heuristic.interpolation`).
 """
 
 import re
@@ -26,11 +25,11 @@ from heuristic.points import INPUTS, Array, Given, Point
 GROUP = "fotismos.heuristics"
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
-"""Parameters of the integrator ``heuristic``, which those of heuristics stand beside."""
+"""Parameters of the integrator ``heuristic`` itself; heuristics must use other names."""
 
 
 THREE = "three:"
-"""How the names of three.js' heuristics begin."""
+"""Prefix of the names of three.js' heuristics."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +42,22 @@ class Range:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a heuristic can be tuned by.
+    """A number that tunes a heuristic.
 
     Parameters
     ----------
     name
-        A Python name: of the attribute in ``point.parameters`` and of the integrator's parameter.
+        A Python name, for the attribute in ``point.parameters`` and the integrator's parameter.
     default, low, high
         In the heuristic's own unit; both bounds are allowed.
     prepared
-        Whether what is prepared depends on it. ``prepare`` then gets it by its name, as a plain
-        number, and is called again where it changes.
+        Whether ``prepare`` depends on it. It then gets the value as a plain keyword argument, and
+        is called again when the value changes.
 
     Raises
     ------
     InputError
-        For a default outside the bounds, or a name that cannot be used.
+        If the default is out of bounds, or the name cannot be used.
     """
 
     name: str
@@ -76,10 +75,12 @@ class Parameter:
         self.checked(self.default)
 
     def checked(self, value: float) -> float:
-        """Return a value that lies within the bounds; raise InputError for any other."""
+        """Return a value if it is within the bounds; raise InputError otherwise."""
         if not (isinstance(value, Real) and self.low <= value <= self.high):
             allowed = f"{self.low:g} to {self.high:g}"
-            raise InputError(f"{self.name} = {value!r} is not allowed: give one from {allowed}.")
+            raise InputError(
+                f"{self.name} = {value!r} is not allowed: give a value from {allowed}."
+            )
         return float(value)
 
 
@@ -90,42 +91,42 @@ class Heuristic:
     Parameters
     ----------
     name
-        In commands, records and messages: lower case, digits and hyphens; or ``FILE.py:function``
-        or ``FILE.glsl`` of one in a file, or ``three:KIND`` of three.js'.
+        Used in commands, records and messages: lower case, digits and hyphens; or
+        ``FILE.py:function`` or ``FILE.glsl`` for one in a file, or ``three:KIND`` for three.js.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
-        viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called for
-        each point: no Python ``if`` on arrays, but ``drjit.select``.
+        viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called per
+        point: use ``drjit.select``, not Python's ``if``, on arrays.
     label
         For people; the name if omitted.
     needs
-        Which of :data:`INPUTS` it reads: all but ``visible`` if omitted. One that needs
-        ``visible`` casts its shadows itself; for others the integrator may (``occlusion``).
+        Which of :data:`INPUTS` it reads; all but ``visible`` if omitted. A heuristic that needs
+        ``visible`` casts its own shadows; for others the integrator may (``occlusion``).
     parameters
-        Numbers that it can be tuned by.
+        Numbers that tune it.
     prepare
         ``prepare(scene)`` is called once for a Mitsuba scene, before its first sample, and returns
-        anything: a table, a depth image. Later edits of the scene do not call it again. It gets
-        the parameters that are ``prepared`` by their names.
+        anything: a table, a depth image. Later edits of the scene do not call it again. Parameters
+        that are ``prepared`` are keyword arguments.
     refuse
-        ``refuse(scene)`` returns why a scene cannot be shaded so, in words such as "there is no
-        environment"; empty where it can.
+        ``refuse(scene)`` returns why it cannot shade a scene, such as "there is no environment";
+        empty if it can.
     form
-        Form of the specular lobe that materials are read with; None for their own.
+        Form of the specular lobe for all materials; None for each material's own.
     reads
-        What it was seen to read (:func:`heuristic.trial.examine`), such as ``material.k_d``.
+        What it read on trial (:func:`heuristic.trial.examine`), such as ``material.k_d``.
     code
-        Digest of the files that it is made of, where they are known.
+        Digest of its files, if known.
     traced
-        Whether Dr.Jit can record ``shade``. One that evaluates its arrays is called in loops that
-        are evaluated, too, and has no derivatives.
+        Whether Dr.Jit can record ``shade``. A function that evaluates its arrays is called in
+        evaluated loops, and has no derivatives.
     remarks
-        What every record of it says among its warnings.
+        Warnings that every record of it carries.
 
     Raises
     ------
     InputError
-        For a name that is not of that kind, unknown needs or form, or two parameters of one name.
+        For an invalid name, unknown needs or form, or two parameters of one name.
     """
 
     name: str
@@ -150,7 +151,7 @@ class Heuristic:
             )
         if unknown := ", ".join(sorted(set(self.needs) - set(INPUTS))):
             known = ", ".join(INPUTS)
-            raise InputError(f"heuristic {self.name} needs {unknown}: choose among {known}.")
+            raise InputError(f"heuristic {self.name} needs {unknown}: choose from {known}.")
         names = [parameter.name for parameter in self.parameters]
         if len(set(names)) < len(names):
             raise InputError(f"heuristic {self.name} has two parameters of one name: {names}.")
@@ -160,12 +161,12 @@ class Heuristic:
         object.__setattr__(self, "label", self.label or self.name)
 
     def prepared(self, scene: Any, values: dict[str, float]) -> Any:
-        """Return what is prepared for a scene, with the values of all parameters.
+        """Prepare for a scene, with the values of all parameters, and return the result.
 
         Raises
         ------
         InputError
-            With the reason why the scene cannot be shaded so.
+            With the reason why it cannot shade the scene.
         """
         if self.refuse is not None and (reason := self.refuse(scene)):
             raise InputError(
@@ -189,37 +190,37 @@ class Heuristic:
         prepared: Any,
         wavelengths: Array = (),
     ) -> Array:
-        """Return the colour at points; the arguments are what :class:`Point` hands on.
+        """Return the colour at points; :class:`Point` passes the arguments on.
 
         Raises
         ------
         InputError
-            When a user's own fails, or returns something else than a colour.
+            If a user's heuristic fails, or does not return a colour.
         """
         tuned = SimpleNamespace(**parameters)
         point = Point(self.needs, given, uv, tuned, prepared, wavelengths)
         if self.is_own:
             return self.shade(point)
-        from heuristic import trial  # which what is the package's own does without
+        from heuristic import trial  # built-in heuristics do not need it
 
         return trial.shaded(self, point)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """What it reads, as far as that is known: what it was seen to read, or else its needs."""
+        """What it read on trial, or else its needs."""
         return self.reads or tuple(sorted(self.needs))
 
     @property
     def is_own(self) -> bool:
-        """Whether it is the package's own."""
+        """Whether the package itself declares it."""
         return HEURISTICS.is_own(self)
 
 
 HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
-"""All heuristics, under their names."""
+"""All heuristics, by name."""
 
 declare = HEURISTICS.declare
-"""Make a heuristic known by its name, in this process, and return it."""
+"""Declare a heuristic in this process, and return it."""
 
 
 def named(name: str) -> Heuristic:
@@ -228,7 +229,7 @@ def named(name: str) -> Heuristic:
     Raises
     ------
     InputError
-        When none has the name, an entry point cannot be loaded, or a file cannot be used.
+        If none has the name, an entry point cannot be loaded, or a file cannot be used.
     """
     if name.endswith(GLSL):
         from heuristic.glsl import shader_files
@@ -255,7 +256,7 @@ def named(name: str) -> Heuristic:
 def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
     """Return the name of a heuristic; declare one that is given as an object or a function.
 
-    A function of a notebook's or program's own is known in its process alone.
+    A function defined in a notebook or program is known only in its process.
     """
     if isinstance(given, str):
         return given
@@ -268,15 +269,15 @@ def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
 
 
 GLSL = ".glsl"
-"""How the names of heuristics in GLSL end."""
+"""Suffix of the names of heuristics in GLSL."""
 
 _WORDS = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
 
 
 def in_file(name: str) -> tuple[str, str] | None:
-    """Return the file and the function that a name ``FILE.py:function`` has, None for others.
+    """Return the file and the function of a name ``FILE.py:function``, None for others.
 
-    The function is empty where the name has none, as that of a ``FILE.glsl``.
+    The function is empty if the name has none, such as ``FILE.glsl``.
     """
     found = _WORDS.fullmatch(name)
     return found and (found[1] or found[3], found[2] or "")

@@ -1,10 +1,10 @@
 """Flat, Gouraud and Phong shading of triangle meshes (chapter 6, section 6.6).
 
 The chapter interpolates twice along straight lines: along two edges to the points D and E where a
-scan line meets them (6.35, 6.37), then along the scan line (6.36, 6.38). On a triangle that is the
+scan line meets them (6.35, 6.37), then along the scan line (6.36, 6.38). On a triangle this is the
 same as weighting the three vertices by barycentric coordinates, for every direction of the scan
 line. Renderers use the latter, on the surface itself; the chapter's scan lines lie in the image,
-where perspective would have to be corrected for.
+where perspective would need a correction.
 
 This module holds the equations. :mod:`heuristic.mesh_shading` applies them to Mitsuba's meshes.
 """
@@ -17,11 +17,11 @@ from heuristic import vectors
 from heuristic.arrays import Colour, Direction, Number, Position, Vector
 
 FINEST = 512
-"""Tessellation: a sphere then has four million triangles, which take half a gigabyte."""
+"""Finest tessellation: a sphere then has four million triangles, half a gigabyte."""
 
 
 class Interpolation(Enum):
-    """What is interpolated over a face: nothing, the intensity, or the normal."""
+    """The quantity interpolated over a face: none, the intensity, or the normal."""
 
     FLAT = "flat"
     GOURAUD = "gouraud"
@@ -45,7 +45,7 @@ def scan_line_intensity(
 ) -> Colour:
     """Equation 6.36: ``I_P = [I_D (x_E - x_P) + I_E (x_P - x_D)] / (x_E - x_D)``.
 
-    The chapter's text names I_D and I_C as what is interpolated, which can only mean I_D and I_E.
+    The chapter's text says I_D and I_C, which can only mean I_D and I_E.
     """
     return _between(intensity_d, intensity_e, x_d, x_e, x)
 
@@ -55,7 +55,7 @@ def edge_normal(
 ) -> Vector:
     """Equation 6.37: ``n_D = [n_A (y_D - y_B) + n_B (y_A - y_D)] / (y_A - y_B)``.
 
-    Not normalised: that would make the result at P depend on the direction of the scan line.
+    It is not normalised: otherwise the result at P would depend on the scan line's direction.
     """
     return _between(normal_a, normal_b, y_a, y_b, y)
 
@@ -65,7 +65,7 @@ def scan_line_normal(
 ) -> Direction:
     """Equation 6.38: ``n_P = [n_D (x_E - x_P) + n_E (x_P - x_D)] / |...|``, a unit vector.
 
-    Where opposite normals meet in the middle it is zero, and such a point receives no light.
+    It is zero where opposite normals cancel, and such a point receives no light.
     """
     return vectors.normalise(_between(normal_d, normal_e, x_d, x_e, x))
 
@@ -75,10 +75,10 @@ def barycentric_coordinates(
 ) -> tuple[Number, Number, Number]:
     """Return the weights ``b0, b1, b2`` with ``point = b0 p0 + b1 p1 + b2 p2`` and sum 1.
 
-    Of a point outside the triangle's plane they are those of its foot. A triangle without area has
-    none; the weights are then ``1, 0, 0``.
+    A point outside the triangle's plane is projected onto it. For a triangle without area the
+    weights are ``1, 0, 0``.
     """
-    from heuristic import normals  # which flat and Gouraud shading alone need
+    from heuristic import normals  # only flat and Gouraud shading need it
 
     # Over the largest component: the fourth power of a length would leave the type's range.
     (edge_1, _, back), largest = normals.scaled_edges(p0, p1, p2)

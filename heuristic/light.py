@@ -1,9 +1,9 @@
-"""What every kind of light is to the kernel; the kinds are in :mod:`heuristic.lights`.
+"""The kernel's view of a light; the kinds are in :mod:`heuristic.lights`.
 
 A light answers one question, ``illuminate(position)``: from which direction ``L``, with what
-intensity and over what distance does its light arrive? Occlusion is not its business. Beside that
-it says which of its values decide on the kernel's instructions, so that lights of one structure can
-share a kernel.
+intensity and over what distance does its light arrive? Occlusion is handled elsewhere. A light also
+states which of its values determine the kernel's instructions, so lights of one structure can share
+a kernel.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from heuristic.arrays import Colour, Direction, Number, Position, Vector
 from heuristic.errors import InputError
 
 PLUGINS: dict[str, type["Light"]] = {}
-"""The kinds of light, by the emitter plugin that stands for each in a Mitsuba scene."""
+"""The kinds of light, by their emitter plugin in a Mitsuba scene."""
 
 
 class Arrival(NamedTuple):
@@ -35,8 +35,8 @@ class Arrival(NamedTuple):
 class Light:
     """A kind of light, as the kernel sees it; each subclass is a frozen dataclass.
 
-    A subclass that names its ``plugin`` is listed in :data:`PLUGINS`. Fields of one name mean the
-    same in all kinds, and are checked by :data:`CHECKS`.
+    A subclass that names its ``plugin`` is listed in :data:`PLUGINS`. Fields of the same name mean
+    the same in all kinds; :data:`CHECKS` checks them.
     """
 
     plugin: ClassVar[str]
@@ -52,7 +52,7 @@ class Light:
                 object.__setattr__(self, name, check(getattr(self, name)))
 
     def illuminate(self, position: Position) -> Arrival:
-        """Return how the light arrives at positions, Dr.Jit arrays of three components."""
+        """Return the light that arrives at positions, Dr.Jit arrays of three components."""
         raise NotImplementedError
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
@@ -64,11 +64,11 @@ class Light:
         return {}
 
     def structure(self) -> tuple:
-        """Return what decides on the light's instructions, apart from its numbers; hashable."""
+        """Return what determines the light's instructions, apart from its numbers; hashable."""
         return type(self), colours.wavelength_count(self.intensity), *self.compiled().items()
 
     def numbers(self) -> dict[str, Any]:
-        """Return the fields that are plain numbers, or tuples of them, and not compiled in."""
+        """Return the fields that are numbers, or tuples of them, and not compiled in."""
         light: Any = self  # a dataclass, as each kind is
         compiled = self.compiled()
         given = {f.name: getattr(self, f.name) for f in fields(light) if f.name not in compiled}
@@ -79,7 +79,7 @@ class Light:
         }
 
     def with_numbers(self, fetch: Callable[[Any], Any], vector_type: type) -> Self:
-        """Return the light with its :meth:`numbers` replaced by Dr.Jit's, which ``fetch`` gives."""
+        """Return the light with its :meth:`numbers` replaced by the Dr.Jit values of ``fetch``."""
         fetched = {name: fetch(value) for name, value in self.numbers().items()}
         for name, array in ARRAYS.items():
             if name in fetched:
@@ -111,7 +111,7 @@ def _direction(value: Any) -> Any:
 
 
 def _attenuation(value: Any) -> tuple:
-    """Return three checked numbers; where one is a Dr.Jit value, none is looked at."""
+    """Return three checked numbers; if one is a Dr.Jit value, none is checked."""
     coefficients = tuple(value) if isinstance(value, Sequence) else ()
     if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
         return coefficients
@@ -157,4 +157,4 @@ ARRAYS = {
     "direction": lambda value, vector_type: vector_type(value),
     "intensity": colours.as_array,
 }
-"""What the kernel's array of a field is made by; other fields stay as they are."""
+"""Functions that make the kernel's array of a field; other fields stay unchanged."""

@@ -1,4 +1,4 @@
-"""Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3): one class a kind."""
+"""Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3): one class per kind."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ INVERSE_SQUARE = (0, 0, 1)
 
 
 def is_unattenuated(coefficients: Sequence) -> bool:
-    """Tell whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
+    """Return whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
     return all(map(is_number, coefficients, UNATTENUATED))
 
 
@@ -28,7 +28,7 @@ class DirectionalLight(Light, plugin="heuristic_directional"):
     direction
         Direction in which the light travels; any length but zero.
     intensity
-        ``I_p``, display-linear: a number, RGB, one value for each wavelength, or a Dr.Jit array.
+        ``I_p``, display-linear: a number, RGB, one value per wavelength, or a Dr.Jit array.
 
     Raises
     ------
@@ -50,7 +50,7 @@ class DirectionalLight(Light, plugin="heuristic_directional"):
 
 
 class _LightFromPoint(Light):
-    """What lights at a position share: ``L``, the distance, and attenuation with it."""
+    """Base of lights with a position: ``L``, the distance, and attenuation."""
 
     position: Position
     attenuation: tuple[Number, Number, Number]
@@ -78,7 +78,7 @@ class _LightFromPoint(Light):
 
 @dataclass(frozen=True)
 class PointLight(_LightFromPoint, plugin="heuristic_point"):
-    """A point that shines alike in all directions (6.1).
+    """A point that shines equally in all directions (6.1).
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
     Raises
     ------
     InputError
-        As for :class:`PointLight`, and for a zero direction, a cutoff outside (0, 180) or a
+        Same as :class:`PointLight`, and for a zero direction, a cutoff outside (0, 180) or a
         negative exponent.
     """
 

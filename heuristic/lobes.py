@@ -1,4 +1,4 @@
-"""The cosine of which the specular lobe is a power, as accurately as the exponent asks for."""
+"""The cosine whose power is the specular lobe, as accurate as the exponent requires."""
 
 from collections.abc import Callable
 
@@ -14,15 +14,15 @@ from heuristic.numerics import Cosine
 def lobe(
     material: Material, normal: Vector, view: Vector
 ) -> Callable[[Light, Position, Direction, Number], Cosines]:
-    """Return a function that gives the lobe's cosine for a light, 0 where it is below the horizon.
+    """Return a function that gives the lobe's cosine for a light, 0 for lights below the horizon.
 
-    ``R.V`` (8.9), or ``N.H`` for the form ``blinn``. What depends on the normal and the view alone
-    is computed once for all lights.
+    ``R.V`` (8.9), or ``N.H`` for the form ``blinn``. Whatever depends only on the normal and the
+    view is computed once for all lights.
 
     For moderate exponents (:data:`heuristic.numerics.MODERATE_EXPONENTS`) it is a float from unit
     vectors of the kernel's precision. For others it is a :class:`heuristic.numerics.Cosine` from
-    double precision throughout: already the rounding of ``N``, ``L`` and ``V`` to single precision
-    turns them by 1e-7, which at ``n = 1e6`` changes the highlight by a thousandth.
+    double precision throughout: rounding ``N``, ``L`` and ``V`` to single precision alone turns
+    them by 1e-7, which at ``n = 1e6`` changes the highlight by a thousandth.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def lobe(
 def local_lobe(material_form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Cosines:
     """Return the lobe's cosine between two directions, in a frame whose third axis is the normal.
 
-    As :func:`lobe`, for directions above the horizon.
+    Same as :func:`lobe`, for directions above the horizon.
     """
     if is_moderate:
         wi, wo = vectors.normalise(wi), vectors.normalise(wo)

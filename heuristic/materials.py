@@ -13,7 +13,7 @@ FORMS = ("phong", "blinn")
 COEFFICIENTS = ("k_i", "k_a", "k_d", "k_s")
 
 PHYSICAL = ("base_color", "alpha", "ior", "metallic")
-"""What a material may know of its physical partner; all but the first are single numbers."""
+"""Parameters of the physical partner; all but the first are single numbers."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Material:
         Emission (8.1), display-linear, 0 or more.
     k_a, k_d, k_s
         Ambient, diffuse and specular reflection coefficients (8.2, 8.5, 8.8), physically in 0..1.
-        Each is a number, RGB, one value for each wavelength, or a Dr.Jit array.
+        Each is a number, RGB, one value per wavelength, or a Dr.Jit array.
     n
         Phong's exponent, 0 or more. A plain number is compiled into the kernel, an integer up to
         :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a
@@ -35,12 +35,11 @@ class Material:
         ``phong`` for the chapters' ``(R.V)^n`` (8.9), ``blinn`` for ``(N.H)^n`` of Blinn (1977),
         which OpenGL's fixed pipeline and most engines use.
     normalised
-        Scale the lobe by :func:`heuristic.terms.normalisation`, so that ``k_s`` is its albedo at
+        Scale the lobe by :func:`heuristic.terms.normalisation`; ``k_s`` is then its albedo at
         normal incidence. The chapters' model does not.
     n_is_moderate
-        Whether a Dr.Jit ``n`` is known to lie within
-        :data:`heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double
-        precision. Of plain numbers it is seen.
+        Whether a Dr.Jit ``n`` is known to lie within :data:`heuristic.numerics.MODERATE_EXPONENTS`,
+        where the kernel may do without double precision. It is inferred for plain numbers.
 
     Raises
     ------
@@ -87,9 +86,9 @@ class PairedMaterial(Material):
     Parameters
     ----------
     base_color
-        Reflectance of the diffuse base, 0..1; of metals, of the surface at normal incidence.
+        Reflectance of the diffuse base, 0..1; for metals, of the surface at normal incidence.
     alpha
-        Root mean square slope of the microfacets, as of Beckmann's distribution and GGX: the square
+        Root mean square slope of the microfacets, as in Beckmann's distribution and GGX: the square
         of what engines call roughness. 1e-4 to 1; 1 for a surface without an interface.
     ior
         Index of refraction, inside over outside; 1 for a surface without an interface.
@@ -111,6 +110,6 @@ def _exponent(n):
 
 
 def check_form(form: str) -> None:
-    """Refuse a form of the specular lobe that is not in :data:`FORMS`."""
+    """Reject a form of the specular lobe that is not in :data:`FORMS`."""
     if not isinstance(form, str) or form not in FORMS:
         raise unknown("form =", form, FORMS)

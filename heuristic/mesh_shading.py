@@ -1,14 +1,13 @@
 """Flat and Gouraud shading of Mitsuba's meshes (chapter 6, sections 6.6.1 and 6.6.2).
 
-:func:`shade_mesh` evaluates the model once a vertex (Gouraud) or once a face (flat), and stores the
-values as attributes of the mesh. :func:`stored_shade` reads them at what a ray hits, interpolated
-by Mitsuba. What is stored holds for one viewer, one set of lights and one of wavelengths.
+:func:`shade_mesh` evaluates the model once per vertex (Gouraud) or face (flat), and stores the
+values as attributes of the mesh. :func:`stored_shade` reads them where a ray hits, interpolated by
+Mitsuba. Stored values hold for one viewer, one set of lights and one of wavelengths.
 
-:class:`MeshCorners` is Gouraud shading without storage: three evaluations for each ray, at the
-vertices of the face that it meets. It is for spectral variants, whose wavelengths change from ray
-to ray.
+:class:`MeshCorners` is Gouraud shading without storage: three evaluations per ray, at the vertices
+of the face that it hits. It is for spectral variants, whose wavelengths change from ray to ray.
 
-Phong shading needs neither: Mitsuba interpolates and normalises the vertex normals.
+Phong shading does not need either: Mitsuba interpolates and normalises the vertex normals.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +33,7 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
     Parameters
     ----------
     mesh : mitsuba.Mesh
-        With vertex normals, or else they are those of 6.34.
+        The mesh; if it has no vertex normals, those of 6.34 are used.
     interpolation : Interpolation
         GOURAUD for the vertices with their normals, FLAT for the faces' centroids with theirs.
 
@@ -89,20 +88,20 @@ def shade_mesh(
     twosided: bool | Mask = False,
     model: Callable[..., Colour] = shade,
 ) -> int:
-    """Evaluate the model (8.10) at a mesh's vertices or faces, and store it with the mesh.
+    """Evaluate the model (8.10) at a mesh's vertices or faces, and store the values in the mesh.
 
     Parameters
     ----------
     mesh, interpolation
         See :func:`shading_points`.
     viewer
-        ``P_V``: three numbers, or a Dr.Jit point. What is stored is what is seen from there.
+        ``P_V``: three numbers, or a Dr.Jit point. The stored values are as seen from there.
     material, lights, ambient, visible
         See :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
     twosided
-        Store the values of the back, with reversed normals, beside those of the front.
+        Also store the values of the back, with reversed normals.
     model : callable
-        What shades, with the arguments of :func:`heuristic.shade`.
+        The model, with the arguments of :func:`heuristic.shade`.
 
     Returns
     -------
@@ -129,9 +128,9 @@ def stored_shade(
 ) -> Colour:
     """Read what :func:`shade_mesh` stored, at the surface interactions of rays.
 
-    A face shows its front where the ray meets the side to which its vertices are anticlockwise,
-    whatever its vertex normals say. Its back is black, or with ``twosided`` what was stored for it.
-    Shapes with nothing stored read as black.
+    A face shows its front if the ray hits the side from which its vertices are anticlockwise,
+    whatever its vertex normals say. Its back is black, or with ``twosided`` has its stored value.
+    Shapes without stored values read as black.
 
     Returns
     -------
@@ -152,13 +151,13 @@ def stored_shade(
 
 
 class MeshCorners:
-    """The vertices of all faces of a scene's meshes, for evaluating at those of the face hit.
+    """The vertices of all faces of a scene's meshes, to shade at those of the face hit.
 
     Parameters
     ----------
     scene : mitsuba.Scene
-        Its meshes count as in :func:`shading_points`, except that ``face_normals`` are taken as
-        what they say: each face has its own normal at its vertices.
+        Its meshes are treated as in :func:`shading_points`, except that with ``face_normals`` each
+        face has its own normal at its vertices.
 
     Raises
     ------
@@ -167,7 +166,7 @@ class MeshCorners:
     """
 
     def __init__(self, scene: Scene):
-        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face is that of no mesh
+        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face belongs to no mesh
         for shape in scene.shapes():
             if shape.is_mesh():
                 starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
@@ -180,10 +179,10 @@ class MeshCorners:
         )
 
     def at(self, si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
-        """Return three pairs of a weight and an interaction, one a vertex of the face hit.
+        """Return three pairs of a weight and an interaction, one per vertex of the face hit.
 
         The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
-        :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are no
+        :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are not
         meshes all weights are zero.
         """
         index = dr.reinterpret_array(mi.UInt32, si.shape)
@@ -222,7 +221,7 @@ def _corner_arrays(mesh):
 
 
 def _joined(arrays):
-    """Join vectors end to end; Dr.Jit's own function does so for arrays of one component."""
+    """Join vectors end to end; Dr.Jit's function takes only arrays of one component."""
     components = range(len(arrays[0]))
     return type(arrays[0])(*(dr.concat([array[i] for array in arrays]) for i in components))
 
@@ -234,7 +233,7 @@ def _mean(values, corners):
 def _refuse_face_normals(mesh):
     if mesh.has_face_normals():
         raise InputError(
-            f"mesh {mesh.id()!r} has face_normals, and so several normals at a vertex. Gouraud"
+            f"mesh {mesh.id()!r} has face_normals, so several normals at a vertex. Gouraud"
             " shading needs one: pass it through heuristic.meshes.split_faces, or take face_normals"
             " off."
         )
@@ -249,11 +248,11 @@ def _store(mesh, interpolation, colour, back, count):
     names = [_name(interpolation, back, block) for block in range(len(values) // BLOCK)]
     for name in names:
         if not mesh.has_attribute(name):
-            # Zeros, as this copies one by one; all of them, as Mitsuba does not check the length.
+            # Zeros, because this copies one by one; all, because Mitsuba does not check the length.
             mesh.add_attribute(name, BLOCK, [0.0] * (BLOCK * count))
     parameters = mi.traverse(mesh)
     for block, name in enumerate(names):
-        # Terms that depend on no position are a single number until they are spread out.
+        # Terms that do not depend on the position are a single number until spread out.
         triple = mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)]) + dr.zeros(mi.Float, count)
         parameters[name] = dr.ravel(triple)
     parameters.update()

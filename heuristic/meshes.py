@@ -1,8 +1,8 @@
 """Meshes for flat, Gouraud and Phong shading: made from other shapes, given normals, taken apart.
 
-Everything returns a new ``mitsuba.Mesh`` in world space, with the BSDF of the original and no
-emitter; the original stays as it is. A flipped orientation (``flip_normals``) goes into the order
-of the vertices. Call it after ``mitsuba.set_variant``.
+Every function returns a new ``mitsuba.Mesh`` in world space, with the BSDF of the original and no
+emitter; the original is unchanged. A flipped orientation (``flip_normals``) becomes the order of
+the vertices. Call it after ``mitsuba.set_variant``.
 """
 
 import drjit as dr
@@ -20,9 +20,9 @@ RESOLUTION = 16
 def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
     """Return a shape as a triangle mesh with the shape's own normals and texture coordinates.
 
-    A grid over the shape's ``(u, v)``, two triangles a cell, so that textures stay in place. With
-    ``h = pi / (2 resolution)``, the angle of one step along a circle, its largest distance from the
-    shape, for the radius ``r``, is:
+    It is a grid over the shape's ``(u, v)`` with two triangles per cell, so textures stay in place.
+    With ``h = pi / (2 resolution)``, the angle of one step along a circle, its largest distance
+    from the shape, for the radius ``r``, is:
 
     =============  ===============================================  ========================
     Shape          Cells                                            Distance
@@ -33,13 +33,13 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
     ``sphere``     ``4 resolution`` around, ``2 resolution`` bands  ``r (1 - cos^2(h / 2))``
     =============  ===============================================  ========================
 
-    Vertices lie on the shape, so that the mesh lies inside a sphere. Other meshes, the cube among
-    them, are returned as they are.
+    Vertices lie on the shape, so the mesh of a sphere lies inside it. Meshes, including the cube,
+    are returned unchanged.
 
     Raises
     ------
     InputError
-        For a shape of any other type, or a resolution that is not a whole number from 1 to
+        For other types of shape, or a resolution that is not a whole number from 1 to
         :data:`heuristic.interpolation.FINEST`.
     """
     if not isinstance(resolution, int) or not 1 <= resolution <= FINEST:
@@ -51,20 +51,20 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
         if shape.is_mesh():
             return shape
         raise InputError(
-            f"shape {shape.id()!r}: a {shape.class_name()} cannot be made into triangles. Flat and"
-            " Gouraud shading take meshes, spheres, disks, cylinders and rectangles; give it as a"
-            " mesh, or use phong interpolation."
+            f"shape {shape.id()!r}: a {shape.class_name()} cannot be made into triangles. Flat"
+            " and Gouraud shading take meshes, spheres, disks, cylinders and rectangles: give"
+            " a mesh, or use phong interpolation."
         )
     return _tessellated(shape, kind, *_cells(resolution)[kind])
 
 
 def with_vertex_normals(mesh: Mesh, weighting: "str | Weighting" = Weighting.ANGLE) -> Mesh:
-    """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, in place of any of its own.
+    """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, replacing any that it has.
 
     Raises
     ------
     InputError
-        When the faces at a vertex oppose each other, so that it has no normal.
+        If the faces at a vertex oppose each other, which leaves it without a normal.
     """
     computed = _checked_normals(mesh, weighting)
     return _build(mesh, positions(mesh), computed, texture_coordinates(mesh), faces(mesh))
@@ -73,7 +73,7 @@ def with_vertex_normals(mesh: Mesh, weighting: "str | Weighting" = Weighting.ANG
 def split_faces(mesh: Mesh) -> Mesh:
     """Return a mesh whose faces share no vertices, each with its face's normal.
 
-    It is the form in which a mesh with ``face_normals`` has vertices to evaluate at.
+    In this form a mesh with ``face_normals`` has vertices to evaluate at.
     """
     corners = dr.ravel(faces(mesh))
     normals = dr.repeat(face_normals(mesh), 3)
@@ -96,7 +96,7 @@ def faces(mesh: Mesh) -> Array:
 
 
 def texture_coordinates(mesh: Mesh) -> Array | None:
-    """Return a mesh's texture coordinates, None where it has none."""
+    """Return a mesh's texture coordinates, None if it has none."""
     if not mesh.has_vertex_texcoords():
         return None
     return dr.unravel(mi.Point2f, mesh.vertex_texcoords_buffer())
@@ -108,12 +108,12 @@ def face_normals(mesh: Mesh) -> Direction:
 
 
 def normals(mesh: Mesh) -> Direction:
-    """Return a mesh's vertex normals: its own, or by 6.34 where it has none.
+    """Return a mesh's vertex normals: its own, or by 6.34 if it has none.
 
     Raises
     ------
     InputError
-        When it has none, and the faces at a vertex oppose each other.
+        If it has none, and the faces at a vertex oppose each other.
     """
     if not mesh.has_vertex_normals():
         return _checked_normals(mesh, Weighting.ANGLE)
@@ -142,7 +142,7 @@ def _checked_normals(mesh, weighting):
 
 
 def _cells(resolution):
-    """Return the cells along ``u`` and ``v`` for each type of shape."""
+    """Return the number of cells along ``u`` and ``v`` for each type of shape."""
     around = 4 * resolution
     return {
         mi.ShapeType.Rectangle: (resolution, resolution),
@@ -186,7 +186,7 @@ def _surface(shape, kind, uv):
         normals = low.n
     else:
         si = _evaluated(shape, uv)
-        # Mitsuba's rectangle leaves its orientation out of its parametrisation.
+        # Mitsuba's rectangle ignores its orientation in its parametrisation.
         flipped = kind == mi.ShapeType.Rectangle and shape.has_flipped_normals()
         points, normals = si.p, -si.n if flipped else si.n
     everywhere = dr.zeros(mi.Vector3f, dr.width(uv))  # plane shapes have a single normal
@@ -205,7 +205,7 @@ def _evaluated(shape, uv):
 
 
 def _closed(kind, uv):
-    """Let both ends of a circle, and all meridians at a pole or centre, meet in one point."""
+    """Make both ends of a circle, and all meridians at a pole or centre, meet in one point."""
     full_turn_u, full_turn_v = dr.select(uv.x < 1, uv.x, 0), dr.select(uv.y < 1, uv.y, 0)
     if kind == mi.ShapeType.Sphere:
         return mi.Point2f(dr.select((uv.y > 0) & (uv.y < 1), full_turn_u, 0), uv.y)

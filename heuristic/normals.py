@@ -1,14 +1,14 @@
 """Normals of planes, triangles, implicit and parametric surfaces (chapter 6, section 6.5).
 
-Each function takes Dr.Jit arrays of three components, or the floats that they are made of, of any
-float type, and returns unit vectors of the same. A surface has no normal where its gradient
-vanishes or its tangents are parallel; the functions return the zero vector there, which receives no
-light, and never NaN. Two vectors count as parallel where the sine of the angle between them is at
-most :data:`PARALLEL_STEPS` rounding steps, because their own rounding can turn them by as much.
+Each function takes Dr.Jit arrays of three components, or their floats, of any float type, and
+returns unit vectors of the same type. A surface has no normal where its gradient vanishes or its
+tangents are parallel; the functions return the zero vector there, which receives no light, and
+never NaN. Two vectors count as parallel where the sine of the angle between them is at most
+:data:`PARALLEL_STEPS` rounding steps, because their own rounding can turn them by as much.
 
-Gradients and tangents are arguments, and are not derived from the surface's function by automatic
-differentiation: that needs a differentiable float type and a graph of its own inside the caller's
-kernel, while closed forms serve every float type and cost what they say.
+Gradients and tangents are arguments, not derived by automatic differentiation: that needs a
+differentiable float type and a separate graph inside the caller's kernel. Closed forms serve every
+float type at a known cost.
 """
 
 import drjit as dr
@@ -18,7 +18,7 @@ from heuristic import vectors
 from heuristic.arrays import Direction, Number, Position, Vector
 
 PARALLEL_STEPS = 4
-"""Edges and tangents carry half a rounding step in each component, their products as much again."""
+"""Edges and tangents are off by half a rounding step per component, products by as much again."""
 
 
 def plane_coefficients(normal: Vector, point: Position) -> tuple[Number, Number, Number, Number]:
@@ -32,7 +32,7 @@ def plane_coefficients(normal: Vector, point: Position) -> tuple[Number, Number,
 def plane_normal(a: Number, b: Number, c: Number) -> Direction:
     """Equations 6.16, 6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
 
-    ``a``, ``b`` and ``c`` are Dr.Jit floats. Its side is that on which ``ax + by + cz + d > 0``.
+    ``a``, ``b`` and ``c`` are Dr.Jit floats. It points to the side where ``ax + by + cz + d > 0``.
     Where all three are zero there is no plane, and ``n`` is zero.
     """
     return unit(_vector_type(a)(a, b, c))
@@ -41,8 +41,8 @@ def plane_normal(a: Number, b: Number, c: Number) -> Direction:
 def triangle_normal(p0: Position, p1: Position, p2: Position) -> Direction:
     """Equation 6.19: ``n = (p1 - p0) x (p2 - p0) / |(p1 - p0) x (p2 - p0)|``.
 
-    It points to the side from which the vertices are seen in anticlockwise order. Another order
-    gives the opposite normal, exactly unless two edges are of one length. Collinear vertices give
+    It points to the side from which the vertices are seen in anticlockwise order. The reverse order
+    gives the opposite normal, exactly unless two edges are equally long. Collinear vertices give
     the zero vector.
     """
     edges, _ = scaled_edges(p0, p1, p2)
@@ -86,7 +86,7 @@ def ellipsoid_point(u: Number, v: Number, a: Number, b: Number, c: Number) -> Po
     """Equation 6.24: ``p = (a cos v cos u, b cos v sin u, c sin v)``.
 
     ``u`` is the longitude in ``[-pi, pi]`` and ``v`` the latitude in ``[-pi/2, pi/2]``, Dr.Jit
-    floats in radians. The chapter's own formula is lost; this choice makes ``p_u x p_v`` point
+    floats in radians. The chapter's formula is lost; this choice makes ``p_u x p_v`` point
     outwards.
     """
     sin_u, cos_u = dr.sincos(u)
@@ -126,8 +126,8 @@ def unit_cross(a: Vector, b: Vector) -> Direction:
 def cross(a: Vector, b: Vector) -> Vector:
     """Return ``a x b`` such that ``b x a`` is its exact opposite.
 
-    ``dr.cross`` fuses one product of each pair and rounds the other, so that two opposing faces
-    would not cancel.
+    ``dr.cross`` fuses one product of each pair and rounds the other, so two opposing faces would
+    not cancel.
     """
     return type(a)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
@@ -143,11 +143,11 @@ def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
     """Return two of the three edges of a closed triangle, in order, leaving out the longest.
 
     Any two give the same cross product. In a needle the two long edges are nearly parallel, and
-    their product is lost to rounding, while the short one meets both at a large angle.
+    their product is lost to rounding, while the short one is at a large angle to both.
     """
     square_a, square_b, square_c = (dr.squared_norm(edge) for edge in (a, b, c))
     omit_a = (square_a > square_b) & (square_a > square_c)
-    omit_b = square_b > square_c  # asked where a stays
+    omit_b = square_b > square_c  # matters only if a stays
     first = dr.select(omit_a, b, dr.select(omit_b, c, a))
     second = dr.select(omit_a, c, dr.select(omit_b, a, b))
     return first, second
@@ -156,20 +156,20 @@ def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
 def _latitude(v):
     """Return sine and cosine of a latitude, with a cosine of exactly 0 at the poles.
 
-    No float is pi/2; the cosine of the nearest is a rounding step that may well be negative, and
-    turns the normal inside out.
+    No float equals pi/2; the cosine of the nearest is a rounding step, which may be negative and
+    turn the normal inside out.
     """
     sine, cosine = dr.sincos(v)
     return sine, dr.select(abs(cosine) > dr.epsilon(_vector_type(v)), cosine, 0)
 
 
 def _scaled(vector):
-    """Return a vector over its largest component, so that its square cannot leave the range."""
+    """Return a vector over its largest component, whose square stays in the range."""
     return _over(vector, _largest(vector))
 
 
 def _over(vector, largest):
-    """Divide by the largest component; what is below the smallest normal float becomes zero.
+    """Divide by the largest component; anything below the smallest normal float becomes zero.
 
     The reciprocal of anything smaller is infinite.
     """
@@ -182,7 +182,7 @@ def _largest(vector):
 
 
 def _vector_type(component):
-    """Return the type of three such components: of double precision for plain numbers."""
+    """Return the type of three such components; double precision for plain numbers."""
     if dr.is_jit_v(component):
         return dr.replace_shape_t(type(component), (3, -1))
     return scalar.Array3f64

@@ -1,10 +1,10 @@
 """Powers, lengths and sums that keep their digits where the textbook's formulas lose them.
 
 All functions take floats of any type: Dr.Jit arrays of single or double precision, or plain
-numbers. From finite values no function makes a NaN. Numbers below the type's smallest normal float
-count as zero, as they do for the threads that Dr.Jit computes with.
+numbers. No function makes a NaN from finite values. Numbers below the type's smallest normal float
+count as zero, as they do in Dr.Jit's threads.
 
-Three ideas carry the module:
+The module rests on three ideas:
 
 - A cosine near 1 travels with its *complement* ``1 - c``, which rounding would swallow. Then
   ``c^n = 2^(n log2(1 - (1 - c)))`` is as accurate as the complement is, for every ``n``.
@@ -22,18 +22,18 @@ import drjit as dr
 from heuristic.arrays import Array, Cosines, Direction, Number, Vector
 
 LARGEST_LITERAL_EXPONENT = 64
-"""Up to here an integer exponent is multiplied out: at most 11 products, and an error of
-``n`` rounding steps, against the logarithm, exponential and branch of a general power."""
+"""Up to here an integer exponent is multiplied out: at most 11 products and an error of ``n``
+rounding steps, in place of the logarithm, exponential and branch of a general power."""
 
 MODERATE_EXPONENTS = (2, 512)
-"""Where the cosine of two unit vectors in the kernel's own precision will do. It is wrong by up to
-three rounding steps of 2^-24, its power by ``3 n 2^-24``: within 1e-4 for these. Beyond them, and
-where the exponent is not known when the kernel is traced, the cosine is taken in double precision.
-Below 2 it is the small cosines that need it: ``c^n > 1e-3`` reaches down to ``c = 10^(-3/n)``."""
+"""Exponents for which the cosine of two unit vectors in the kernel's precision is enough. It is
+wrong by up to three rounding steps of 2^-24, its power by ``3 n 2^-24``: within 1e-4 for these. For
+others, and for exponents unknown when the kernel is traced, the cosine has double precision. Below
+2 the small cosines need it: ``c^n > 1e-3`` reaches down to ``c = 10^(-3/n)``."""
 
 
 class Cosine(NamedTuple):
-    """The cosine ``c`` of an angle, with ``1 - c`` and, where it is needed, ``1 + c``."""
+    """The cosine ``c`` of an angle, with ``1 - c`` and, if needed, ``1 + c``."""
 
     value: object
     complement: object
@@ -41,9 +41,9 @@ class Cosine(NamedTuple):
 
 
 def plain(value: Any) -> Any:
-    """Return a number as a Python int or float, and a Dr.Jit float as it is; else None.
+    """Return a number as a Python int or float, a Dr.Jit float unchanged, and otherwise None.
 
-    NumPy's numbers and fractions are numbers, too; NaN comes of what is beyond all floats.
+    NumPy's numbers and fractions count as numbers; those beyond all floats become NaN.
     """
     if dr.is_array_v(value):
         return value if dr.depth_v(value) == 1 and dr.is_jit_v(value) else None
@@ -54,7 +54,7 @@ def plain(value: Any) -> Any:
 
 
 def is_moderate(n: Number) -> bool:
-    """Tell whether an exponent is a plain number within :data:`MODERATE_EXPONENTS`."""
+    """Return whether an exponent is a plain number within :data:`MODERATE_EXPONENTS`."""
     return isinstance(n, Real) and MODERATE_EXPONENTS[0] <= float(n) <= MODERATE_EXPONENTS[1]
 
 
@@ -68,7 +68,7 @@ def cosine_of_degrees(angle: Number) -> Cosine:
 
 
 def power(cosine: Cosines, n: Number) -> Number:
-    """Return ``c ** n`` where the cosine is positive, and 0 elsewhere, for ``n = 0`` too.
+    """Return ``c ** n`` where the cosine is positive, and 0 elsewhere, also for ``n = 0``.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def power(cosine: Cosines, n: Number) -> Number:
     lobe = value >= smallest(value)
     if isinstance(n, int) and n <= LARGEST_LITERAL_EXPONENT:
         return dr.power(at_least(value, 0), n) if n > 0 else dr.select(lobe, 1.0, 0.0)
-    value = at_least(value, smallest(value))  # outside the lobe too nothing becomes infinite
+    value = at_least(value, smallest(value))  # nothing becomes infinite outside the lobe either
     complement = at_least(cosine.complement, 0)
     return dr.select(lobe, exp2(n * log2_of(value, complement)), 0)
 
@@ -129,7 +129,7 @@ def exp2(x: Number) -> Number:
 def one_less_exp2(x: Number) -> Number:
     """Return ``1 - 2^-x`` for ``x >= 0``, accurate relative to the result where ``x`` is small.
 
-    Below ``x = 1/2`` by the series of the exponential function, whose next term is under 1e-9 of
+    Below ``x = 1/2`` it is the series of the exponential function, whose next term is under 1e-9 of
     it.
     """
     y = x * _LN_2
@@ -140,8 +140,8 @@ def one_less_exp2(x: Number) -> Number:
 def scaled(vector: Vector) -> tuple[Vector, Number, Number]:
     """Return a vector over a power of two near its length, that power's inverse, and its square.
 
-    The square of what is returned lies between 1/8 and 8, or for lengths at the ends of the type's
-    range well within it; for the zero vector it is 0.
+    The returned square lies between 1/8 and 8, or well within the type's range for lengths at its
+    ends; for the zero vector it is 0.
     """
     square = dr.squared_norm(vector)
     inverse = _inverse_root_power(dr.detach(square))
@@ -157,8 +157,8 @@ def inverse_root(square: Number) -> Number:
 def inverse_length(square: Number) -> Number:
     """Return ``1 / sqrt(square)``, and 0 where ``square`` is 0.
 
-    A vector times that is a unit vector or zero, and so is its derivative at the zero vector, where
-    that of a large number times zero would overflow as soon as light is added to it.
+    A vector times that is a unit vector or zero, and so is its derivative at the zero vector. The
+    derivative of a large number times zero would overflow once light is added to it.
     """
     return dr.select(square >= smallest(square), inverse_root(square), 0)
 
@@ -166,7 +166,7 @@ def inverse_length(square: Number) -> Number:
 def at_least(value: Any, low: Number) -> Number:
     """Return the larger of two, and NaN for NaN.
 
-    This form is one instruction; ``dr.maximum`` is four, because it tells -0 from 0.
+    This form is one instruction; ``dr.maximum`` is four, because it distinguishes -0 from 0.
     """
     return dr.select(value < low, low, value)
 
@@ -177,7 +177,7 @@ def at_most(value: Any, high: Number) -> Number:
 
 
 def is_number(value: Any, number: float) -> bool:
-    """Tell whether a value is a plain number and that number; Dr.Jit arrays are not looked at."""
+    """Return whether a value is a plain number equal to ``number``; Dr.Jit arrays are not read."""
     return isinstance(value, Real) and value == number
 
 
@@ -197,7 +197,7 @@ def largest(value: Any) -> float:
 
 
 def wide(value: Any) -> Array:
-    """Return a Dr.Jit array of single precision in double precision; anything else as it is."""
+    """Return a Dr.Jit array of single precision in double precision; anything else unchanged."""
     return dr.float64_array_t(type(value))(value) if dr.is_array_v(value) else value
 
 
@@ -220,18 +220,18 @@ def refined_inverse(square: Number, estimate: Number) -> Number:
 
 
 def add(total: Array, lost: Array, term: Array) -> tuple[Array, Array]:
-    """Return ``total + term``, and with ``lost`` added what the sum's rounding took away.
+    """Return ``total + term``, and ``lost`` plus what the sum's rounding took away.
 
     The pair ``total, lost`` stands for ``total + lost`` (Neumaier). Start with ``0, 0``.
     """
     result = total + term
     back = result - total
-    # Knuth's exact form, which needs to know nothing of which of the two is larger.
+    # Knuth's exact form does not need to know which of the two is larger.
     return result, lost + ((total - (result - back)) + (term - back))
 
 
 def summed(total: Array, lost: Array) -> Array:
-    """Return ``total + lost``; what was lost of a sum beyond the type's range is no number."""
+    """Return ``total + lost``; for a sum beyond the type's range ``lost`` is not a number."""
     return total + dr.select(dr.isfinite(lost), lost, 0)
 
 
@@ -250,8 +250,8 @@ def _is_single(value):
 def _inverse_root_power(square):
     """Return a power of two near ``1 / sqrt(square)``, by halving the bits of the exponent.
 
-    Any power of two will do, so that the bits of an overflown or vanished square are no special
-    case: the result is then 2^-65 or 2^63 in single precision.
+    Any power of two will do, so an overflowed or vanished square is not a special case: the result
+    is then 2^-65 or 2^63 in single precision.
     """
     if not dr.is_jit_v(square):
         usable = 0 < square < inf

@@ -1,4 +1,4 @@
-"""Which files Python code reads while it runs: those that it opens, and modules that it imports."""
+"""The files that Python code reads while it runs, by opening them or importing modules."""
 
 import os
 import site
@@ -11,24 +11,23 @@ from importlib.util import source_from_cache
 from pathlib import Path, PurePath
 
 OWN = ("heuristic", "reference", "comparisons", "reports")
-"""Packages of the project: their version stands for them."""
+"""Packages of the project, identified by their version instead."""
 
 VOLATILE = ("/proc", "/sys", "/dev")
 
 _open: list[set[str]] = []
-"""What is noted of the code that runs now; empty where none does."""
+"""Files noted for the code that is running; empty if none is."""
 
 
 @contextmanager
 def noted() -> Iterator[set[Path]]:
-    """Give a set that holds, after the block, the files that its code read.
+    """Yield a set that holds, after the block, the files that its code read.
 
-    These are files opened for reading through Python and not deleted since, and the files of
-    modules imported. Left out are the standard library, installed packages and the project itself.
-    Modules imported are forgotten again: other code may mean another file by the same name.
-
-    What is read in native code, in other processes, after the block (as a Python plugin may, once
-    it renders), or from the environment and the clock is not noted.
+    These are files opened for reading through Python and not deleted since, and files of imported
+    modules. The standard library, installed packages and the project itself are left out. Imported
+    modules are forgotten again: other code may mean another file by the same name. Reads in native
+    code, in other processes, after the block (as a Python plugin may, once it renders), and of the
+    environment and the clock are not noted.
     """
     _listen()
     paths: set[str] = set()
@@ -50,7 +49,7 @@ def noted() -> Iterator[set[Path]]:
 
 @cache
 def _listen() -> None:
-    """Note what is opened from now on; Python keeps such a hook until its end."""
+    """Note files opened from now on; Python keeps such a hook until it exits."""
     sys.addaudithook(_note)
 
 
@@ -78,7 +77,7 @@ def _places(module: object) -> set[str]:
 
 
 def _source(path: str) -> str:
-    """Return the source of compiled code, where it is there, and else the file itself."""
+    """Return the source of compiled code if it exists, and otherwise the file itself."""
     try:
         source = source_from_cache(path)
     except ValueError:
@@ -87,7 +86,7 @@ def _source(path: str) -> str:
 
 
 def is_users(path: Path) -> bool:
-    """Tell whether a file is neither Python's, nor of an installed package, nor the project's."""
+    """Return whether a file is outside Python, installed packages and the project."""
     return not any(path.is_relative_to(folder) for folder in _left_out())
 
 

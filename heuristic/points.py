@@ -1,4 +1,4 @@
-"""What a heuristic reads of the points that it shades: positions, directions, material, lights."""
+"""The points that a heuristic shades: positions, directions, material, lights."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +13,10 @@ from heuristic.errors import InputError
 from heuristic.materials import Material
 
 INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "visible")
-"""What a heuristic may need of a point; ``visible`` is a shadow ray to a light."""
+"""The possible needs of a heuristic; ``visible`` is a shadow ray to a light."""
 
 Array = Any
-"""A Dr.Jit array of the current variant, one entry a point; a plain number where all are equal."""
+"""A Dr.Jit array of the current variant, one entry per point; a plain number if all are equal."""
 
 
 class Given(NamedTuple):
@@ -42,9 +42,9 @@ class LightAtPoint:
     distance
         To the light, in units of the scene; infinite for parallel light.
     intensity
-        ``I_p``, display-linear, attenuation and cone applied: a white diffuse surface that faces
-        the light has this value. Where the integrator has ``occlusion``, and the heuristic does not
-        need ``visible``, it is 0 at points that the light does not reach.
+        ``I_p``, display-linear, with attenuation and cone: a white diffuse surface that faces the
+        light has this value. If the integrator has ``occlusion``, and the heuristic does not need
+        ``visible``, it is 0 at points that the light does not reach.
     """
 
     toward: Array
@@ -53,14 +53,14 @@ class LightAtPoint:
     _point: "Point"
 
     def visible(self) -> Array:
-        """Return the mask of points that the light reaches, by a shadow ray, which is a need."""
+        """Return the mask of points that the light reaches, by a shadow ray (a need)."""
         self._point.require("visible")
         ray: Any = self._point.given.visible  # there is one, since it was declared
         return ray(self.toward, self.distance)
 
 
 def _input(read: Callable[["Point"], Any]) -> cached_property:
-    """Make an attribute of :class:`Point` that a heuristic can read if it declares to need it."""
+    """Make an attribute of :class:`Point` that a heuristic can read if it declares the need."""
 
     def checked(point: "Point") -> Any:
         point.require(read.__name__)
@@ -71,21 +71,21 @@ def _input(read: Callable[["Point"], Any]) -> cached_property:
 
 @dataclass(frozen=True)
 class Point:
-    """The points to shade, all at once: what a heuristic reads.
+    """The points to shade, all at once, as read by a heuristic.
 
     Attributes
     ----------
     parameters
         The heuristic's parameters, as attributes.
     prepared
-        What the heuristic's ``prepare`` returned for the scene; None without it.
+        Result of the heuristic's ``prepare`` for the scene; None without it.
     wavelengths
-        Those that colours are for, in nm: four in spectral variants, otherwise none.
+        Wavelengths of colours, in nm: four in spectral variants, otherwise none.
 
     Raises
     ------
     InputError
-        When the heuristic reads what is not among its needs.
+        If the heuristic reads something that is not among its needs.
     """
 
     needs: frozenset[str]
@@ -117,7 +117,7 @@ class Point:
 
     @_input
     def material(self) -> Material:
-        """What the surface is made of, a :class:`heuristic.materials.PairedMaterial`.
+        """The material of the surface, a :class:`heuristic.materials.PairedMaterial`.
 
         ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
         ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
@@ -154,4 +154,4 @@ class Point:
     def require(self, name: str) -> None:
         """Raise InputError for an input that is not among the heuristic's needs."""
         if name not in self.needs:
-            raise InputError(f"{name!r} is read, but not declared: add it to what is needed.")
+            raise InputError(f"{name!r} is read, but not declared: add it to the needs.")

@@ -1,4 +1,4 @@
-"""How the program was started, so that the commands that it prints can be pasted."""
+"""How the program was started, so users can paste the commands that it prints."""
 
 import os
 import shlex

@@ -1,6 +1,6 @@
 """The heuristic half of a scene as plain data: camera, triangles, materials, lights.
 
-Everything is in world space and in display-linear units, those of the kernel.
+Everything is in world space and in the kernel's display-linear units.
 """
 
 from dataclasses import dataclass, fields
@@ -38,18 +38,19 @@ def camera(scene: mi.Scene) -> dict:
     """Return the camera as matrices, rows of numbers.
 
     ``to_world`` is Mitsuba's: the camera looks along +z, +y is up, +x to the left. ``view`` and
-    ``projection`` are OpenGL's: the camera looks along -z, +y is up, +x to the right, and what is
-    seen has -1 to 1 in each coordinate of ``projection view p / w``.
+    ``projection`` are OpenGL's: the camera looks along -z, +y is up, +x to the right, and visible
+    points have -1 to 1 in each coordinate of ``projection view p / w``.
     """
     sensor = scene.sensors()[0]
     values = mi.traverse(sensor)
     if "Perspective" not in sensor.class_name():
         raise InputError(
-            f"sensor {sensor.id()!r} is a {sensor.class_name()}: perspective cameras are exported."
+            f"sensor {sensor.id()!r} is a {sensor.class_name()}, but only perspective cameras can"
+            " be exported."
         )
     offsets = [numbers(values[f"principal_point_offset_{axis}"])[0] for axis in ("x", "y")]
     if any(offsets):
-        raise InputError(f"sensor {sensor.id()!r}: its principal point is not in the middle.")
+        raise InputError(f"sensor {sensor.id()!r}: its principal point must be in the middle.")
     width, height = (int(side) for side in sensor.film().crop_size())
     to_world = np.array(values["to_world"].matrix, float).reshape(4, 4, -1)[..., 0]
     x_fov = numbers(values["x_fov"])[0]
@@ -76,7 +77,7 @@ def camera(scene: mi.Scene) -> dict:
 
 
 def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Triangles:
-    """Return a shape as triangles, those of :func:`heuristic.meshes.to_mesh`."""
+    """Return a shape as the triangles of :func:`heuristic.meshes.to_mesh`."""
     mesh = meshes.to_mesh(shape, tessellation or meshes.RESOLUTION)
     values = mi.traverse(mesh)
     normals = not mesh.has_face_normals() and mesh.has_vertex_normals()
@@ -95,7 +96,7 @@ def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Tr
 
 
 def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
-    """Return a material; of what varies over the surface, the value in the middle of its map."""
+    """Return a material; a texture gives the value in its middle."""
     point = dr.zeros(mi.SurfaceInteraction3f)
     point.uv = mi.Point2f(0.5)
     found = bsdf.material(point, True, False, None, True)

@@ -27,32 +27,33 @@ def shade(
 
     ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
     wavelength (8.11) or for RGB (8.12, 6.13-6.15). Lights at or below the horizon (``N.L <= 0``)
-    give neither diffuse nor specular light. Only terms that can be other than zero are traced: a
-    coefficient of 0, or an empty list of lights, leaves no instruction behind.
+    give neither diffuse nor specular light. Only terms that can be non-zero are traced: a
+    coefficient of 0, or an empty list of lights, adds no instruction.
 
     Parameters
     ----------
     position, normal, view
         Dr.Jit arrays of three components, of any float type: ``P``, ``N`` and ``V``, in one space.
-        Normals and views of any length are normalised; a zero vector receives no light. Three
-        plain numbers stand for all points, where another of the three is a Dr.Jit array. Half
-        precision and integers are computed in single precision.
+        Normals and views of any length are normalised; a zero vector receives no light. Three plain
+        numbers stand for all points if another of the three is a Dr.Jit array. Half precision and
+        integers are computed in single precision.
     material : Material
         The coefficients.
     lights : sequence of PointLight, DirectionalLight or SpotLight
         Any number of them. Numbers in up to :data:`heuristic.shading.BLOCK` lights, and in the
         material, are compiled into the kernel; opaque Dr.Jit values are not.
     ambient
-        ``I_a``: a number, RGB, one value for each wavelength, or a Dr.Jit array.
+        ``I_a``: a number, RGB, one value per wavelength, or a Dr.Jit array.
     visible : callable, optional
         ``visible(toward, distance)`` returns a mask of the points that a light in that direction,
-        at that distance, reaches. The chapters' model has no shadows; without it nothing is hidden.
+        at that distance, reaches. The chapters' model has no shadows; if omitted, nothing is
+        hidden.
 
     Returns
     -------
     Dr.Jit array
-        The display-linear value: a float where all coefficients are single numbers, otherwise a
-        colour with one component for each wavelength.
+        The display-linear value: a float if all coefficients are single numbers, otherwise a colour
+        with one component per wavelength.
 
     Raises
     ------
@@ -131,9 +132,9 @@ def _check_wavelengths(material, lights, ambient):
 
 
 BLOCK = 16
-"""Lights in one kernel. More are summed block after block by the same kernel, each light costing
-about what it costs unrolled; a loop inside the kernel would fetch each parameter again for each
-pixel, and take twice as long. Larger blocks compile longer and gain little (see the benchmarks)."""
+"""Lights in one kernel. More are summed block after block by the same kernel, at about the cost of
+unrolling; a loop inside the kernel would fetch each parameter again per pixel, and take twice as
+long. Larger blocks compile longer and gain little (see the benchmarks)."""
 
 
 def sum_lights(
@@ -151,18 +152,18 @@ def sum_lights(
     position, normal, view
         See :func:`heuristic.shade`: normals and views of any length.
     material : Material
-        Tells which of the two sums are needed, and the form and exponent of the specular term.
+        Determines which of the two sums are needed, and the form and exponent of the specular term.
     lights : sequence
-        Any number. More than :data:`BLOCK` are evaluated in blocks, so that compile time, kernel
-        size and memory do not grow with their number. They are unrolled where there is nothing to
-        evaluate (scalar arrays) or it is not possible (inside a symbolic loop or call).
+        Any number. More than :data:`BLOCK` are evaluated in blocks, so compile time, kernel size
+        and memory do not grow with their number. They are unrolled if there is nothing to evaluate
+        (scalar arrays) or it is impossible (in a symbolic loop or call).
     visible : callable, optional
         ``visible(toward, distance)`` returns a mask of the points that the light reaches.
 
     Returns
     -------
     diffuse, specular
-        The two sums, each None where its coefficient is zero.
+        The two sums, each None if its coefficient is zero.
     """
     has_diffuse = not colours.is_zero(material.k_d)
     has_specular = not colours.is_zero(material.k_s)
@@ -192,7 +193,7 @@ def sum_lights(
                 cosine = lobe(light, position, arrival.toward, cos_incidence)
                 _add(parts, "specular", terms.specular(intensity, 1, cosine, material.n))
         for name, part in parts.items():
-            # A sum of thousands would lose what is smaller than its last digit (Neumaier).
+            # A sum of thousands would lose terms below its last digit (Neumaier).
             sums[name] = numerics.add(*sums[name], part) if name in sums else (part, 0)
     return tuple(_summed(sums.get(name)) for name in ("diffuse", "specular"))
 
@@ -208,7 +209,7 @@ def _add(parts: dict, name: str, term: Any) -> None:
 
 
 def _portions(lights: Sequence[Light]) -> list[Sequence[Light]]:
-    """Split lights into blocks as they are."""
+    """Split lights into blocks, unchanged."""
     return [lights[begin : begin + BLOCK] for begin in range(0, len(lights), BLOCK)]
 
 
@@ -225,8 +226,7 @@ def _blocks(lights: Sequence[Light], vector_type: type) -> Iterator[list[Light]]
 def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
     """Move the numbers of a block of lights out of the kernel's code, into one small array.
 
-    Which light comes from where in the array is the same for all blocks of a structure, and so is
-    the kernel.
+    The layout of the array is the same for all blocks of one structure, and so is the kernel.
     """
     values = [value for light in lights for value in light.numbers().values()]
     flat = [number for value in values for number in np.ravel(value)]

@@ -1,8 +1,8 @@
-"""Heuristics in files of a user's, which a command names as ``FILE.py`` or ``FILE.py:function``.
+"""Heuristics in users' files, which a command names as ``FILE.py`` or ``FILE.py:function``.
 
-A heuristic there is a function of a :class:`heuristic.points.Point`, called ``shade`` where the
-command names no other, or an object :class:`heuristic.heuristics.Heuristic`. Any process finds the
-same by the same words, and a file that changed is read again.
+A heuristic there is a function of a :class:`heuristic.points.Point`, called ``shade`` unless the
+command names another, or a :class:`heuristic.heuristics.Heuristic`. Every process finds the same
+heuristic by the same words, and reads a changed file again.
 """
 
 import runpy
@@ -19,10 +19,10 @@ from heuristic.heuristics import Heuristic, in_file
 from heuristic.user_code import contained, told
 
 FUNCTION = "shade"
-"""What the function is called where no other name is given."""
+"""Name of the function, if omitted."""
 
 MODULE = "_shading_of_a_user"
-"""What a file's functions have as their module: a name that hides nobody else's."""
+"""Module of a file's functions: a name that does not hide another."""
 
 _opened: dict[tuple[str, Path, str | None], tuple[Heuristic, frozenset[Path]]] = {}
 
@@ -33,7 +33,7 @@ def opened(word: str) -> Heuristic:
     Raises
     ------
     InputError
-        When there is no such file or function, or its code fails: naming its line.
+        If there is no such file or function, or its code fails; the message names the line.
     """
     file, function = in_file(word) or (word, "")
     path, function = Path(file), function or FUNCTION
@@ -60,17 +60,17 @@ def _read(word: str, path: Path, function: str) -> tuple[Heuristic, frozenset[Pa
 
 
 def _run(path: Path) -> dict[str, Any]:
-    """Return what a file defines, under its names."""
+    """Return what a file defines, by name."""
     try:
         return runpy.run_path(str(path.resolve()), run_name=MODULE)
-    except (Exception, SystemExit) as error:  # whatever a user's own code raises
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
         raise InputError(
-            f"{told(error)}. {path} was to give a heuristic, and cannot be run."
+            f"{told(error)}. Correct {path}, which is to define a heuristic."
         ) from error
 
 
 def _named(names: dict[str, Any], function: str, path: Path) -> Any:
-    """Return what a file calls by a name."""
+    """Return the object of a name in a file."""
     if function in names:
         return names[function]
     own = [
@@ -90,7 +90,7 @@ def _label(path: Path, function: str) -> str:
 
 
 def _digest(files: frozenset[Path]) -> str:
-    """Return a digest of the content of files; one that is gone counts, too."""
+    """Return a digest of the content of files; a missing file counts, too."""
     found = sha256()
     for file in sorted(files):
         content = file.read_bytes() if file.is_file() else b"gone"

@@ -1,10 +1,10 @@
-"""The illumination model, term by term: one function an equation.
+"""The illumination model, term by term: one function per equation.
 
 Equation numbers 8.x are of the chapter *Illumination* (sections 8.2.1-8.2.5), 6.x of the chapter
 *Lighting models*. Intensities and coefficients are display-linear (see
-:mod:`heuristic.convention`); they are numbers, Dr.Jit floats, or colours with one component for
-each wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The same functions serve
-the kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
+:mod:`heuristic.convention`); they are numbers, Dr.Jit floats, or colours with one component per
+wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The same functions serve the
+kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
 """
 
 from collections.abc import Sequence
@@ -48,8 +48,8 @@ def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number)
 
     6.10 is the same for an ``intensity`` that is already attenuated. The limit of large ``n`` is
     the perfect mirror of 8.7. ``cos_reflection`` is a float or, for large ``n``, a
-    :class:`heuristic.numerics.Cosine`. The caller sees to the horizon (``N.L > 0``); the lobe
-    itself ends where ``R.V <= 0``, for every ``n``, so that ``n = 0`` is the limit of small ``n``.
+    :class:`heuristic.numerics.Cosine`. The caller handles the horizon (``N.L > 0``); the lobe
+    itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is the limit of small ``n``.
 
     >>> specular(intensity=1.0, k_s=0.5, cos_reflection=0.5, n=2)
     0.125
@@ -85,12 +85,12 @@ def attenuation(
 ) -> Colour:
     """Equation 6.1: ``I = I_0 / (k0 + k1 d + k2 d^2)``: constant, linear and quadratic parts.
 
-    Without an ``intensity`` it is ``f_att``; ``inverse`` is ``1 / d`` where the caller has it at
-    hand. ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation.
-    Where the denominator is 0 (on a light of inverse-square type) the result is 0: no direction
-    exists there, so nothing is lit.
+    Without an ``intensity`` it is ``f_att``; ``inverse`` is ``1 / d`` if the caller has it already.
+    ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation. Where
+    the denominator is 0 (on a light of inverse-square type) the result is 0: no direction exists
+    there, so nothing is lit.
 
-    Neither ``d^2`` nor ``f_att`` need lie in the type's range, if only the result does: see
+    ``d^2`` and ``f_att`` may leave the type's range as long as the result does not: see
     :func:`attenuation_root`. A result beyond the range is the largest float, since an infinite one
     would become NaN at the horizon.
 
@@ -102,10 +102,10 @@ def attenuation(
 
 
 def is_tame(coefficients: Sequence[Number], intensity: Colour) -> bool:
-    """Tell whether :func:`tame_attenuation` will do: all are plain numbers of moderate size.
+    """Return whether :func:`tame_attenuation` will do: all are plain numbers of moderate size.
 
-    With ``k0 >= 1e-30`` the denominator is never 0, and small products are lost beside it; with
-    ``k1, k2 <= 1`` its parts are finite, and where the whole is not, an intensity of 4 or less
+    With ``k0 >= 1e-30`` the denominator is never 0, and small products do not count next to it;
+    with ``k1, k2 <= 1`` its parts are finite, and where the whole is not, an intensity of 4 or less
     leaves less than the smallest normal float, which counts as zero.
     """
     numbers = (*coefficients, *(intensity if isinstance(intensity, tuple) else (intensity,)))
@@ -154,10 +154,10 @@ def attenuation_root(
 ) -> Number:
     """Return ``1 / sqrt(k0 + k1 d + k2 d^2)``, and ``at_zero`` where the denominator is 0.
 
-    Its product with an intensity, and that with it once more, stay between numbers that exist.
-    With ``u = 1 / d`` the denominator is ``d^2 (k2 + k1 u + k0 u^2)``, which is taken where ``k2
-    d^2`` is the largest of the three. Of the products with ``k0``, ``k1`` and ``k2`` that with
-    ``k1`` alone must lie in the type's range.
+    Multiplying an intensity by it twice never leaves the type's range on the way. With ``u = 1 /
+    d`` the denominator is ``d^2 (k2 + k1 u + k0 u^2)``, which is used where ``k2 d^2`` is the
+    largest of the three. Of the products with ``k0``, ``k1`` and ``k2`` only that with ``k1`` must
+    lie in the type's range.
     """
     float_type = type(distance)
     if numerics.is_number(k2, 0):
@@ -189,8 +189,8 @@ def spot_cone(cos_axis: Cosines, cos_cutoff: Cosines) -> Number:
     """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it.
 
     Both are cosines, or both :class:`heuristic.numerics.Cosine` with supplement; these compare by
-    what is left to 1 or -1, whichever is nearer to the cutoff, and let in what lies on the edge to
-    within :data:`EDGE_STEPS` rounding steps.
+    the difference from 1 or -1, whichever is nearer to the cutoff, and include the edge to within
+    :data:`EDGE_STEPS` rounding steps.
     """
     if not isinstance(cos_axis, numerics.Cosine):
         return dr.select(cos_axis >= cos_cutoff, 1.0, 0.0)
@@ -201,14 +201,14 @@ def spot_cone(cos_axis: Cosines, cos_cutoff: Cosines) -> Number:
 
 
 EDGE_STEPS = 8
-"""A point whose coordinates lie exactly on a cone is lit, as 6.2 has it, whatever the rounding of
-directions and cutoff."""
+"""A point exactly on a cone is lit, as in 6.2, however directions and cutoff are rounded."""
 
 
 def spot_falloff(cos_axis: Cosines, m: Number) -> Number:
     """Equation 6.4: ``(v_L.v_P)^m``, the factor by which the cone of 6.3 fades from its axis.
 
-    0 from 90 degrees on, but for ``m = 0``, which does not fade at all: the even cone of 6.3.
+    It is 0 from 90 degrees on, except for ``m = 0``, which does not fade at all: the even cone of
+    6.3.
 
     >>> spot_falloff(cos_axis=0.5, m=2)
     0.25

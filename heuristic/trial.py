@@ -1,7 +1,7 @@
-"""Calling heuristics of a user's: on trial before any scene, and with their mistakes in words.
+"""Calling users' heuristics: on trial before any scene, with clear messages for mistakes.
 
-The trial is a few hundred points under two lights, seen from many sides: what :data:`POINTS` says.
-It finds what fails, is not finite or is negative in most scenes, and what is read.
+The trial shades :data:`POINTS` points under two lights, seen from many sides. It finds code that
+fails or gives infinite or negative values in most scenes, and what the code reads.
 """
 
 from collections.abc import Callable
@@ -36,14 +36,14 @@ def shaded(heuristic: "Heuristic", point: Point) -> Any:
     Raises
     ------
     InputError
-        When it fails or returns something else than a colour: by its file and line.
+        If it fails or does not return a colour; the message names file and line.
     """
     try:
         value = heuristic.shade(point)
     except FotismosError as error:
         where, line, _ = told(error).partition(f"{type(error).__name__}: ")
         raise type(error)(f"{where if line else ''}{error}") from error
-    except (Exception, SystemExit) as error:  # whatever a user's own code raises
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
         raise InputError(f"{told(error)} (heuristic {heuristic.name}).{_advice(error)}") from error
     _require_colour(heuristic, value, point)
     import mitsuba as mi
@@ -52,15 +52,15 @@ def shaded(heuristic: "Heuristic", point: Point) -> Any:
 
 
 def examine(heuristic: "Heuristic") -> tuple[str, ...]:
-    """Return what a heuristic reads, by trying it.
+    """Try a heuristic, and return what it reads.
 
-    Inputs have the names of :data:`heuristic.points.INPUTS`, and what is read of the material is
-    told, too: ``material.k_d``.
+    Inputs have the names of :data:`heuristic.points.INPUTS`; the parts of the material are named
+    too, such as ``material.k_d``.
 
     Raises
     ------
     InputError
-        When it fails, or returns something that is not a colour, not finite or negative.
+        If it fails, or returns something that is not a colour, not finite or negative.
     """
     import mitsuba as mi
 
@@ -76,7 +76,7 @@ def examine(heuristic: "Heuristic") -> tuple[str, ...]:
     return tuple(sorted(read))
 
 
-@dataclass(frozen=True)  # as what it stands for
+@dataclass(frozen=True)  # hashable, like what it imitates
 class _Watched:
     """Notes which attributes of an object are read."""
 
@@ -102,11 +102,11 @@ class _Trial(Point):
         return _Watched(found, lambda name: self.prepared.setdefault(name))
 
 
-_Trial.__name__ = "Point"  # for a user's AttributeError
+_Trial.__name__ = "Point"  # for users' AttributeErrors
 
 
 def _points(heuristic: "Heuristic", read: dict[str, None]) -> tuple[Point, Callable[[int], str]]:
-    """Return the points of a trial, and what describes one of them in words."""
+    """Return the points of a trial, and a function that describes one of them."""
     import mitsuba as mi
 
     from heuristic.lights import DirectionalLight, PointLight
@@ -171,15 +171,16 @@ def _require(
     described: Callable[[int], str],
     expected: str,
 ) -> None:
-    """Refuse colours (components, points) on trial, naming one of those that are wrong."""
+    """Reject wrong colours (components, points) on trial, naming one of them."""
     wrong = np.flatnonzero(~is_right.all(axis=0))
     if not wrong.size:
         return
     shown = ", ".join(f"{component:.3g}" for component in colours[:, wrong[0]])
     raise InputError(
         f"{defined(heuristic.shade)}: heuristic {heuristic.name} returned ({shown}) on trial, and"
-        f" wrong values at {wrong.size} of {POINTS} points; expected are components that are"
-        f" {expected}. One of the points: {described(wrong[0])}. {_cure(heuristic, expected)}"
+        f" wrong values at {wrong.size} of {POINTS} points; components"
+        f" must be {expected}. One of the points: {described(wrong[0])}."
+        f" {_cure(heuristic, expected)}"
     )
 
 
@@ -191,13 +192,13 @@ def _cure(heuristic: "Heuristic", expected: str) -> str:
 
 
 def _require_colour(heuristic: "Heuristic", value: Any, point: Point) -> None:
-    """Refuse what is not a number or colour for each point."""
+    """Reject anything but one number or colour per point."""
     import mitsuba as mi
 
     components = dr.size_v(mi.Spectrum)
     expected = (
-        f"expected is one colour for each point, as a Dr.Jit array: a mitsuba.Spectrum of"
-        f" {components} components, or a mitsuba.Float"
+        f"return one colour per point, as a Dr.Jit array: a mitsuba.Spectrum of {components}"
+        " components, or a mitsuba.Float"
     )
     if isinstance(value, Real) and not isinstance(value, bool):
         return
@@ -228,7 +229,7 @@ def _kind(value: Any) -> str:
 
 
 def _advice(error: BaseException) -> str:
-    """Return what to do about the mistake that is made most: a branch on an array."""
+    """Return advice for the most frequent mistake: a branch on an array."""
     text = str(error)
     while error.__cause__ is not None:
         error = error.__cause__

@@ -1,4 +1,4 @@
-"""Code of a user's: run without a trace in its process, and its errors told by file and line."""
+"""Users' code: run without side effects on the process, with errors by file and line."""
 
 import inspect
 import os
@@ -17,7 +17,7 @@ from heuristic.opened import is_users, noted
 def contained(path: Path) -> Iterator[set[Path]]:
     """Let a file's code run in the block, with its folder first in the search path.
 
-    What it does to the process is undone: folder, umask, environment, arguments and path. Gives a
+    Its changes to the process are undone: folder, umask, environment, arguments and path. Yields a
     set that holds, after the block, the files that it read (:func:`heuristic.opened.noted`).
     """
     with _put_back(), noted() as read:
@@ -26,7 +26,7 @@ def contained(path: Path) -> Iterator[set[Path]]:
 
 
 def told(error: BaseException) -> str:
-    """Return what went wrong, after the user's file and line where there is one."""
+    """Return what went wrong, after the user's file and line if known."""
     place = _place(error)
     where = f"{place[0]}, line {place[1]}: " if place else ""
     message = error.msg if isinstance(error, SyntaxError) else str(_first(error))
@@ -37,7 +37,7 @@ def told(error: BaseException) -> str:
 
 
 def defined(function: Callable[..., Any]) -> str:
-    """Return where a function stands, as file and line; its name where that is not known."""
+    """Return a function's file and line; its name if they are not known."""
     code = getattr(inspect.unwrap(function), "__code__", None)
     if code is None:
         return getattr(function, "__qualname__", repr(function))
@@ -45,7 +45,7 @@ def defined(function: Callable[..., Any]) -> str:
 
 
 def _place(error: BaseException) -> tuple[str, int] | None:
-    """Return the innermost line of a user's that led to an error."""
+    """Return the innermost line of a user's code that led to an error."""
     if isinstance(error, SyntaxError) and error.filename:
         return _shown(error.filename), error.lineno or 1
     frames = traceback.extract_tb(_first(error).__traceback__)
@@ -63,23 +63,23 @@ def _is_users(frame: traceback.FrameSummary) -> bool:
 
 
 def _first(error: BaseException) -> BaseException:
-    """Return the error that began a chain of them: Dr.Jit raises its own of a user's."""
+    """Return the first error of a chain: Dr.Jit raises its own from a user's."""
     while error.__cause__ is not None:
         error = error.__cause__
     return error
 
 
 def _shown(file: str) -> str:
-    """Return the name of a file as seen from the current folder, where it lies below that."""
+    """Return a file's path, relative to the current folder if it lies below."""
     path = Path(file)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
 
 
 @contextmanager
 def _put_back() -> Iterator[None]:
-    """Undo what a script does to its process: folder, umask, environment, arguments and path.
+    """Undo a script's changes to its process: folder, umask, environment, arguments and path.
 
-    What it forks ends here instead of going on beside its parent.
+    A process that it forks ends here instead of continuing alongside its parent.
     """
     pid, folder, environment = os.getpid(), os.getcwd(), dict(os.environ)
     arguments, path = list(sys.argv), list(sys.path)

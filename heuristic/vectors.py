@@ -1,7 +1,7 @@
 """The unit vectors that the terms need (chapter 6, section 6.5).
 
 Each function takes Dr.Jit arrays of three components, of any float type, and returns the same.
-Lengths may have any size that the type has; those below its smallest normal float count as zero.
+Lengths may have any size within the type's range; below its smallest normal float they are zero.
 """
 
 import drjit as dr
@@ -13,7 +13,7 @@ from heuristic.arrays import Cosines, Direction, Number, Position, Vector
 def normalise(vector: Vector) -> Direction:
     """Return ``vector / |vector|``, and zero for the zero vector.
 
-    A direction that does not exist then contributes nothing to a scalar product, instead of NaN.
+    An undefined direction then contributes nothing to a scalar product, instead of NaN.
     """
     vector, _, square = numerics.scaled(vector)
     return vector * numerics.inverse_length(square)
@@ -23,7 +23,7 @@ def light_vector(light_position: Position, position: Position) -> tuple[Directio
     """Equation 6.26: ``L = (P_L - P) / |P_L - P|``, with the distance ``d = |P_L - P|``.
 
     Returns ``(L, d)``. On the light itself (``d = 0``) the direction is undefined and ``L`` is
-    zero, so that such a point receives no light. A distance beyond the type's range is its largest
+    zero, so such a point receives no light. A distance beyond the type's range becomes its largest
     float.
     """
     half, inverse, square = numerics.scaled(_half_offset(light_position, position))
@@ -52,7 +52,7 @@ def wide_light_vector(light_position: Position, position: Position) -> tuple[Vec
 
 
 def _half_offset(light_position, position):
-    """Return half of ``P_L - P``, which unlike the whole never exceeds the type's range."""
+    """Return half of ``P_L - P``, which, unlike the whole, never exceeds the type's range."""
     return dr.fma(position, -0.5, light_position * 0.5)
 
 
@@ -64,7 +64,7 @@ def view_vector(viewer_position: Position, position: Position) -> Direction:
 def mirror_vector(normal: Vector, direction: Direction, cosine: Cosines) -> Direction:
     """Equations 6.28-6.31: ``R = 2 (L.N) N - L``, the mirror image of ``L`` about ``N``.
 
-    It follows from three demands on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and
+    It follows from three conditions on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and
     ``N`` (6.30) and unit length. ``cosine`` is ``N.L``, which callers have already. Mirroring
     either of two directions gives the same angle between them: ``R.V`` is the scalar product of
     ``L`` with the mirror image of ``V``.
@@ -75,7 +75,7 @@ def mirror_vector(normal: Vector, direction: Direction, cosine: Cosines) -> Dire
 def chord_cosine(a: Direction, b: Direction) -> numerics.Cosine:
     """Return the :class:`heuristic.numerics.Cosine` of the angle between two unit vectors.
 
-    ``1 - a.b = |a - b|^2 / 2`` and ``1 + a.b = |a + b|^2 / 2``: near 0 and near 180 degrees the
-    chords keep the digits that the scalar product has lost.
+    ``1 - a.b = |a - b|^2 / 2`` and ``1 + a.b = |a + b|^2 / 2``: near 0 and 180 degrees the chords
+    keep the digits that the scalar product loses.
     """
     return numerics.Cosine(dr.dot(a, b), dr.squared_norm(a - b) * 0.5, dr.squared_norm(a + b) * 0.5)

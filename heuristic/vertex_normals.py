@@ -1,19 +1,19 @@
 """Normals at the vertices of a triangle mesh (chapter 6, section 6.6.2).
 
-A vertex has no normal of its own; it gets the mean of those of the faces around it, in one of three
-weightings. All take the mesh as Dr.Jit arrays: ``positions`` with three floats of any type a
-vertex, ``faces`` with three vertex numbers per face, of a type such as ``Array3u``. They return one
-vector a vertex, and share these rules:
+A vertex gets the mean normal of the faces around it, in one of three weightings. All take the mesh
+as Dr.Jit arrays: ``positions`` with three floats of any type per vertex, ``faces`` with three
+vertex numbers per face, of a type such as ``Array3u``. They return one vector per vertex, and share
+these rules:
 
 - A face without area contributes nothing.
-- A vertex with no face, or with such faces alone, has the zero vector.
-- So has one whose faces oppose each other, as those of the two sides of a sheet do: what is left of
-  the sum is rounding, up to :data:`CANCELLATION_STEPS` rounding steps of the weights' sum.
+- A vertex with no face, or only such faces, has the zero vector.
+- So has one whose faces oppose each other, like the two sides of a sheet: the rest of the sum is
+  rounding, up to :data:`CANCELLATION_STEPS` rounding steps of the weights' sum.
 - Slivers have exact normals, areas and angles like other faces, until their edges are parallel to
   within rounding (see :mod:`heuristic.normals`).
 
-Sums run in parallel over the faces; the last bit may depend on their order in meshes of tens of
-thousands of faces and more.
+Sums run in parallel over the faces; in meshes of tens of thousands of faces or more the last bit
+may depend on their order.
 """
 
 from enum import Enum
@@ -39,15 +39,15 @@ class Weighting(Enum):
 def vertex_normals(
     positions: Position, faces: Array, weighting: "str | Weighting" = Weighting.ANGLE
 ) -> Direction:
-    """Return the unit normal at each vertex, in a weighting or under its name (6.32-6.34).
+    """Return the unit normal at each vertex, for a weighting or its name (6.32-6.34).
 
-    Weighting by angle is the default because it alone does not depend on how a flat part of the
+    Weighting by angle is the default because only it does not depend on how a flat part of the
     surface is divided into triangles.
 
     Raises
     ------
     InputError
-        When a face names a vertex that does not exist, or the weighting is none of the three.
+        If a face names a vertex that does not exist, or the weighting is unknown.
     """
     _check_faces(positions, faces)
     try:

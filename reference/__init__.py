@@ -2,10 +2,10 @@
 
 import mitsuba as mi
 
-import heuristic  # noqa: F401  before anything compiles: it finds LLVM
+import heuristic  # noqa: F401  it finds LLVM, before anything compiles
 
 if mi.variant() is None:
-    mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names at all before one is chosen
+    mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen
 
 from reference.pairing.factors import Convention
 from reference.pairing.halves import Pair, pair

@@ -282,5 +282,5 @@ def test_mistakes_are_told(run, tmp_path, words, told):
 
 
 def test_a_parameter_outside_its_bounds_is_refused(rgb):
-    with pytest.raises(InputError, match="give one from 0 to 1"):
+    with pytest.raises(InputError, match="give a value from 0 to 1"):
         Shaded(heuristic_of(detached_parameter, "mine"), {"gloss": 2.0})

@@ -159,7 +159,7 @@ BOMB = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{"".join(ENTITIES)}]>'
 
 HOSTILE = {
     "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "&j;|j"),
-    "nesting": (_nested(100_000), "deep in each other"),
+    "nesting": (_nested(100_000), "nested more than"),
     "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "includes itself"),
     "unclosed comments": ("<!--" * 300_000, "x.xml"),  # these two take hours if read badly
     "unclosed elements": ("<a" * 300_000, "x.xml"),

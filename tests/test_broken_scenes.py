@@ -131,9 +131,9 @@ BROKEN = {
     "a blend of one": (
         MATTE,
         '<bsdf type="blendbsdf" id="odd"><bsdf type="diffuse"/></bsdf>',
-        "odd: it has 1 of the 2 BSDF",
+        "odd: it needs 2 BSDF elements, and has 1",
     ),
-    "not UTF-8": ("point", "p\udce9int", "not in UTF-8"),
+    "not UTF-8": ("point", "p\udce9int", "not UTF-8"),
 }
 
 

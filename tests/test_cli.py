@@ -59,7 +59,7 @@ def _changed(old, new):
 
 BAD_FILES = {
     "malformed": (SCENE[:300], r"line \d+|byte offset \d+"),
-    "no scene": ("<bsdf version='3.0.0' type='diffuse'/>", "must be a scene"),
+    "no scene": ("<bsdf version='3.0.0' type='diffuse'/>", "must be <scene>"),
     "unknown BSDF": (_changed("roughplastic", "roughplastik"), r'"roughplastik" not found'),
     "environment without a file": (
         _changed('type="constant"', 'type="envmap"'),

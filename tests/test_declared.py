@@ -42,7 +42,7 @@ def test_installed_packages_are_loaded_once_and_stand_last(toys):
 
 def test_own_names_are_refused_and_others_replaced(toys):
     found, _ = toys
-    with pytest.raises(InputError, match="toy 'own' is declared already"):
+    with pytest.raises(InputError, match="toy 'own' is already declared"):
         found.declare(Toy("own", 1))
     for number in (1, 2):
         found.declare(Toy("mine", number))

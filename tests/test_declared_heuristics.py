@@ -383,13 +383,13 @@ def test_an_unknown_name_lists_what_there_is(name):
     ("make", "message"),
     [
         (lambda: Heuristic("My toon", toon), "'My toon': a name has lower-case"),
-        (lambda: Heuristic("a", toon, needs={"depth"}), "needs depth: choose among position"),
+        (lambda: Heuristic("a", toon, needs={"depth"}), "needs depth: choose from position"),
         (lambda: Heuristic("a", toon, form="ward"), "'ward' is not known"),
         (lambda: Heuristic("a", toon, parameters=(Parameter("x", 1, 0, 1),) * 2), "of one name"),
         (lambda: Parameter("ambient", 0, 0, 1), "'ambient' is not allowed"),
         (lambda: Parameter("two words", 0, 0, 1), "'two words' is not allowed"),
-        (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give one from 0 to 1"),
-        (lambda: declare(Heuristic("phong", toon)), "'phong' is declared already"),
+        (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give a value from 0 to 1"),
+        (lambda: declare(Heuristic("phong", toon)), "'phong' is already declared"),
     ],
 )
 def test_a_wrong_declaration_is_refused(make, message):
@@ -399,7 +399,7 @@ def test_a_wrong_declaration_is_refused(make, message):
 
 @pytest.mark.parametrize("value", [1.5, -0.1, float("nan")])
 def test_a_parameter_out_of_bounds_is_refused(rgb, declared, value):
-    with pytest.raises(Exception, match=r"wrap = .* is not allowed: give one from 0 to 1"):
+    with pytest.raises(Exception, match=r"wrap = .* is not allowed: give a value from 0 to 1"):
         mi.load_dict({"type": "heuristic", "model": "wrapped", "wrap": value})
 
 

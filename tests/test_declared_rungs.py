@@ -122,7 +122,7 @@ def test_declaring_a_name_again_replaces_the_rung():
 
 
 def test_the_packages_own_names_are_refused():
-    with pytest.raises(InputError, match=r"'direct' is declared already, .* give another"):
+    with pytest.raises(InputError, match=r"'direct' is already declared .* give another"):
         declare(Rung("direct", "physical", Physical()))
 
 

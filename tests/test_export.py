@@ -214,8 +214,8 @@ def test_what_cannot_be_exported_is_refused(rgb):
         "light": {"type": "point"},
     }
     case = open_case(scene)
-    with pytest.raises(InputError, match="perspective cameras are exported"):
+    with pytest.raises(InputError, match="only perspective cameras can be exported"):
         exported(case.source, case.options)
     moved = scene | {"sensor": {"type": "perspective", "principal_point_offset_x": 0.1}}
-    with pytest.raises(InputError, match="its principal point is not in the middle"):
+    with pytest.raises(InputError, match="its principal point must be in the middle"):
         exported(Source("moved", moved), case.options)

@@ -118,7 +118,7 @@ def test_any_number_of_lights(rgb, lights):
 
 @opengl
 def test_more_lights_than_the_record_holds_are_refused(rgb):
-    with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights, .* 64 at most"):
+    with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights; .* at most 64"):
         image(room(shader_files.LIGHTS + 1), PHONG)
 
 
@@ -253,8 +253,8 @@ MISTAKES = {
         r"mine\.glsl: .*recursion",
     ),
     "include": ('\n#include "x"\n' + returning("1"), r"mine\.glsl, line 2: .* one file"),
-    "main": (returning("1") + "\nvoid main() {}", r"mine\.glsl, line 2: `main` is not"),
-    "our names": (returning("fotismos_count"), r"mine\.glsl, line 1: .*are taken"),
+    "main": (returning("1") + "\nvoid main() {}", r"mine\.glsl, line 2: leave out `main`"),
+    "our names": (returning("fotismos_count"), r"mine\.glsl, line 1: .*are reserved"),
     "not a number": (returning("sqrt(-1.0 - point.uv.x)"), r"line 1: .* finite.* max\(x, 1e-6\)"),
     "infinite": (returning("1.0 / (point.uv.x * 0.0)"), "line 1: .* finite"),
     "negative": ("\n" + returning("point.normal"), r"line 2: .* 0 or more.* max\(cosine, 0\)"),
@@ -273,17 +273,17 @@ def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"gone\.glsl: there is no such file"):
         named("gone.glsl")
     Path("noise.glsl").write_bytes(b"\xff\xfe\x00vec3")
-    with pytest.raises(InputError, match=r"noise\.glsl: this is not text in UTF-8"):
+    with pytest.raises(InputError, match=r"noise\.glsl is not text in UTF-8"):
         named("noise.glsl")
     Path("long.glsl").write_bytes(b" " * (shader_files.LARGEST + 1))
-    with pytest.raises(InputError, match=r"long\.glsl: 1048577 bytes are too many"):
+    with pytest.raises(InputError, match=r"long\.glsl: 1048577 bytes are too long"):
         named("long.glsl")
 
 
 @opengl
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"])
 def test_other_colours_than_rgb_are_refused(variant):
-    with pytest.raises(InputError, match=rf"has RGB colours, and {variant} has others"):
+    with pytest.raises(InputError, match=rf"needs RGB colours, which {variant} does not have"):
         image("fig-8-9", PHONG, variant=variant)
 
 
@@ -293,7 +293,7 @@ def test_a_symbolic_loop_is_refused(rgb):
     with pytest.raises(RuntimeError) as caught:
         dr.while_loop((mi.UInt32([0, 1]), mi.Spectrum(0)), lambda i, _: i < 2,
                       lambda i, _: (i + 1, shader(point)), mode="symbolic")  # fmt: skip
-    assert "cannot be recorded by Dr.Jit" in str(caught.value.__cause__)
+    assert "Dr.Jit cannot record" in str(caught.value.__cause__)
 
 
 @opengl
@@ -402,5 +402,5 @@ def test_a_uniform_with_bounds_is_a_parameter(rgb, tmp_path):
 def test_a_uniform_without_bounds_is_refused(tmp_path, line):
     path = tmp_path / "x.glsl"
     path.write_text(f"{line}\nvec3 shade(Point point) {{ return vec3(0.5); }}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 1: a uniform here is a parameter"):
+    with pytest.raises(InputError, match=r"line 1: a uniform is a parameter"):
         named(str(path))

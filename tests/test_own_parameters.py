@@ -154,7 +154,7 @@ def test_points_are_done_again_when_the_file_changes(rgb, written):
     ("text", "message"),
     [
         ("heuristic.warp = 1", "parameter of mine.py:? 'warp' is not known .did you mean wrap"),
-        ("heuristic.wrap = [0, 2]", "wrap = 2.0 is not allowed: give one from 0 to 1"),
+        ("heuristic.wrap = [0, 2]", "wrap = 2.0 is not allowed: give a value from 0 to 1"),
     ],
 )
 def test_a_study_refuses_parameters_that_are_not_declared(rgb, written, text, message):

@@ -130,7 +130,7 @@ def test_without_llvm_tests_are_skipped_with_the_reason(suite):
     code, printed = suite("-rs", DRJIT_LIBLLVM_PATH="/nowhere/libLLVM.so")
     assert code == 0
     assert "8 skipped" in printed
-    assert "fotismos cannot render here. There is no LLVM" in printed
+    assert "fotismos cannot render here. Dr.Jit cannot find an LLVM" in printed
 
 
 def test_the_plugin_imports_nothing_heavy():

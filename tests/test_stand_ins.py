@@ -464,8 +464,8 @@ def test_a_slice_is_the_integral_that_it_stands_for():
     [
         ("harmonics-ambient", {}, "it has no environment"),
         ("shadow-map", {"lamp": None}, "it has no lamp"),
-        ("soft-shadow-map", {"lamp": "many"}, "it has 17 lamps, and 16 get a depth image at most"),
-        ("screen-occlusion", {"camera": "orthographic"}, "no single viewpoint, and so no depth"),
+        ("soft-shadow-map", {"lamp": "many"}, "it has 17 lamps, and at most 16 get a depth image"),
+        ("screen-occlusion", {"camera": "orthographic"}, "no single viewpoint, so no depth"),
     ],
 )
 def test_a_scene_that_cannot_be_shaded_so_is_refused_with_the_reason(rgb, model, change, reason):

@@ -136,7 +136,7 @@ def test_what_three_js_does_not_have_is_said(rgb):
     case = open_case(lambda: plane(lamp), Request(heuristic="three:lambert", spp=4,
                                                   resolution=(16, 16)))  # fmt: skip
     said = " ".join(compare(case.source, case.options).record.warnings)
-    for words in ("power of the cosine", "attenuation ends at 1", "highlight, which"):
+    for words in ("power of the cosine", "limit of 1 on its attenuation", "highlight, which"):
         assert words in said
 
 

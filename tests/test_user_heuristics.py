@@ -273,7 +273,7 @@ MISTAKES = {
     ),
     "not finite": (
         "def shade(point): return point.ambient / 0\n",
-        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*expected are .* finite",
+        r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*components must be finite",
     ),
     "root of what is negative": (
         "import drjit as dr\n\n"
@@ -283,15 +283,15 @@ MISTAKES = {
     "negative": (
         "import drjit as dr\n"
         "def shade(point): return dr.dot(point.normal, point.lights[1].toward)\n",
-        r"^mine.py, line 2: .* expected are components that are 0 or more.*drjit.maximum\(cosine",
+        r"^mine.py, line 2: .* components must be 0 or more.*drjit.maximum\(cosine",
     ),
     "shape": (
         "def shade(point): return (1, 2, 3)\n",
-        r"^mine.py, line 1: .* returned a tuple of 3; expected is one colour for each point",
+        r"^mine.py, line 1: .* returned a tuple of 3; return one colour per point",
     ),
     "two components": (
         "import mitsuba as mi\ndef shade(point): return mi.Point2f(point.uv)\n",
-        r"^mine.py, line 2: .*Point2f; expected is .* of 3 components",
+        r"^mine.py, line 2: .*Point2f; return .* of 3 components",
     ),
     "a mask": ("def shade(point): return point.ambient > 0\n", r"line 1: .* returned a .*Array3b"),
     "NumPy": (
@@ -329,7 +329,7 @@ MISTAKES = {
     "bounds": (
         "from heuristic import Range\n"
         "def shade(point, gloss: Range(0, 1) = 2): return gloss\n",
-        r"^mine.py, line 2: gloss = 2.0 is not allowed: give one from 0 to 1",
+        r"^mine.py, line 2: gloss = 2.0 is not allowed: give a value from 0 to 1",
     ),
     "a reserved name": (
         "def shade(point, ambient=1.0): return ambient\n",

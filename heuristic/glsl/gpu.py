@@ -1,4 +1,4 @@
-"""The OpenGL context that shaders run in: one for each thread, without a window."""
+"""The OpenGL context of shaders: one per thread, without a window."""
 
 import os
 import threading
@@ -11,21 +11,21 @@ VERSION = 430
 """OpenGL 4.3, the first with compute shaders."""
 
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
-"""What the renderers of OpenGL that use no graphics card have in their names."""
+"""Parts of the names of OpenGL renderers that do not use a graphics card."""
 
 _kept = threading.local()
 
 
 @dataclass(frozen=True, eq=False)
 class Device:
-    """An OpenGL context of moderngl's, the renderer's own name, and buffers that are kept."""
+    """An OpenGL context of moderngl, the renderer's name, and buffers kept for reuse."""
 
     context: Any
     renderer: str
     kept: dict[int, Any] = field(default_factory=dict)
 
     def buffer(self, number: int, size: int) -> Any:
-        """Return the buffer of a binding, of so many bytes at least; a new one takes long."""
+        """Return a binding's buffer of at least ``size`` bytes; making a new one is slow."""
         found = self.kept.get(number)
         if found is None or found.size < size:
             if found is not None:
@@ -35,7 +35,7 @@ class Device:
 
     @property
     def is_software(self) -> bool:
-        """Whether the processor does the graphics card's work."""
+        """Whether the processor does the work of a graphics card."""
         return any(name in self.renderer.lower() for name in SOFTWARE)
 
 
@@ -45,7 +45,7 @@ def device() -> Device:
     Raises
     ------
     InstallationError
-        When moderngl, or a driver of OpenGL 4.3 that EGL finds, is missing.
+        If moderngl, or a driver for OpenGL 4.3 that EGL finds, is missing.
     """
     pid, found = getattr(_kept, "device", (None, None))
     if found is None or pid != os.getpid():  # a context does not outlive a fork
@@ -59,16 +59,16 @@ def _opened() -> Device:
         import moderngl
     except ImportError as error:
         raise InstallationError(
-            "moderngl is not installed, and heuristics in GLSL need it. Install the extra `glsl`,"
-            " as by pip install 'fotismos[glsl]'."
+            "moderngl is not installed, and heuristics in GLSL need it. Install the extra `glsl`:"
+            " pip install 'fotismos[glsl]'."
         ) from error
     try:
-        options: Any = {"backend": "egl"}  # moderngl's own annotation is of all options as one
+        options: Any = {"backend": "egl"}  # moderngl annotates all options as one
         context = moderngl.create_context(standalone=True, require=VERSION, **options)
-    except Exception as error:  # of several kinds, by which library is missing
+    except Exception as error:  # its type depends on which library is missing
         raise InstallationError(
-            f"there is no OpenGL {VERSION / 100:.1f} by EGL, and heuristics in GLSL need it:"
-            f" {str(error).strip().rstrip('.')}. Install a driver; one that needs no graphics card"
-            " is Mesa's (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)."
+            f"EGL finds no OpenGL {VERSION / 100:.1f}, and heuristics in GLSL need it:"
+            f" {str(error).strip().rstrip('.')}. Install a driver; Mesa's works without a"
+            " graphics card (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)."
         ) from error
     return Device(context, context.info["GL_RENDERER"])

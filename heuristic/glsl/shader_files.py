@@ -18,16 +18,16 @@ from heuristic.points import INPUTS, LightAtPoint, Point
 SIGNATURE = "vec3 shade(Point point)"
 
 LARGEST = 1 << 20
-"""Bytes of a file: a shader is far shorter, and what is longer is something else."""
+"""Bytes of a file at most: a longer one is not a shader."""
 
 LIGHTS = 64
-"""Lights at most: the record of a point holds them all."""
+"""Lights at most: each point's record holds them all."""
 
 FLOATS = 1 << 24
-"""Floats sent at once, half of what OpenGL allows in a buffer at least (128 MiB with Mesa)."""
+"""Floats sent at once: half of what every OpenGL allows in a buffer (128 MiB with Mesa)."""
 
 POINTS = 1 << 20
-"""Points shaded at once at most; OpenGL allows 65,535 work groups."""
+"""Points shaded at once, at most; OpenGL allows 65,535 work groups."""
 
 _opened: dict[tuple[str, Path], Heuristic] = {}
 
@@ -38,9 +38,9 @@ def opened(word: str) -> Heuristic:
     Raises
     ------
     InputError
-        When there is no such file or function, it does not compile, or it fails on trial.
+        If there is no such file or function, it does not compile, or it fails the trial.
     InstallationError
-        When there is no OpenGL to run it.
+        If there is no OpenGL to run it.
     """
     path = Path(word)
     content = _content(path)
@@ -54,35 +54,35 @@ def opened(word: str) -> Heuristic:
 class Shader:
     """A user's GLSL as a function of a :class:`heuristic.points.Point`.
 
-    It evaluates the point's arrays and sends those that its words may read. So it cannot be traced
-    in a loop, and has no derivatives.
+    It evaluates the point's arrays and sends those that its code may read. So it cannot be traced
+    in a loop and has no derivatives.
     """
 
     def __init__(self, file: str, text: str) -> None:
         self.file, self.text = file, text
         self.words = shader_text.words(text)
         self.line = shader_text.line_of_shade(text)
-        self.__qualname__ = f"{file}, line {self.line}"  # what messages call it by
+        self.__qualname__ = f"{file}, line {self.line}"  # its name in messages
         self._programs: dict[int, tuple[gpu.Device, Any]] = {}
 
     def __call__(self, point: Point) -> Any:
-        """Return the colours (3, points) as a Dr.Jit colour; see the module for what is raised."""
+        """Return the colours (3, points) as a Dr.Jit colour; raise InputError if it cannot run."""
         if dr.flag(dr.JitFlag.SymbolicScope):
             raise InputError(
-                f"{self.file}: a shader in GLSL cannot be recorded by Dr.Jit, and is asked for in a"
+                f"{self.file}: Dr.Jit cannot record a shader in GLSL, so it cannot run in a"
                 " symbolic loop. Evaluate that loop, or write the heuristic in Python."
             )
         if not mi.is_rgb:
             raise InputError(
-                f"{self.file}: a shader in GLSL has RGB colours, and {mi.variant()} has others."
-                " Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb for its half."
+                f"{self.file}: a shader in GLSL needs RGB colours, which {mi.variant()} does not"
+                " have. Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb."
             )
         lights = point.lights if "lights" in self.words else ()
         floats = self._floats(point, lights)
         count = dr.width(point.given.position)
         program, device = self._program(max(len(lights), 1))
         for name, value in vars(point.parameters).items():
-            if name in program:  # compilers drop what is not used
+            if name in program:  # compilers drop unused names
                 program[name] = float(np.ravel(value)[0])
         colours = np.empty((count, 3), np.float32)
         step = max(min(POINTS, FLOATS // len(floats)), 1)
@@ -93,7 +93,7 @@ class Shader:
         return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
 
     def compile(self, lights: int = 2) -> None:
-        """Compile it for a number of lights; raise InputError with the lines that are wrong."""
+        """Compile it for a number of lights; raise InputError with the faulty lines."""
         self._program(lights)
 
     def _program(self, lights: int) -> tuple[Any, gpu.Device]:
@@ -103,8 +103,8 @@ class Shader:
             return made, device
         if lights > LIGHTS:
             raise InputError(
-                f"{self.file}: the scene has {lights} lights, and a shader in GLSL gets {LIGHTS} at"
-                " most. Write it in Python, or take lights out of the scene."
+                f"{self.file}: the scene has {lights} lights; a shader in GLSL takes at most"
+                f" {LIGHTS}. Write it in Python, or remove lights from the scene."
             )
         import moderngl
 
@@ -117,7 +117,7 @@ class Shader:
         return made, device
 
     def _floats(self, point: Point, lights: tuple[LightAtPoint, ...]) -> list[np.ndarray]:
-        """Return the arrays of a point, float by float; of length 1 where all points agree."""
+        """Return the arrays of a point, float by float; length 1 where all points agree."""
         fields = shader_text.values(max(len(lights), 1))
         found = [self._value(point, lights, each) for each in fields]
         dr.eval([each for each in found if each is not None])
@@ -127,7 +127,7 @@ class Shader:
     def _value(
         self, point: Point, lights: tuple[LightAtPoint, ...], value: shader_text.Value
     ) -> Any:
-        """Return a field of the record as Dr.Jit has it; None for what the shader does not read."""
+        """Return a field of the record as a Dr.Jit value; None if the shader does not read it."""
         owner, _, field = value.name.rpartition(".")
         if field not in self.words:
             return None
@@ -137,7 +137,7 @@ class Shader:
             return getattr(point.material, field)
         number = int(owner[len("lights[") : -1])
         if number >= len(lights):
-            return None  # a scene without lights has one that is dark
+            return None  # a scene without lights gets a dark one
         found = getattr(lights[number], field)
         return dr.select(found(), mi.Float(1), 0) if field == "visible" else found
 
@@ -149,16 +149,16 @@ def _content(path: Path) -> bytes:
         )
     size = path.stat().st_size
     if size > LARGEST:
-        raise InputError(f"{path}: {size} bytes are too many for a shader: {LARGEST} are allowed.")
+        raise InputError(f"{path}: {size} bytes are too long for a shader: give {LARGEST} at most.")
     return path.read_bytes()
 
 
 def tried(word: str, text: str) -> Heuristic:
-    """Return the heuristic that a text is, after a trial, or raise as :func:`opened`."""
+    """Return the heuristic of a text, after a trial; raises the errors of :func:`opened`."""
     if shader_text.line_of_shade(text) is None:
         raise InputError(
-            f"{word}: there is no function `{SIGNATURE}`. A heuristic in GLSL is that function,"
-            " which returns a display-linear colour."
+            f"{word}: there is no function `{SIGNATURE}`. Add it; it returns a display-linear"
+            " colour."
         )
     if refused := shader_text.refusal(text):
         raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
@@ -182,11 +182,11 @@ def _text(word: str, content: bytes) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{word}: this is not text in UTF-8: {error}.") from error
+        raise InputError(f"{word} is not text in UTF-8: {error}.") from error
 
 
 def _told(word: str) -> tuple[str, tuple[str, ...]]:
-    """Return the label, and the remarks of records: both say of a software GPU that it is one."""
+    """Return the label, and the remarks of records; both mention a software GPU."""
     device, label = gpu.device(), Path(word).stem
     if not device.is_software:
         return label, ()
@@ -212,7 +212,7 @@ def _run(device: gpu.Device, program: Any, floats: list[np.ndarray], count: int)
     places = np.stack([offsets, lengths > 1], axis=1).astype(np.int32)
     sizes = 4 * int(lengths.sum()), places.nbytes, 12 * count
     values, at, colours = (device.buffer(number, size) for number, size in enumerate(sizes))
-    for column, offset in zip(floats, offsets, strict=True):  # a copy less than all at once
+    for column, offset in zip(floats, offsets, strict=True):  # saves one copy
         values.write(column, offset=4 * int(offset))
     at.write(places)
     for number, buffer in enumerate((values, at, colours)):

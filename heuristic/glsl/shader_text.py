@@ -16,9 +16,8 @@ LIGHT = {"toward": 3, "distance": 1, "intensity": 3, "visible": 1}
 
 _TYPES = {1: "float", 2: "vec2", 3: "vec3"}
 _OURS = 1_000_001
-"""Lines of our own after the user's have numbers from here on, by which messages tell them apart.
-
-Mesa 22 has the number of the source string right in some of its messages alone.
+"""Our lines after the user's are numbered from here, so messages can be told apart. Mesa 22 gives
+the right number of the source string only in some of its messages.
 """
 
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
@@ -30,11 +29,10 @@ _PARAMETER = re.compile(
 )
 _UNIFORM = re.compile(r"\s*(?:layout\s*\(.*\)\s*)?uniform\b")
 _REFUSED = {
-    re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader here is one file: put what is included in"
-    " its place",
-    re.compile(r"\bvoid\s+main\s*\("): "`main` is not the shader's: leave it out, and fotismos"
-    " calls `shade` for each point",
-    re.compile(r"\b\w*fotismos_\w*"): "names with `fotismos_` are taken: choose another one",
+    re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader is one file here: paste the included"
+    " text in its place",
+    re.compile(r"\bvoid\s+main\s*\("): "leave out `main`: fotismos calls `shade` for each point",
+    re.compile(r"\b\w*fotismos_\w*"): "names with `fotismos_` are reserved: choose another one",
 }
 
 
@@ -47,19 +45,19 @@ class Value:
 
 
 def bare(text: str) -> str:
-    """Return GLSL without its comments, line by line as it was."""
+    """Return GLSL without its comments, with the same lines."""
     return _COMMENT.sub(lambda found: "\n" * found[0].count("\n") or " ", text)
 
 
 def line_of_shade(text: str) -> int | None:
-    """Return the line on which ``vec3 shade(Point point)`` begins, None where it is missing."""
+    """Return the line on which ``vec3 shade(Point point)`` begins, None if it is missing."""
     code = bare(text)
     found = _SHADE.search(code)
     return code.count("\n", 0, found.start()) + 1 if found else None
 
 
 def words(text: str) -> frozenset[str]:
-    """Return the words of the code: what is not among them is not read."""
+    """Return the words of the code; it cannot read anything else."""
     return frozenset(re.findall(r"\b[A-Za-z_]\w*", bare(text)))
 
 
@@ -75,7 +73,7 @@ def values(lights: int) -> tuple[Value, ...]:
 def program(text: str, lights: int) -> str:
     """Return the compute shader that calls a user's ``shade`` for all points.
 
-    Each float has a place ``(offset, stride)`` in one buffer: the stride is 0 where all points have
+    Each float has a place ``(offset, stride)`` in one buffer: the stride is 0 if all points have
     the same value, else 1.
     """
     whole = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
@@ -114,13 +112,13 @@ def parameters(text: str) -> list[tuple[str, float, float, float]]:
 
 
 def refusal(text: str) -> tuple[int, str] | None:
-    """Return the line of what no shader here may have, and what to do; None where all is well."""
+    """Return the line of a forbidden word, and what to do; None if there is none."""
     for number, (line, own) in enumerate(
         zip(text.splitlines(), bare(text).splitlines(), strict=False), 1
     ):
         if _UNIFORM.match(own) and not _PARAMETER.match(line):
             return number, (
-                "a uniform here is a parameter: write its default and bounds, as in"
+                "a uniform is a parameter: write its default and bounds, as in"
                 " `uniform float wrap = 0.5;  // 0 to 1`"
             )
     code = bare(text)

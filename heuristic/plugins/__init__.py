@@ -4,7 +4,7 @@
 Plugin                      Kind        What it is
 ==========================  ==========  ==========================================================
 ``phong``                   BSDF        diffuse and specular terms behind Mitsuba's BSDF interface
-``heuristic``               integrator  calls the kernel :func:`heuristic.shade` at what a ray hits
+``heuristic``               integrator  calls the kernel :func:`heuristic.shade` where a ray hits
 ``heuristic_point``         emitter     point light with the chapters' attenuation
 ``heuristic_spot``          emitter     spot light with cone, exponent and attenuation
 ``heuristic_directional``   emitter     parallel light
@@ -12,7 +12,7 @@ Plugin                      Kind        What it is
                                         integrators; it lights nothing else
 ``heuristic_product`` …     textures    coefficients computed from textures
                                         (:mod:`heuristic.plugins.mapped`)
-``heuristic_tilt``          texture     the normal that a bump or normal map gives
+``heuristic_tilt``          texture     the normal from a bump or normal map
 ==========================  ==========  ==========================================================
 """
 
@@ -26,14 +26,14 @@ _registered: set[str] = set()
 
 
 def register() -> None:
-    """Make the plugins known to Mitsuba, for the current variant. Calling it again does nothing.
+    """Register the plugins with Mitsuba for the current variant. Calling it again does nothing.
 
     Raises
     ------
     InputError
-        When no variant is set, or the current one is polarised.
+        If no variant is set, or the current one is polarised.
     InstallationError
-        When Dr.Jit found no LLVM that it can work with.
+        If Dr.Jit found no usable LLVM.
     """
     variant = mi.variant()
     if variant is None or "polarized" in variant:

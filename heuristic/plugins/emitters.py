@@ -31,8 +31,8 @@ Parameter       Type (default)       Meaning
 ``twosided``    boolean (false)      glow on both sides
 ==============  ===================  ===============================================================
 
-Neither term is a matter of reflection, so no BSDF can hold them. Attached to a shape, this emitter
-shows ``k_i + I_a k_a`` where a camera ray meets the shape, and lights nothing: in the model,
+Neither term is reflection, so a BSDF cannot hold them. Attached to a shape, this emitter
+shows ``k_i + I_a k_a`` where a camera ray hits the shape, and lights nothing: in the model,
 emission and ambient light do not travel.
 """
 
@@ -49,8 +49,8 @@ from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLig
 from heuristic.plugins.spectra import coefficient, emitted
 
 FAR = 1e8
-"""Where shadow rays of parallel light end: outside any scene. Mitsuba does not tell a plugin in
-Python how large the scene is, and rays of this length still keep their direction to 1e-7."""
+"""Where shadow rays of parallel light end: outside any scene. A Python plugin does not learn the
+size of the scene from Mitsuba, and rays of this length still keep their direction to 1e-7."""
 
 
 def define() -> None:
@@ -70,7 +70,7 @@ def define() -> None:
         return plugin
 
     class HeuristicEmitter(mi.Emitter):
-        """What all kinds share: a position-free delta light that is never hit by a ray."""
+        """Base of all kinds: a delta light without a position, never hit by a ray."""
 
         model: type[Light]
 
@@ -89,7 +89,7 @@ def define() -> None:
                     self._keep(props, name, mi.Float, default)
 
         def parameters_changed(self, keys=()):
-            """Make edited numbers opaque, so that a new value compiles nothing."""
+            """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(*(getattr(self, name) for name in self.numbers))
             if coefficients.keys() & set(keys):
                 self.unattenuated = False
@@ -108,7 +108,7 @@ def define() -> None:
 
         @property
         def attenuation(self):
-            """The coefficients of 6.1; plain numbers where they are 1, 0 and 0."""
+            """The coefficients of 6.1; plain numbers if they are 1, 0 and 0."""
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
         def eval(self, si, active=True):
@@ -156,7 +156,7 @@ def define() -> None:
             self.m_flags = +mi.EmitterFlags.DeltaPosition
 
         def sample_direction(self, it, sample, active=True):
-            # Divided by its largest component first: the square need not lie in the type's range.
+            # Divided by its largest component first: its square may be out of the type's range.
             half = 0.5 * self.position - 0.5 * it.p
             size = dr.max(abs(half))
             is_away = size >= numerics.smallest(size)

@@ -1,4 +1,4 @@
-"""The integrator plugin ``heuristic``: shading at the first surface that a camera ray meets.
+"""The integrator plugin ``heuristic``: shading at the first surface that a camera ray hits.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
@@ -12,16 +12,16 @@ Parameter           Type (default)      Meaning
 ``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
                                         chapters' model does not
 ``prune``           boolean (true)      trace only the terms that some material of the scene has
-``hide_emitters``   boolean (false)     show black instead of the environment where a ray meets
-                                        nothing
+``hide_emitters``   boolean (false)     show black instead of the environment where a ray
+                                        hits nothing
 ==================  ==================  ===========================================================
 
-The parameters that the heuristic declares are floats beside these.
+The parameters that the heuristic declares are additional floats.
 
 It works on scenes whose BSDFs are ``phong`` and whose lights are ``heuristic_*`` plugins; an
 environment emitter is background only. Films, samplers, cameras, filters and AOVs are Mitsuba's.
-The first thing drawn from the sampler is the camera ray, as in ``direct`` and ``path``, so that
-equal seeds give equal rays. Python::
+The camera ray is drawn from the sampler first, as in ``direct`` and ``path``, so equal seeds give
+equal rays. Python::
 
     {'type': 'heuristic', 'ambient': 1.0}
 """
@@ -43,15 +43,15 @@ from heuristic.plugins.spectra import emitted, may_be_nonzero
 from heuristic.points import Given
 
 LAYERS = 64
-"""Surfaces that a camera ray passes at most: a bound for a tower of empty ones."""
+"""Surfaces that a camera ray passes at most: a bound for stacks of empty ones."""
 
 
 @dataclass
 class _Known:
-    """What a rendering needs to know of a scene, and the scene's parts.
+    """What a rendering needs to know about a scene, and the scene's parts.
 
-    ``prepared`` is what the heuristic prepares for it with ``values`` of its parameters, None where
-    it prepares nothing, and ``seconds`` the time that this took.
+    ``prepared`` is the heuristic's preparation with ``values`` of its parameters, None if it has
+    none; ``seconds`` is the time that it took.
     """
 
     parts: list[mi.Object]
@@ -61,7 +61,7 @@ class _Known:
     seconds: float
 
     def is_of(self, parts: list[mi.Object], values: dict[str, float]) -> bool:
-        """Tell whether these are the parts of the scene, and the values it was prepared with."""
+        """Return whether the scene has these parts and was prepared with these values."""
         is_same = len(parts) == len(self.parts) and all(map(is_, parts, self.parts))
         return is_same and values == self.values
 
@@ -83,12 +83,12 @@ def define() -> None:
             self.parameters_changed()
             self._known = None
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
-            # A user's own gets arrays alone: a plain 0 has no components.
+            # A user's heuristic gets only arrays: a plain 0 has no components.
             self.prune = props.get("prune", True) and self.model.is_own
             self.interpolation = _interpolation(props)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
-            materials = self.known(scene).materials  # which a symbolic loop could not make
+            materials = self.known(scene).materials  # a symbolic loop could not make them
             if any(bsdf.is_clear for bsdf in materials.bsdfs):
                 recorded = self.model.traced and dr.flag(dr.JitFlag.SymbolicLoops)
                 with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, recorded):
@@ -99,7 +99,7 @@ def define() -> None:
             return colour, active if sees_all else hit, []
 
         def layer(self, scene, ray, active):
-            """Return what a ray shows where it first hits, or else the background; and the hit."""
+            """Return the value where a ray first hits, or else the background; and the hit."""
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
             colour = self.surface_colour(scene, si, mi.Vector3f(-ray.d), hit)
@@ -109,7 +109,7 @@ def define() -> None:
             return colour, hit, si
 
         def surface_colour(self, scene, si, view, active):
-            """Return the value that is seen at what a ray hits: the normal of 6.37 and 6.38."""
+            """Return the value seen where a ray hits, with the normal of 6.37 and 6.38."""
             normal, is_shaded = self.seen_side(scene, si, active)
             colour = self.shaded(scene, si, view, normal, active)
             return dr.select(active & is_shaded, colour, 0)
@@ -142,8 +142,8 @@ def define() -> None:
             )
 
         def known(self, scene):
-            """Return what is :class:`_Known` of a scene, made once for all that is traced of it."""
-            # Its parts tell one scene from another: to hold a scene would be a cycle, never freed.
+            """Return the :class:`_Known` of a scene, made once for everything traced of it."""
+            # Its parts identify a scene: holding the scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
             values = self._prepared_with
             if self._known is None or not self._known.is_of(parts, values):
@@ -158,7 +158,7 @@ def define() -> None:
             return self._known
 
         def prepare(self, scene):
-            """Make what a rendering needs to know of a scene, which the first sample does else."""
+            """Collect what a rendering needs; otherwise the first sample does."""
             self.known(scene)
 
         @property
@@ -171,16 +171,16 @@ def define() -> None:
             return [emitter.light(si, active) for emitter in _lights(scene)]
 
         def ambient_at(self, si, active):
-            """Return ``I_a``, a plain 0 where there is none."""
+            """Return ``I_a``, a plain 0 if there is none."""
             is_there = may_be_nonzero(self.ambient) or not self.prune
             return self.ambient.eval(si, active) if is_there else 0
 
         def visibility(self, scene, si, active):
-            """Return the shadow test for :func:`heuristic.shade`, None where there is none."""
+            """Return the shadow test for :func:`heuristic.shade`, None if there is none."""
             return _shadow_test(scene, si, active) if self.occlusion else None
 
         def twosided(self, scene, si, active):
-            """Return whether the surface is two-sided; a plain False where none of the scene is."""
+            """Return whether the surface is two-sided; a plain False if none of the scene is."""
             return self.known(scene).materials.twosided(si, active)
 
         def traverse(self, callback):
@@ -188,7 +188,7 @@ def define() -> None:
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
-            """Make edited numbers opaque, so that a new value compiles nothing."""
+            """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(self.parameters)
             prepared = [known.name for known in self.model.parameters if known.prepared]
             self._prepared_with = {name: float(self.parameters[name][0]) for name in prepared}
@@ -211,10 +211,10 @@ def define() -> None:
 
 @dr.syntax
 def _through_layers(integrator, scene, ray, active):
-    """Follow rays straight through what lets light through, at most :data:`LAYERS` surfaces.
+    """Follow rays straight through surfaces that transmit light, at most :data:`LAYERS` of them.
 
-    ``C = sum_j c_j prod_(i < j) T_i``: each surface adds its own light ``c_j``, in which its
-    opacity is contained, behind the transmittances ``T_i`` of those before it.
+    ``C = sum_j c_j prod_(i < j) T_i``: each surface adds its light ``c_j``, which includes its
+    opacity, behind the transmittances ``T_i`` of those before it.
     """
     colour, throughput = mi.Spectrum(0), mi.Spectrum(1)
     hit_any = mi.Bool(False)
@@ -242,7 +242,7 @@ def _shadow_test(scene, si, active):
     """Return the test whether a light in some direction, at some distance, is seen from ``si``."""
 
     def visible(toward, distance):
-        # Mitsuba aims at a point for parallel light too, and grazing rays feel the difference.
+        # Mitsuba aims at a point for parallel light too, which matters for grazing rays.
         distance = FAR if isinstance(distance, float) else distance
         return ~scene.ray_test(si.spawn_ray_to(si.p + toward * distance), active)
 
@@ -250,7 +250,7 @@ def _shadow_test(scene, si, active):
 
 
 def _lights(scene):
-    """Return the emitters that light the scene, refusing those that the model does not know."""
+    """Return the emitters that light the scene; reject those that the model does not know."""
     lights = []
     for emitter in scene.emitters():
         if hasattr(emitter, "light"):

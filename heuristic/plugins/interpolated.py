@@ -1,8 +1,8 @@
 """The integrator ``heuristic`` with ``interpolation`` ``flat`` or ``gouraud`` (6.6.1, 6.35, 6.36).
 
-In RGB variants the heuristic runs once a vertex or face before the rendering, for the sensor that
+In RGB variants the heuristic runs once per vertex or face before the rendering, for the sensor that
 renders, and Mitsuba interpolates the stored values. Spectral variants draw other wavelengths for
-each ray; there the heuristic runs at the corners of the face that a ray meets.
+each ray; there the heuristic runs at the corners of the face that a ray hits.
 """
 
 from typing import Any
@@ -48,7 +48,7 @@ def interpolating(base: type) -> type:
                     self.lights(scene, at, True),
                     self.ambient_at(at, True),
                     self.visibility(scene, at, True),
-                    # Stored for all, because reading cannot tell the shapes apart.
+                    # Stored for all, because reading cannot distinguish the shapes.
                     twosided=any(shape.bsdf().twosided for shape in scene.shapes()),
                     model=self.model_at(scene, at),
                 )
@@ -72,18 +72,18 @@ def interpolating(base: type) -> type:
 
 
 def _meshes(scene):
-    """Return the scene's shapes, refusing those that are no meshes."""
+    """Return the scene's shapes; reject those that are not meshes."""
     for shape in scene.shapes():
         if not shape.is_mesh():
             raise InputError(
                 f"shape {shape.id()!r} is a {shape.class_name()}: flat and Gouraud shading need"
-                " triangle meshes. heuristic.meshes.to_mesh makes one; fotismos does so by itself."
+                " triangle meshes. Make one with heuristic.meshes.to_mesh; fotismos does so itself."
             )
     return scene.shapes()
 
 
 def viewpoint(sensor: Any) -> Position:
-    """Return the viewer's position, refusing cameras that have none."""
+    """Return the viewer's position; reject cameras without one."""
     if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
         raise InputError(
             f"sensor {sensor.id()!r} ({sensor.class_name()}) has no single viewpoint, which flat"

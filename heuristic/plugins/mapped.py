@@ -8,16 +8,16 @@ Plugin                   Operands                            Value
 ``heuristic_rest``       ``a``, scalar ``weight``            ``a (1 - weight)``
 ``heuristic_sum``        ``a``, ``b``                        ``a + b``
 ``heuristic_blend``      ``a``, ``b``, scalar ``weight``     ``a (1 - weight) + b weight``
-``heuristic_sides``      ``front``, ``back``                 the one of the side that is seen
+``heuristic_sides``      ``front``, ``back``                 the value of the side that is seen
 ``heuristic_exponent``   scalar ``alpha``                    ``(1 / alpha^2 - 1) / 2``, 0 or more
 ``heuristic_interior``   ``rho``; numbers ``scale``,         ``scale rho / (1 - rho return)``
                          ``return``
 =======================  ==================================  =======================================
 
 Operands are numbers, colours or textures. Scalars are read as Mitsuba reads an ``alpha`` or an
-opacity (``eval_1``), weights clipped to [0, 1], the others in the form that is asked for.
+opacity (``eval_1``), weights clipped to [0, 1], the others in the requested form.
 
-Beside them stands ``heuristic_tilt``: the shading normal that a bump or normal map gives.
+Also here is ``heuristic_tilt``: the shading normal from a bump or normal map.
 
 ==================  ==================  ============================================================
 Parameter           Type                Meaning
@@ -38,7 +38,7 @@ import drjit as dr
 import mitsuba as mi
 
 SMALLEST_ALPHA = 1e-4
-"""Mitsuba takes every smaller roughness for this one."""
+"""Mitsuba replaces every smaller roughness by this one."""
 
 SCALARS = ("weight", "alpha")
 LARGEST = 1e9
@@ -82,7 +82,7 @@ def define() -> None:
             self.children = {name: _operand(props, name) for name in self.operands}
 
         def value(self, si, *operands):
-            """Return the value for those of the operands."""
+            """Return the value for the values of the operands."""
             raise NotImplementedError
 
         def eval(self, si, active=True):
@@ -129,7 +129,7 @@ def define() -> None:
         return Operation
 
     class Interior(Mapped):
-        """Light that a diffuse base sends out again after any number of inner reflections."""
+        """Light that leaves a diffuse base after any number of inner reflections."""
 
         operands = ("rho",)
 

@@ -4,7 +4,7 @@
 Parameter           Type (default)    Meaning
 ==================  ================  =============================================================
 ``k_i``, ``k_a``    spectrum (0)      emission and ambient coefficient; read by the integrator
-                                      ``heuristic`` alone, as they are no matter of reflection
+                                      ``heuristic`` only, since they are not reflection
 ``k_d``, ``k_s``    spectrum or       diffuse and specular coefficient
                     texture (0)
 ``n``               float or          Phong's exponent
@@ -13,10 +13,10 @@ Parameter           Type (default)    Meaning
 ``normalised``      boolean (false)   scale the lobe so that ``k_s`` is its albedo at normal
                                       incidence
 ``twosided``        boolean (false)   shade the side that faces the viewer, whichever it is
-``transmittance``   spectrum or       share of the light that passes straight through, beside what
+``transmittance``   spectrum or       share of the light that passes straight through, besides what
                     texture (0)       the other coefficients reflect: a null component
 ``tilt``            texture (none)    unit normal in the shading frame, such as ``heuristic_tilt``;
-                                      read by the integrator ``heuristic`` alone
+                                      read only by the integrator ``heuristic``
 ==================  ================  =============================================================
 
 All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
@@ -25,7 +25,7 @@ All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
 
 The reflected radiance for irradiance ``E`` at normal incidence is 8.10's for ``I_p = E / pi``
 (:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
-has no cosine of its own; as the chapters have it, it neither conserves energy nor is reciprocal.
+has no cosine factor; as in the chapters, it neither conserves energy nor is reciprocal.
 """
 
 from functools import reduce
@@ -43,7 +43,7 @@ from heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_fo
 from heuristic.plugins.spectra import coefficient, emitted, may_be_nonzero
 
 SMALLEST_SAMPLE = 2.0**-25
-"""In place of a random number of 0, which stands for all those below 2^-24."""
+"""In place of a random number of 0, which represents all numbers below 2^-24."""
 
 
 def define() -> None:
@@ -127,7 +127,7 @@ def define() -> None:
                 return self._reflected(ctx, si, sample1, sample2, active)
             probability = self._through_probability(ctx, si, active)
             passes = active & (sample1 < probability)
-            # What is left of the number is uniform again, and chooses between the other two.
+            # The rest of the number is uniform again, and chooses between the other two.
             sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
             reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
             straight = dr.zeros(mi.BSDFSample3f)
@@ -147,7 +147,7 @@ def define() -> None:
             return self.k_d.eval(si, active)
 
         def _reflected(self, ctx, si, sample1, sample2, active):
-            """Draw ``wo`` among what the diffuse part and the lobe reflect."""
+            """Draw ``wo`` from the diffuse part and the lobe."""
             (wi,) = self._facing(si.wi)
             active = active & (wi.z > 0)
             probability = self._specular_probability(ctx, si, active)
@@ -179,10 +179,10 @@ def define() -> None:
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
-            """Note which coefficients can be other than zero, and make the exponent opaque.
+            """Note which coefficients can be non-zero, and make the exponent opaque.
 
-            An opaque exponent can change without a new compilation, as fits and sweeps need, as
-            long as it stays moderate, or does not (:data:`heuristic.numerics.MODERATE_EXPONENTS`).
+            An opaque exponent can change without a new compilation, as fits and sweeps need, unless
+            it crosses the bounds of :data:`heuristic.numerics.MODERATE_EXPONENTS`.
             """
             self.present = {
                 name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
@@ -196,7 +196,7 @@ def define() -> None:
                 self.n_is_moderate = all(map(numerics.is_moderate, np.ravel(self.n).tolist()))
 
         def _set_components(self):
-            """Tell Mitsuba of the lobe, the diffuse part and what passes, in this order."""
+            """Declare the lobe, the diffuse part and the null component, in this order."""
             front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
             sides = front | (back if self.twosided else 0)
             self.m_components = [
@@ -214,7 +214,7 @@ def define() -> None:
             return f"PhongBSDF[{parts}, twosided = {self.twosided}]"
 
         def _facing(self, wi, *directions):
-            """Turn directions to the viewer's side where both sides are shaded."""
+            """Turn directions to the viewer's side if both sides are shaded."""
             if not self.twosided:
                 return wi, *directions
             return tuple(dr.mulsign(direction, wi.z) for direction in (wi, *directions))
@@ -233,7 +233,7 @@ def define() -> None:
             return dr.select(total > 0, specular / total, 0.5)
 
         def _through_probability(self, ctx, si, active):
-            """Share of samples that go straight on: the transmittance's part of all that leaves."""
+            """Share of samples that pass straight through."""
             if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
                 return mi.Float(0)
             clear = dr.mean(self.transmittance.eval(si, active))
@@ -241,7 +241,7 @@ def define() -> None:
             return dr.select(total > 0, clear / total, 0)
 
         def _albedos(self, si, active):
-            """Return what the two parts reflect at normal incidence, the mean over channels."""
+            """Return the albedo of the two parts at normal incidence, the mean over channels."""
             n = self.exponent(si, active)
             albedo = self._scale(n) / terms.normalisation(self.form, n)
             k_d, k_s = (dr.mean(k.eval(si, active)) for k in (self.k_d, self.k_s))
@@ -258,9 +258,9 @@ def define() -> None:
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
 
             That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
-            the normal, at which ``wi`` is then mirrored. Its cosine is ``u^(1/(n + 1))``, of which
-            ``1 - c^2`` would leave nothing for large ``n``: with ``c = 2^-x`` the sine comes from
-            ``1 - 2^(-2x)`` (:func:`heuristic.numerics.one_less_exp2`).
+            the normal, at which ``wi`` is then mirrored. Its cosine is ``u^(1/(n + 1))``, whose ``1
+            - c^2`` would vanish for large ``n``: with ``c = 2^-x`` the sine comes from ``1 -
+            2^(-2x)`` (:func:`heuristic.numerics.one_less_exp2`).
             """
             halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (n + 1)
             sine = dr.sqrt(numerics.one_less_exp2(2 * halvings))
@@ -274,7 +274,7 @@ def define() -> None:
         def _lobe_pdf(self, wi, wo, n):
             """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``.
 
-            ``wi.H = |wi + wo| / 2``, which is 0 for opposite directions alone.
+            ``wi.H = |wi + wo| / 2``, which is 0 only for opposite directions.
             """
             density = (n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), n)
             if self.form == "blinn":
@@ -285,7 +285,7 @@ def define() -> None:
 
 
 PARTNER = {"alpha": 1.0, "ior": 1.0, "metallic": 0.0}
-"""Single numbers of the physical partner, and what they are where it has none."""
+"""Single numbers of the physical partner, with their defaults."""
 
 
 def _number(props, name, default):

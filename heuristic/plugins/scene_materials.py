@@ -1,4 +1,4 @@
-"""The materials of a scene, read at what a ray hits."""
+"""The materials of a scene, read where a ray hits."""
 
 from typing import ClassVar
 
@@ -12,10 +12,10 @@ from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
 
 
 class SceneMaterials:
-    """The ``phong`` BSDFs of a scene, and what they are at a surface interaction.
+    """The ``phong`` BSDFs of a scene, and their values at a surface interaction.
 
-    ``prune`` leaves out the terms that no material has; ``form`` is in place of the materials' own;
-    ``physical`` reads the parameters of the physical partners, too
+    ``prune`` leaves out the terms that no material has; ``form`` replaces the materials' own;
+    ``physical`` also reads the parameters of the physical partners
     (:class:`heuristic.materials.PairedMaterial`).
 
     Raises
@@ -24,7 +24,7 @@ class SceneMaterials:
         For a BSDF that is not a ``phong``.
     """
 
-    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze has to know of
+    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze must know of
 
     def __init__(
         self, scene: Scene, prune: bool = True, form: str | None = None, physical: bool = False
@@ -44,8 +44,8 @@ class SceneMaterials:
     def at(self, si: Interaction, active: Mask) -> list[tuple[Material, Mask]]:
         """Return the materials at a surface interaction, as pairs of a material and a mask.
 
-        There is one pair for each form of the lobe that the scene has, since the form decides on
-        the kernel's code; the mask tells where it holds.
+        There is one pair for each form of the lobe in the scene, since the form determines the
+        kernel's code; the mask says where it applies.
         """
         if not self.bsdfs:
             return []  # a scene without shapes
@@ -77,14 +77,14 @@ class SceneMaterials:
         return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
 
     def transmittance(self, si: Interaction, active: Mask) -> Colour:
-        """Return the share of light that passes straight through; a plain 0 where none can."""
+        """Return the share of light that passes straight through; a plain 0 if none can."""
         if not any(bsdf.is_clear for bsdf in self.bsdfs):
             return 0
         readers = [_transmittance_of(bsdf) for bsdf in self.bsdfs]
         return dr.select(active, self._switch(readers, si, active), 0)
 
     def normal(self, si: Interaction, active: Mask) -> Direction:
-        """Return the shading normal in world space, bump and normal maps applied."""
+        """Return the shading normal in world space, with bump and normal maps applied."""
         if not any(bsdf.tilt for bsdf in self.bsdfs):
             return mi.Vector3f(si.sh_frame.n)
         readers = [_normal_of(bsdf) for bsdf in self.bsdfs]
@@ -102,7 +102,7 @@ class SceneMaterials:
 
 
 def _reader(bsdf, present, form, physical):
-    """Return the function that reads one BSDF's coefficients, normalisation applied."""
+    """Return the function that reads one BSDF's coefficients, normalisation included."""
 
     def read(si, active):
         material = bsdf.material(si, active, form=form, physical=physical)
@@ -130,7 +130,7 @@ def _normal_of(bsdf):
 
 
 def _bsdfs(scene):
-    """Return the BSDFs of a scene; those inside shape groups show by traversing it alone."""
+    """Return the BSDFs of a scene; only traversal finds those inside shape groups."""
     shapes = scene.shapes()
     if not any(shape.class_name() == "Instance" for shape in shapes):
         return [shape.bsdf() for shape in shapes]
@@ -150,5 +150,5 @@ def _bsdfs(scene):
 
 
 def _registry_index(bsdf):
-    """Return the number under which Dr.Jit knows a BSDF, as found in ``si.bsdf()``."""
+    """Return Dr.Jit's number of a BSDF, as found in ``si.bsdf()``."""
     return int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])

@@ -1,4 +1,4 @@
-"""Reading the spectra of plugin parameters, alike in all variants."""
+"""Reading the spectra of plugin parameters in the same way in all variants."""
 
 from numbers import Real
 from typing import Any
@@ -10,10 +10,10 @@ from heuristic import colours
 
 
 def coefficient(props: Any, name: str) -> Any:
-    """Read a reflection coefficient, 0 where it is not given.
+    """Read a reflection coefficient, 0 if omitted.
 
-    Up to 1 it is a reflectance like any other of Mitsuba's, with the same spectrum for the same
-    RGB; above 1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
+    Up to 1 it is an ordinary reflectance of Mitsuba, with the same spectrum for the same RGB; above
+    1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
     """
     value = _plain(props, name, 0.0)
     if value is not None and max(value) > 1:
@@ -24,7 +24,7 @@ def coefficient(props: Any, name: str) -> Any:
 def emitted(props: Any, name: str, default: Any) -> Any:
     """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
 
-    Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum out of nothing.
+    Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum of zero.
     """
     value = _plain(props, name, default)
     if value is not None and max(value) == 0:
@@ -43,7 +43,7 @@ def _plain(props, name, default):
 
 
 def may_be_nonzero(texture: Any) -> bool:
-    """Tell whether a texture can be other than zero anywhere; one that cannot tell counts as so."""
+    """Return whether a texture can be non-zero anywhere; True if unknown."""
     if texture.is_spatially_varying():
         return True
     try:

@@ -1,8 +1,8 @@
-"""What engines use in place of light transport, one heuristic in each module.
+"""What engines use in place of light transport, one heuristic per module.
 
-Their light is display-linear as the kernel's is (:mod:`heuristic.convention`). What they prepare
-for a scene is gathered in its heuristic half alone, and is the same in every run. The records of it
-are not frozen, since ``dr.freeze`` puts other arrays in their place.
+Their light is display-linear, like the kernel's (:mod:`heuristic.convention`). They prepare for a
+scene from its heuristic half alone, with the same result in every run. Its dataclasses are not
+frozen, since ``dr.freeze`` replaces their arrays.
 """
 
 from heuristic.stand_ins import (

@@ -1,7 +1,7 @@
-"""What stand-ins for indirect light share: the chapters' model with other light for ``I_a``.
+"""Shared by stand-ins for indirect light: the chapters' model with other light for ``I_a``.
 
-``I_a`` stands for the environment where the scene has one, and is then replaced. Where the scene
-has an ``I_a`` of its own it stays, and what surfaces reflect joins it.
+``I_a`` stands for the environment if the scene has one, and is then replaced. If the scene has its
+own ``I_a``, it stays, and the light reflected by surfaces is added.
 """
 
 from typing import Any
@@ -11,15 +11,15 @@ from heuristic.points import Array, Point
 
 
 def has_environment(scene: Any) -> bool:
-    """Tell whether a scene has an environment, whose light ``I_a`` stands for."""
+    """Return whether a scene has an environment, whose light ``I_a`` stands for."""
     return scene.environment() is not None
 
 
 def lit(point: Point, arriving: Array, replaces_ambient: bool, share: Array = 1) -> Array:
-    """Return the chapters' model, and ``k_d`` times the light that arrives from all around.
+    """Return the chapters' model plus ``k_d`` times the light that arrives from all around.
 
-    ``arriving`` is ``E / pi``, display-linear; ``share`` is how much of an ``I_a`` that stays is
-    not hidden.
+    ``arriving`` is ``E / pi``, display-linear; ``share`` is the unhidden share of an ``I_a`` that
+    stays.
     """
     ambient = point.given.ambient
     is_there = not (replaces_ambient or colours.is_zero(colours.checked("ambient", ambient)))

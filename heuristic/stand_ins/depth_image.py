@@ -1,15 +1,15 @@
 """Ambient occlusion from the camera's depth image: horizons about each point, as engines do it.
 
 Jimenez, Wu, Pesce and Jarabo, "Practical real-time strategies for accurate indirect occlusion"
-(2016). The hemisphere is cut into slices that hold the view vector. In a slice, what the image has
-near by leaves free the angles from ``h1`` to ``h2`` about the view, of which a surface that is
-inclined with ``g`` in the slice sees, weighted by the cosine::
+(2016). The hemisphere is cut into slices that hold the view vector. In a slice, nearby points of
+the image leave free the angles from ``h1`` to ``h2`` about the view. A surface inclined by ``g`` in
+the slice sees of them, weighted by the cosine::
 
     a(h1) + a(h2)   with   a(h) = (cos g - cos(2 h - g) + 2 h sin g) / 4
 
-times the length of the normal's projection. The sum over slices is divided by what it is where
-nothing is near, so that open surfaces have an openness of 1 with any number of slices. What the
-image does not show hides nothing.
+times the length of the normal's projection. The sum over slices is divided by its value with
+nothing near, so open surfaces have an openness of 1 for any number of slices. Anything not in the
+image hides nothing.
 """
 
 from dataclasses import dataclass
@@ -30,18 +30,19 @@ from heuristic.stand_ins.tabulated import Table
 
 SLICES = 4
 STEPS = 8
-"""To each side of a slice."""
+"""Samples on each side of a slice."""
 
 OWN = 1e-3
-"""What is nearer than this share of the reach is the surface itself."""
+"""Anything nearer than this share of the reach is the surface itself."""
 
 ABOVE = 0.05
-"""And so is what rises less above its tangent plane: the sine of an angle. Pixels are coarse."""
+"""So is anything that rises less above its tangent plane: the sine of an angle. Pixels are
+coarse."""
 
 
 @dataclass
 class DepthImage:
-    """What each pixel of a camera sees, at its centre.
+    """The point that a camera sees at the centre of each pixel.
 
     Attributes
     ----------
@@ -62,7 +63,7 @@ class DepthImage:
     axes: Any
 
     def at(self, position: Any) -> Any:
-        """Return what the image shows where a position would be seen; infinite where nothing."""
+        """Return the image's point where a position would be seen; infinite if there is none."""
         it = dr.zeros(mi.Interaction3f)
         it.p = position
         sample, _ = self.sensor.sample_direction(it, mi.Point2f(0.5))
@@ -97,7 +98,7 @@ def openness(image: DepthImage, position: Any, normal: Any, view: Any, reach: An
     found, whole = mi.Float(0), mi.Float(0)
     shift, turn = hashed(position)
     right, up = (dr.gather(mi.Vector3f, image.axes, mi.UInt32(axis)) for axis in (0, 1))
-    reach = mi.Float(reach)  # a loop may widen what it is given
+    reach = mi.Float(reach)  # a loop may widen its argument
     for number in range(SLICES):
         sine, cosine = dr.sincos((number + turn) * (pi / SLICES))
         across = right * cosine + up * sine
@@ -119,7 +120,7 @@ def openness(image: DepthImage, position: Any, normal: Any, view: Any, reach: An
 def _horizon(
     image: DepthImage, position: Any, normal: Any, view: Any, across: Any, reach: Any, shift: Any
 ) -> Any:
-    """Return the angle from the view to the highest thing to one side, pi where nothing is near."""
+    """Return the angle from the view to the highest thing on one side, pi if nothing is near."""
     cosine, number = mi.Float(-1), mi.UInt32(0)
     while dr.hint(number < STEPS, exclude=[image]):
         far = reach * dr.square((mi.Float(number) + 1 - 0.5 * shift) / STEPS)
@@ -134,7 +135,7 @@ def _horizon(
 
 @dataclass
 class Shown:
-    """Ambient light where nothing is near, the depth image, and the reach in units of the scene."""
+    """Unhidden ambient light, the depth image, and the reach in units of the scene."""
 
     arriving: Table
     image: DepthImage
@@ -156,7 +157,7 @@ def prepare(scene: Any, reach: float) -> Shown:
 
 
 def shade(point: Point) -> Array:
-    """Return the chapters' model with the mean of the indirect light, hidden near by."""
+    """Return the chapters' model with the mean indirect light, hidden by nearby things."""
     prepared, given = point.prepared, point.given
     share = openness(prepared.image, given.position, point.normal, point.view, prepared.distance)
     arriving = prepared.arriving.at(point.wavelengths) * share
@@ -164,11 +165,11 @@ def shade(point: Point) -> Array:
 
 
 def refuse(scene: Any) -> str:
-    """Say that no depth image has a horizon about the view, where that is so."""
+    """Return why a scene has no depth image with a horizon about the view, if so."""
     try:
         viewpoint(scene.sensors()[0])
     except InputError:
-        return "its camera has no single viewpoint, and so no depth image"
+        return "its camera has no single viewpoint, so no depth image"
     return ""
 
 

@@ -1,13 +1,13 @@
-"""Light that reaches what the camera sees otherwise than straight from a lamp.
+"""Indirect light at the points that the camera sees.
 
-It is what other surfaces reflect, and what the environment sends where nothing hides it. It is
-gathered in the heuristic half: by Mitsuba's ``path`` over the ``phong`` materials and the
-heuristic's lights, from a coarse grid of the points that the camera sees::
+It is reflected by other surfaces, or comes from the unhidden environment. It is gathered in the
+heuristic half, by Mitsuba's ``path`` over the ``phong`` materials and the heuristic's lights, from
+a coarse grid of the points that the camera sees::
 
     I = E / pi = 1 / N sum_j L(w_j) + 1 / (pi N) sum_j L_env(w'_j) V (n.w'_j) / p(w'_j)
 
-where the directions ``w`` follow the cosine and ``w'`` the environment's light. ``L`` is what is
-reflected towards the point. The numbers are those of one seed, so that runs repeat.
+where the directions ``w`` follow the cosine and ``w'`` the environment's light. ``L`` is the light
+reflected towards the point. The seed is fixed, so runs repeat.
 """
 
 from dataclasses import dataclass
@@ -25,15 +25,15 @@ GRID = 32
 """Points along each side of the image."""
 
 STRATA = 4
-"""Directions along each side of the square that the hemisphere of a point is."""
+"""Directions along each side of the square that maps to a point's hemisphere."""
 
 REFLECTIONS = 16
-"""Of a path at most. Mitsuba ends most sooner, by Russian roulette after five."""
+"""Longest path. Mitsuba ends most paths sooner, by Russian roulette after five."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Points that the camera sees, with the sides that are shaded.
+    """Points that the camera sees, with the shaded sides.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Seen:
     normal
         Unit shading normals on the viewer's side.
     k_d
-        What the surface reflects evenly; 0 where nothing is seen.
+        Diffuse coefficient of the surface; 0 where nothing is seen.
     """
 
     si: Any
@@ -58,14 +58,14 @@ class Seen:
 
 @dataclass(frozen=True)
 class Gathered:
-    """What reaches points that the camera sees, for each of K channels or wavelengths.
+    """Light at points that the camera sees, for each of K channels or wavelengths.
 
     Attributes
     ----------
     normal
         (N, 3).
     arriving
-        (N, K): ``E / pi``, what a white surface would show.
+        (N, K): ``E / pi``, the value of a white surface.
     k_d
         (N, K): the weight of each in the image.
     """
@@ -75,10 +75,10 @@ class Gathered:
     k_d: np.ndarray
 
     def mean(self, of: np.ndarray | None = None) -> np.ndarray:
-        """Return the mean (K,) of what arrives, or of values (N, 1 or K), as the image shows it.
+        """Return the mean (K,) of the arriving light, or of values (N, 1 or K), over the image.
 
-        The weight of a point is its ``k_d``, so that ``k_d`` times the mean has the same mean over
-        the image as ``k_d`` times what arrives.
+        The weight of a point is its ``k_d``: ``k_d`` times the mean then has the same mean over the
+        image as ``k_d`` times the arriving light.
         """
         values = self.arriving if of is None else of
         weight = self.k_d.sum(axis=0)
@@ -87,7 +87,7 @@ class Gathered:
 
 
 def seen(scene: Any, repeat: int = 1, wavelengths: Any = ()) -> Seen:
-    """Return the points of the grid, each as often as asked for."""
+    """Return the points of the grid, each repeated as often as requested."""
     cells = (np.arange(GRID) + 0.5) / GRID
     x, y = (np.repeat(side.ravel(), repeat) for side in np.meshgrid(cells, cells))
     place = mi.Point2f(mi.Float(x), mi.Float(y))
@@ -135,7 +135,7 @@ def _arriving(scene: Any, at: Seen) -> Any:
     corner = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
     toward = mi.warp.square_to_cosine_hemisphere((corner + sampler.next_2d()) / STRATA)
     ray = at.si.spawn_ray(mi.Frame3f(at.normal).to_world(toward))
-    # What is seen of the environment is added below: a sun would be met too seldom.
+    # The visible environment is added below: rays would hit a sun too seldom.
     paths = mi.load_dict({"type": "path", "max_depth": REFLECTIONS + 1, "hide_emitters": True})
     reflected, _, _ = paths.sample(scene, sampler, ray, active=active)
     from_around = _from_environment(scene, at, (corner + sampler.next_2d()) / STRATA, active)

@@ -1,4 +1,4 @@
-"""Spherical harmonics of the environment: nine numbers a colour for its unoccluded irradiance.
+"""Spherical harmonics of the environment: nine numbers per channel for its unoccluded irradiance.
 
 Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps" (2001).
 Reflection by a diffuse surface is a convolution with the cosine, which keeps little beyond the
@@ -23,7 +23,7 @@ from heuristic.stand_ins.ambient_light import has_environment, lit
 from heuristic.stand_ins.tabulated import Table
 
 RINGS = 512
-"""Rings of directions over the sphere, of twice as many each: 0.35 degrees, finer than a sun."""
+"""Rings of directions over the sphere, with twice as many each: 0.35 degrees, finer than a sun."""
 
 CONVOLVED = np.repeat((1.0, 2 / 3, 1 / 4), (1, 3, 5))
 """``A_l / pi`` of the nine terms."""
@@ -100,7 +100,7 @@ def shade(point: Point) -> Array:
 
 
 def refuse(scene: Any) -> str:
-    """Say that there is nothing to project, where that is so."""
+    """Return why there is nothing to project, if so."""
     return "" if has_environment(scene) else "it has no environment"
 
 

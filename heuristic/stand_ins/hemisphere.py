@@ -1,9 +1,9 @@
 """Hemisphere lighting: a sky and a ground of one colour each, fitted to the indirect light.
 
-Of a sky of radiance ``S`` above the horizon and a ground of ``G`` below, a surface that is inclined
-with ``c = n.up`` receives ``E / pi = S (1 + c) / 2 + G (1 - c) / 2``: the integral of both halves
-over its hemisphere. ``S`` and ``G`` are fitted by least squares to what is gathered at the points
-that the camera sees (:mod:`heuristic.stand_ins.gathering`), so that the image's mean is kept.
+From a sky of radiance ``S`` above the horizon and a ground of ``G`` below, a surface with ``c =
+n.up`` receives ``E / pi = S (1 + c) / 2 + G (1 - c) / 2``: the integral of both halves over its
+hemisphere. ``S`` and ``G`` are fitted by least squares to the light gathered at the points that the
+camera sees (:mod:`heuristic.stand_ins.gathering`), which keeps the image's mean.
 """
 
 from dataclasses import dataclass
@@ -20,13 +20,13 @@ from heuristic.stand_ins.gathering import Gathered, gather
 from heuristic.stand_ins.tabulated import Table
 
 EVENNESS = 1e-3
-"""Weight, relative to that of all points, by which sky and ground are alike where nothing tells
-them apart: where all surfaces seen are inclined alike."""
+"""Weight, relative to all points, that makes sky and ground equal if nothing distinguishes them
+because all visible surfaces have the same inclination."""
 
 
 @dataclass
 class SkyAndGround:
-    """The colours of both halves, where up is, and whether they are in place of ``I_a``."""
+    """The colours of both halves, the upward direction, and whether they replace ``I_a``."""
 
     sky: Table
     ground: Table
@@ -40,7 +40,7 @@ def irradiance(sky: Array, ground: Array, cosine: Array) -> Array:
 
 
 def upward(scene: Any) -> np.ndarray:
-    """Return the axis of the world, or its opposite, that the camera's up vector is nearest to."""
+    """Return the axis of the world, or its opposite, nearest to the camera's up vector."""
     column = np.array(scene.sensors()[0].world_transform().matrix, float).reshape(4, 4, -1)[
         :3, 1, 0
     ]
@@ -51,7 +51,7 @@ def upward(scene: Any) -> np.ndarray:
 def fit(gathered: Gathered, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return sky and ground, (K,) each and not negative, by weighted least squares.
 
-    Where one would be negative it is 0, and the other alone keeps the mean.
+    If one would be negative it is 0, and the other alone keeps the mean.
     """
     cosine = gathered.normal @ up
     found = [

@@ -1,12 +1,12 @@
-"""Depth images from lamps: how far light gets in each direction before it meets something.
+"""Depth images from lamps: how far light travels in each direction before it hits something.
 
 A lamp with a position has one over all directions, on the six sides of a cube; parallel light has
-one over the disc that the scene casts. The image is traced through the centres of its texels.
+one over the scene's projected disc. The image is traced through the centres of its texels.
 
-A point is looked up from a little above its surface. On a plane the distance changes by ``w tan a``
-over a width ``w`` across the light, which arrives at an angle ``a`` to the normal; a height of
-``w sin a`` makes up for it. So that no plane hides itself, ``w`` is half the diagonal of what is
-averaged: of the texel, and of the filter.
+A point is looked up from slightly above its surface. On a plane the distance changes by ``w tan a``
+over a width ``w`` across the light, which arrives at an angle ``a`` to the normal; a height of ``w
+sin a`` compensates. To keep planes from hiding themselves, ``w`` is half the diagonal of the
+averaged area: the texel plus the filter.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from heuristic.lights import DirectionalLight
 from heuristic.plugins.emitters import FAR
 
 LEAST = 1e-4
-"""Of a distance, by which a lookup may be beyond what the image has: single precision."""
+"""Share of a distance by which a lookup may exceed the image's: single precision."""
 
 SMALLEST_SINE = 0.1
 """For the height above surfaces that face the lamp: they may be curved."""
@@ -35,7 +35,7 @@ class LightMap:
     resolution
         Texels along a side.
     depths
-        Distances, FAR where nothing is met: six sides of a cube one after the other, or one square.
+        Distances, FAR where nothing is hit: six sides of a cube one after the other, or one square.
     """
 
     resolution: int
@@ -46,11 +46,11 @@ class LightMap:
         raise NotImplementedError
 
     def depth(self, offset: Any, across: tuple[Any, Any], u: Any, v: Any) -> Any:
-        """Return what the image has ``u`` and ``v`` texels beside a point's ``offset``."""
+        """Return the image's value ``u`` and ``v`` texels away from a point's ``offset``."""
         raise NotImplementedError
 
     def distance(self, offset: Any) -> Any:
-        """Return how far from the lamp a point is."""
+        """Return the distance of a point from the lamp."""
         raise NotImplementedError
 
     def offset(self, position: Any) -> Any:
@@ -60,7 +60,7 @@ class LightMap:
 
 @dataclass
 class CubeMap(LightMap):
-    """Of a lamp with a position."""
+    """The depth image of a lamp with a position."""
 
     centre: Any
 
@@ -108,7 +108,7 @@ class SquareMap(LightMap):
 
 
 def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (3,) of a scene's box; Mitsuba's own leaves out meshes that it merged."""
+    """Return the corners (3,) of a scene's box; Mitsuba's leaves out meshes that it merged."""
     corners = [np.zeros((0, 3))]
     for shape in scene.shapes():
         if shape.is_mesh():
@@ -124,7 +124,7 @@ def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def light_map(scene: Any, light: Any, resolution: int) -> LightMap:
-    """Trace the depth image of a lamp of the kernel."""
+    """Trace the depth image of one of the kernel's lamps."""
     low, high = box(scene)
     radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
     if isinstance(light, DirectionalLight):
@@ -158,7 +158,7 @@ def _square(
 
 
 def _traced(scene: Any, origin: Any, toward: Any) -> Any:
-    """Return how far rays get, and FAR for those that meet nothing."""
+    """Return how far rays travel, and FAR for those that hit nothing."""
     hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(toward)))
     return dr.select(hit.is_valid(), hit.t, FAR)
 
@@ -178,7 +178,7 @@ def _cube_direction(size: int) -> Any:
 
 
 def _cube_texel(place: Any, size: int) -> Any:
-    """Return the number of the texel that a direction of any length meets."""
+    """Return the number of the texel that a direction of any length hits."""
     length = abs(place)
     is_x = (length.x >= length.y) & (length.x >= length.z)
     is_y = ~is_x & (length.y >= length.z)

@@ -1,9 +1,8 @@
 """Constant ambient light, set to the mean of the indirect light.
 
-``I = ... + k_d A``, where ``A`` is the mean of what arrives at the points that the camera sees
-otherwise than from the lights (:mod:`heuristic.stand_ins.gathering`), each weighted by its ``k_d``.
-Engines of the 1990s had ``I_a`` set by hand to look like it; the mean is the best that one number
-can do for the image's level.
+``I = ... + k_d A``, where ``A`` is the mean indirect light at the points that the camera sees
+(:mod:`heuristic.stand_ins.gathering`), each weighted by its ``k_d``. Artists of the 1990s set
+``I_a`` by hand to imitate it; the mean is the best single number for the image's level.
 """
 
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from heuristic.stand_ins.tabulated import Table
 
 @dataclass
 class Constant:
-    """Light that is the same everywhere, and whether it is in place of ``I_a``."""
+    """Light that is the same everywhere, and whether it replaces ``I_a``."""
 
     arriving: Table
     replaces_ambient: bool

@@ -1,10 +1,10 @@
-"""Ambient occlusion by rays: the mean ambient light where it is not hidden near by.
+"""Ambient occlusion by rays: the mean ambient light, unless hidden by nearby things.
 
 ``I = ... + k_d A o`` with the openness ``o = 1 / N sum_j V(w_j)`` over directions that follow the
-cosine, hence ``1 / pi`` times the integral of ``V (n.w)``; ``V`` is 0 where something lies within
-``reach``. ``A`` keeps the image's mean of indirect light, as that of
-:mod:`heuristic.stand_ins.mean_ambient` does. The directions are a fixed pattern, turned and shifted
-by a hash of the place, so that they differ from point to point and repeat from run to run.
+cosine, hence ``1 / pi`` times the integral of ``V (n.w)``; ``V`` is 0 if something lies within
+``reach``. ``A`` keeps the image's mean indirect light, like
+:mod:`heuristic.stand_ins.mean_ambient`. The directions are a fixed pattern, turned and shifted by a
+hash of the place: they differ from point to point and repeat from run to run.
 """
 
 from collections.abc import Callable
@@ -22,19 +22,19 @@ from heuristic.stand_ins.ambient_light import has_environment, lit
 from heuristic.stand_ins.tabulated import Table
 
 RAYS = Parameter("rays", 8, 1, 256)
-"""From each point; a pixel of several samples has as many times more."""
+"""Rays from each point; a pixel of several samples has that many times more."""
 
 MANY = 64
-"""Rays for the mean openness that the ambient light is calibrated by."""
+"""Rays for the mean openness, which calibrates the ambient light."""
 
 REACH = Parameter("reach", 0.5, 0.01, 100.0, prepared=True)
-"""How far away things hide light, in units of the size of what the camera sees (:func:`reach_of`).
+"""How far away things hide light, in units of the size of the visible scene (:func:`reach_of`).
 Without a bound a closed room would be dark."""
 
 
 @dataclass
 class Hidden:
-    """Ambient light where nothing is near, and the reach in units of the scene."""
+    """Unhidden ambient light, and the reach in units of the scene."""
 
     arriving: Table
     distance: Any
@@ -42,7 +42,7 @@ class Hidden:
 
 
 def hashed(position: Any) -> tuple[Any, Any]:
-    """Return two numbers from 0 to 1 that follow from a place, and look random."""
+    """Return two numbers from 0 to 1 that depend on a place and look random."""
     bits = [
         dr.reinterpret_array(mi.UInt32, dr.float32_array_t(mi.Float)(part))
         for part in (position.x, position.y, position.z)
@@ -53,13 +53,13 @@ def hashed(position: Any) -> tuple[Any, Any]:
 
 @dr.syntax
 def openness(visible: Callable, position: Any, normal: Any, distance: Any, rays: Any) -> Any:
-    """Return the share of the cosine-weighted hemisphere that nothing hides within a distance.
+    """Return the share of the cosine-weighted hemisphere unhidden within a distance.
 
     ``rays`` is their number, as a plain or Dr.Jit number.
     """
     frame = mi.Frame3f(normal)
     shift, turn = hashed(position)
-    distance, rays = mi.Float(distance), dr.round(mi.Float(rays))  # loops widen what they are given
+    distance, rays = mi.Float(distance), dr.round(mi.Float(rays))  # loops widen their arguments
     count, number = mi.Float(0), mi.UInt32(0)
     while mi.Float(number) < rays:
         square = (mi.Float(number) + shift) / rays
@@ -72,10 +72,10 @@ def openness(visible: Callable, position: Any, normal: Any, distance: Any, rays:
 
 
 def reach_of(scene: Any, reach: float) -> float:
-    """Return a share of the size of what the camera sees, in units of the scene.
+    """Return a share of the size of the visible scene, in units of the scene.
 
-    The size is the median distance of the points seen from their median: a floor or a wall that is
-    much larger than what stands before it does not change it.
+    The size is the median distance of the points seen from their median: a floor or wall much
+    larger than the objects in front of it does not change it.
     """
     si = gathering.seen(scene, wavelengths=tabulated.batches()[0]).si
     places = np.array(si.p, float).T[np.array(si.is_valid())]
@@ -85,7 +85,7 @@ def reach_of(scene: Any, reach: float) -> float:
 
 
 def calibrated(scene: Any, hidden: Callable[[gathering.Seen], Any]) -> Table:
-    """Return the ambient light that has the image's mean once it is hidden."""
+    """Return the ambient light that has the image's mean after occlusion."""
     gathered = gathering.gather(scene)
     (first, *_) = tabulated.batches()
     at = gathering.seen(scene, wavelengths=first)
@@ -105,7 +105,7 @@ def prepare(scene: Any, reach: float) -> Hidden:
 
 
 def shade(point: Point) -> Array:
-    """Return the chapters' model with the mean of the indirect light, hidden near by."""
+    """Return the chapters' model with the mean indirect light, hidden by nearby things."""
     prepared = point.prepared
     place = point.position, point.normal, prepared.distance
     share = openness(point.given.visible, *place, point.parameters.rays)

@@ -2,9 +2,9 @@
 
 Williams, "Casting curved shadows on curved surfaces" (1978): a point is lit where the depth image
 of the lamp (:mod:`heuristic.stand_ins.light_maps`) has nothing nearer. Reeves, Salesin and Cook,
-"Rendering antialiased shadows with depth maps" (1987): the share of the texels about it that say so
-is how much of the light arrives. It softens every edge by the same width of the image, whereas the
-half shadow of a lamp grows with the distance from what casts it.
+"Rendering antialiased shadows with depth maps" (1987): the share of nearby texels that say so is
+the share of the light that arrives. It softens every edge by the same width in the image, whereas a
+lamp's penumbra grows with the distance from the occluder.
 """
 
 from collections.abc import Iterable
@@ -19,10 +19,10 @@ from heuristic.points import INPUTS, Array, Point
 from heuristic.stand_ins.light_maps import LEAST, SMALLEST_SINE, LightMap, light_map
 
 LAMPS = 16
-"""That get a depth image at most."""
+"""Lamps with a depth image, at most."""
 
 TAPS = 4
-"""Along each side of the square that is averaged."""
+"""Texels along each side of the averaged square."""
 
 RESOLUTION = Parameter("resolution", 512, 16, 2048, prepared=True)
 """Texels along a side of the image."""
@@ -31,7 +31,7 @@ BIAS = Parameter("bias", 0.75, 0.0, 8.0)
 """Height above the surface, in texels: half a diagonal is enough for planes."""
 
 RADIUS = Parameter("radius", 2.0, 0.25, 16.0)
-"""Half the side of the square that is averaged, in texels."""
+"""Half the side of the averaged square, in texels."""
 
 
 def prepare(scene: Any, resolution: float) -> tuple[LightMap, ...]:
@@ -42,11 +42,11 @@ def prepare(scene: Any, resolution: float) -> tuple[LightMap, ...]:
 
 
 def refuse(scene: Any) -> str:
-    """Say that there is no lamp, or that there are too many for an image each."""
+    """Return why there are no depth images: no lamp, or too many; empty if there are."""
     count = sum(1 for _ in _lamps(scene))
     if count == 0:
         return "it has no lamp"
-    return "" if count <= LAMPS else f"it has {count} lamps, and {LAMPS} get a depth image at most"
+    return "" if count <= LAMPS else f"it has {count} lamps, and at most {LAMPS} get a depth image"
 
 
 def _lamps(scene: Any) -> Iterable[Any]:
@@ -54,12 +54,12 @@ def _lamps(scene: Any) -> Iterable[Any]:
 
 
 def hard(point: Point) -> Array:
-    """Return the chapters' model, with the light of lamps that their image does not hide."""
+    """Return the chapters' model, with shadows from the lamps' depth images."""
     return _shaded(point, ((0.0, 0.0),), 0.0)
 
 
 def soft(point: Point) -> Array:
-    """Return the chapters' model, with the share of the light that is not hidden."""
+    """Return the chapters' model, with the unhidden share of each lamp's light."""
     radius = point.parameters.radius
     places = [radius * (2 * (tap + 0.5) / TAPS - 1) for tap in range(TAPS)]
     return _shaded(point, [(u, v) for u in places for v in places], 1.5 * radius)

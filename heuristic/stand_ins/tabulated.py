@@ -1,4 +1,4 @@
-"""Colours that are prepared once for a scene: RGB, or one value at each of some wavelengths."""
+"""Colours prepared once for a scene: RGB, or one value at each of some wavelengths."""
 
 from typing import Any, ClassVar
 
@@ -7,11 +7,11 @@ import mitsuba as mi
 import numpy as np
 
 KNOTS = 16
-"""Wavelengths of a tabulated spectrum, in steps of 31 nm: a multiple of those that a ray has."""
+"""Wavelengths of a tabulated spectrum, in steps of 31 nm: a multiple of a ray's number."""
 
 
 def batches() -> list[Any]:
-    """Return the wavelengths (nm) to gather light at, a batch for each ray; [] for RGB and mono."""
+    """Return the wavelengths (nm) to gather light at, a batch per ray; [] for RGB and mono."""
     if not mi.is_spectral:
         return [[]]
     size = dr.size_v(mi.Spectrum)
@@ -34,11 +34,11 @@ class Table:
         (K,), finite: the channels of the variant, or values at the :func:`batches`, in order.
     """
 
-    DRJIT_STRUCT: ClassVar = {"values": object}  # what dr.freeze has to know of
+    DRJIT_STRUCT: ClassVar = {"values": object}  # what dr.freeze must know of
 
     def __init__(self, values: np.ndarray) -> None:
         self.values = mi.Float(np.asarray(values, float))
-        dr.eval(self.values)  # a number of the kernel's code would compile it for every scene
+        dr.eval(self.values)  # as a literal it would compile a kernel for every scene
 
     def at(self, wavelengths: Any) -> Any:
         """Return the colour at the wavelengths of rays, linear between those tabulated."""

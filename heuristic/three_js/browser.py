@@ -25,7 +25,7 @@ OPTIONS = (
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--allow-file-access-from-files",
     "--disable-extensions", "--disable-background-networking", "--no-first-run", "--dump-dom",
 )  # fmt: skip
-"""Software rendering, so that a picture is the same on every machine; no network."""
+"""Software rendering, so a picture is the same on every machine; no network."""
 
 PAGE = """<!doctype html><meta charset="utf-8">
 <script id="scene" type="application/json">{scene}</script>
@@ -36,7 +36,7 @@ PAGE = """<!doctype html><meta charset="utf-8">
 
 
 def version() -> str:
-    """Return the version of three.js that the lock names."""
+    """Return the version of three.js in the lock file."""
     return json.loads(LOCK.read_text("utf-8"))["packages"]["node_modules/three"]["version"]
 
 
@@ -46,12 +46,12 @@ def require() -> str:
     Raises
     ------
     InstallationError
-        When it or the package is missing, with what to install.
+        If it or the package is missing; the message says what to install.
     """
     if not (BUILD / "three.module.js").is_file():
         raise InstallationError(
-            f"three.js {version()} is not there, and heuristics `three:…` need it. Fetch it by"
-            f" npm ci --ignore-scripts --prefix {HERE}"
+            f"three.js {version()} is not installed, and heuristics `three:…` need it. Run npm ci"
+            f" --ignore-scripts --prefix {HERE}"
         )
     for program in PROGRAMS:
         if found := shutil.which(program):
@@ -68,9 +68,9 @@ def draw(scene: dict[str, Any]) -> np.ndarray:
     Raises
     ------
     InstallationError
-        When there is nothing to draw with.
+        If there is nothing to draw with.
     InputError
-        With what three.js says, when it cannot.
+        With three.js' own message, if it cannot draw the scene.
     """
     program = require()
     text = json.dumps(scene).replace("<", "\\u003c")
@@ -86,7 +86,7 @@ def draw(scene: dict[str, Any]) -> np.ndarray:
         return floats.reshape(scene["height"], scene["width"], 4)[::-1]
     said = re.search(r'<pre id="error">([^<]*)</pre>', done.stdout)
     reason = said[1] if said else (done.stderr.strip().splitlines() or ["nothing"])[-1]
-    raise InputError(f"three.js cannot draw this scene: it says {reason}")
+    raise InputError(f"three.js cannot draw this scene: {reason}")
 
 
 def _run(command: list[str]) -> subprocess.CompletedProcess:

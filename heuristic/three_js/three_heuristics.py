@@ -2,8 +2,8 @@
 
 ``prepare`` draws the scene once, with several fragments per pixel, by its own camera. ``shade``
 then looks up the picture where a point is seen, between four fragments. So camera rays, film and
-noise are those of every other heuristic. Fragments that triangles leave empty at an outline take
-the nearest colour.
+noise are the same as for other heuristics. Fragments left empty at an outline take the nearest
+colour.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ FINER = 4
 """Fragments along each side of a pixel, at most."""
 
 FRAGMENTS = 3 << 19
-"""Fragments of a picture, where its pixels are not more."""
+"""Fragments of a picture at most, unless it has more pixels."""
 
 
 @dataclass
@@ -44,14 +44,14 @@ def opened(name: str) -> Heuristic:
     Raises
     ------
     InputError
-        For another kind.
+        For any other kind.
     InstallationError
-        When three.js or a browser is missing.
+        If three.js or a browser is missing.
     """
     kind = name.removeprefix(THREE)
     if kind not in KINDS:
         known = ", ".join(THREE + each for each in KINDS)
-        raise InputError(f"heuristic {name!r} is not declared: of three.js there are {known}.")
+        raise InputError(f"heuristic {name!r} is not declared: choose one of {known}.")
     browser.require()
     return _declared(name, kind)
 
@@ -72,14 +72,14 @@ def _declared(name: str, kind: str) -> Heuristic:
 
 def _refused(scene: mi.Scene) -> str:
     if not mi.is_rgb:
-        return f"three.js has RGB colours, and {mi.variant()} has others"
+        return f"three.js needs RGB colours, which {mi.variant()} does not have"
     film = scene.sensors()[0].film()
     is_cropped = list(film.size()) != list(film.crop_size())
     return "its film is cropped" if is_cropped else ""
 
 
 def prepared(scene: mi.Scene, kind: str) -> Drawn:
-    """Draw a scene, and say among the warnings of a record what three.js does not have."""
+    """Draw a scene; whatever three.js lacks becomes a warning in the record."""
     given, lost = three_scene.said(scene, kind)
     if lost:
         mi.Log(mi.LogLevel.Warn, f"three.js does not have, of {'; of '.join(lost)}.")
@@ -94,7 +94,7 @@ def prepared(scene: mi.Scene, kind: str) -> Drawn:
 
 
 def _filled(picture: np.ndarray) -> np.ndarray:
-    """Return the colours (H, W, 3), those of the nearest surface where there is none."""
+    """Return the colours (H, W, 3); empty fragments take those of the nearest surface."""
     empty = picture[..., 3] == 0
     if not empty.any() or empty.all():
         return picture[..., :3]

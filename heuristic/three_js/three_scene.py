@@ -1,14 +1,14 @@
-"""A scene in three.js' terms, and in words what three.js has no term for.
+"""A scene in three.js' terms, and a list of what three.js cannot express.
 
-three.js (MeshPhongMaterial) computes, of a light of intensity ``I``, at a distance ``d``:
+three.js (MeshPhongMaterial) computes, for a light of intensity ``I`` at a distance ``d``:
 
     I / d^decay  N.L  (color / pi + F (n + 2) / (8 pi) (N.H)^n),
     F = specular + (1 - specular) 2^((-5.55473 V.H - 6.98316) V.H),
 
 where the power of two is close to Schlick's ``(1 - V.H)^5``. So a light gets ``pi I_p``, ``color``
 is ``k_d``, the exponent of a lobe about the mirrored vector becomes ``4 n``, since the half vector
-turns half as fast, and ``specular`` is ``8 k_s / (n + 2)``: both lobes are then as wide, and equal
-where light, viewer and normal coincide, but for 0.02 % of Schlick's.
+turns half as fast, and ``specular`` is ``8 k_s / (n + 2)``: both lobes then have the same width,
+and are equal where light, viewer and normal coincide, except for 0.02 % from Schlick's term.
 """
 
 import base64
@@ -24,14 +24,14 @@ from heuristic import scene_data, terms
 from heuristic.errors import InputError
 
 FINENESS = 96
-"""Tessellation: a sphere is 384 by 192 cells, at most 7e-5 of its radius inside itself."""
+"""Tessellation: a sphere has 384 by 192 cells, at most 7e-5 of its radius inside it."""
 
 FAR = 1e3
-"""Distance of a light without a place, of which three.js uses the direction alone."""
+"""Distance of a light without a position; three.js uses only its direction."""
 
 
 def said(scene: mi.Scene, kind: str) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a scene for :func:`heuristic.three_js.browser.draw`, and what it leaves out, in words.
+    """Return a scene for :func:`heuristic.three_js.browser.draw`, and a list of omissions.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ def _material(given: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
 
 
 def _light(given: dict) -> dict[str, Any]:
-    """Return a light as three.js has it, in candela and lux.
+    """Return a light in three.js' form, in candela and lux.
 
     Raises
     ------
     InputError
-        For one that falls off as no power of the distance.
+        If it does not fall off by a power of the distance.
     """
     found = {"color": given["intensity"], "intensity": pi}
     if given["type"] == "directional":
@@ -100,8 +100,8 @@ def _light(given: dict) -> dict[str, Any]:
     powers = [power for power, value in enumerate(given["attenuation"]) if value]
     if len(powers) > 1:
         raise InputError(
-            f"light {given['name']!r} has the attenuation {given['attenuation']}, and three.js has"
-            " one power of the distance. Give one of k0, k1 and k2 alone."
+            f"light {given['name']!r} has the attenuation {given['attenuation']}, and three.js"
+            " has one power of the distance. Give only one of k0, k1 and k2."
         )
     (power,) = powers
     found |= {
@@ -130,6 +130,6 @@ def _lost_of(lights: list[dict]) -> Iterator[str]:
         if light.get("exponent"):
             yield f"{light['name']}: a fall-off within its cone, by the power of the cosine"
         if light.get("cutoff", 0) > 90:
-            yield f"{light['name']}: what it sends beyond 90 degrees"
+            yield f"{light['name']}: its light beyond 90 degrees"
         if light.get("clamped"):
-            yield f"{light['name']}: that its attenuation ends at 1"
+            yield f"{light['name']}: the limit of 1 on its attenuation"

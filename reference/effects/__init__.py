@@ -1,9 +1,9 @@
 """The effects of light, each declared once: :data:`EFFECTS`.
 
 An effect is an :class:`reference.effects.effect.Effect` at the top of a module of this folder,
-which is found by itself. Whatever lists effects reads :data:`EFFECTS`: plans, the scenes between
-the halves, prices, parts of a departure, steps of a study, charts and pages. Code that needs one
-effect in particular imports it from its module.
+which is found automatically. Code that lists effects reads :data:`EFFECTS`: plans, the scenes
+between the halves, prices, parts of a departure, steps of a study, charts and pages. Code that
+needs one particular effect imports it from its module.
 """
 
 from importlib import import_module
@@ -19,5 +19,5 @@ EFFECTS: tuple[Effect, ...] = tuple(sorted(_found, key=lambda effect: effect.ord
 
 
 def labelled(label: str) -> Effect:
-    """Return the effect of a label."""
+    """Return the effect with a label."""
     return next(effect for effect in EFFECTS if effect.label == label)

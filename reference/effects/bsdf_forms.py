@@ -1,4 +1,4 @@
-"""What surfaces have in another form in the two halves: reflection, and transmission."""
+"""Effects of surfaces that differ in form between the halves: reflection and transmission."""
 
 from reference.effects.effect import Effect
 from reference.pairing.nearest import WRAPPERS
@@ -7,7 +7,7 @@ from reference.scene.graph import Graph, graft
 
 
 def _inexact(facts: Facts, opaque: bool) -> list[int]:
-    """Return the opaque shapes, or the others, whose two BSDFs differ; a diffuse one is exact."""
+    """Return the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
     graph, found = facts.pair.physical, []
     known = {shape.name: shape.opaque for shape in facts.structure.shapes}
     for shape in graph.nodes(SHAPE):
@@ -20,7 +20,7 @@ def _inexact(facts: Facts, opaque: bool) -> list[int]:
 
 
 def _replace(graph: Graph, facts: Facts, opaque: bool) -> None:
-    """Give shapes the materials of the heuristic half; what shares one goes on sharing it."""
+    """Give shapes the materials of the heuristic half; shared materials stay shared."""
     grafted = {}
     for shape in _inexact(facts, opaque):
         ((key, _),) = graph.children(shape, BSDF)
@@ -47,7 +47,7 @@ MICROFACETS = Effect(
     label="microfacets and Fresnel",
     heuristic="none",
     reference="roughplastic",
-    cost="a BSDF evaluation a light",
+    cost="a BSDF evaluation per light",
     rule=_reflected,
     part="BSDF form",
     colour="#cc79a7",
@@ -60,7 +60,7 @@ TRANSMISSION = Effect(
     label="transmission",
     heuristic="none",
     reference="refraction and media",
-    cost="samples, rays a surface",
+    cost="samples, rays per surface",
     rule=_transmitted,
     undecided=True,
     part="BSDF form",

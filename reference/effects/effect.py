@@ -1,4 +1,4 @@
-"""What an effect of light is declared with, and what planning decides on it."""
+"""The declaration of an effect of light, and the decision of planning on it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from reference.planning.premises import Pruning
 from reference.scene.graph import Graph
 
 PARTS = ("interpolation", "spectral", "visibility", "light form", "BSDF form", "transport")
-"""The parts of a departure that effects make, in the order in which they are split off."""
+"""The parts of a departure that effects cause, in the order in which they are split off."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -19,35 +19,35 @@ class Effect:
     Attributes
     ----------
     order
-        Where it stands among all effects, ascending.
+        Its position among all effects, ascending.
     label
         Its name in records and reports.
     heuristic, reference, cost
-        In words: what it is in either half, and what it costs.
+        Text: its form in each half, and its cost.
     rule
-        ``rule(facts)`` returns whether the effect is called for, and the evidence.
+        ``rule(facts)`` returns whether the scene needs the effect, and the evidence.
     pruning
-        In the place of ``rule``: the rule of pruning by which the effect is left out. Where it does
-        not apply, the effect may be there, and is simulated.
+        In place of ``rule``: the rule of pruning that leaves the effect out. If it does not apply,
+        the effect may be present, and is simulated.
     undecided
-        Whether a yes of ``rule`` only means that nothing is known against the effect.
+        Whether a yes of ``rule`` only means that the effect is not ruled out.
     part, colour
-        One of :data:`PARTS`, and a CSS colour in charts; None for what both halves have alike.
+        One of :data:`PARTS`, and a CSS colour in charts; None for effects equal in both halves.
     sampled
-        Whether its direct light takes random numbers.
+        Whether its direct light needs random numbers.
     differs
-        ``differs(facts, called_for)`` tells whether the two halves as such differ in it.
+        ``differs(facts, called_for)`` returns whether the two halves differ in it.
     graft
-        ``graft(graph, facts)`` edits a copy of the physical half where the effect is left out: the
-        heuristic half's form takes the place. None where the scene is the same.
+        ``graft(graph, facts)`` leaves the effect out of a copy of the physical half: the heuristic
+        half's form takes its place. None if the scene stays the same.
     glow
-        ``glow(phong, facts)`` returns what a camera ray meets on a heuristic material where the
-        effect is left out, as parameters of ``heuristic_glow``.
+        ``glow(phong, facts)`` returns the light of a heuristic material that a camera ray sees
+        without the effect, as parameters of ``heuristic_glow``.
     without
-        ``without(plan)`` returns a plan of ``direct_all`` that leaves the effect out. None where
-        the integrator has no part in it.
+        ``without(plan)`` returns a plan of ``direct_all`` that leaves the effect out. None if the
+        integrator has no part in it.
     step
-        What it changes in an image, in words; empty where a study takes no step for it.
+        Text: what it changes in an image; empty if studies have no step for it.
     """
 
     order: int
@@ -82,7 +82,7 @@ class Effect:
         return f"<effect {self.label}>"
 
     def __reduce__(self):
-        # A copy in another process is the same effect, as sets and `is` need it.
+        # A copy in another process must be the same effect, for sets and `is`.
         from reference.effects import labelled
 
         return labelled, (self.label,)
@@ -90,11 +90,11 @@ class Effect:
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether an effect is called for, and the rule and evidence that decided.
+    """Whether a scene needs an effect, and the rule and evidence that decided.
 
-    ``rule`` says of what kind the reason is: ``structural`` where it follows from what the scene is
-    made of, ``simulated`` where a premise of leaving it out is not known to hold, ``asked`` where
-    pruning is switched off, ``guard`` where a probe of the scene disagreed with the plan.
+    ``rule`` is the kind of reason: ``structural`` if it follows from the scene's contents,
+    ``simulated`` if a premise of leaving it out is not known to hold, ``asked`` if pruning is off,
+    ``guard`` if a probe of the scene disagreed with the plan.
     """
 
     effect: Effect

@@ -1,4 +1,4 @@
-"""What the heuristic kernel has: its terms, its interpolation of polygons, its wavelengths."""
+"""Effects of the heuristic kernel: its terms, interpolation of polygons and wavelengths."""
 
 import mitsuba as mi
 

@@ -1,4 +1,4 @@
-"""What lights have in another form in the two halves: fall-off, cone, extent, surroundings."""
+"""Effects of lights that differ in form: fall-off, cone, extent, surroundings."""
 
 from collections.abc import Iterable
 
@@ -11,9 +11,9 @@ from reference.scene.graph import Graph, graft
 
 
 def _inexact(facts: Facts, with_cone: bool) -> list[str]:
-    """Return the keys of the scene's lights whose two forms differ by cone, or by fall-off alone.
+    """Return the keys of the scene's lights whose two forms differ by cone, or only by fall-off.
 
-    A spot's attenuation goes with its cone: Mitsuba has no spot that falls off in another way.
+    A spot's attenuation goes with its cone: Mitsuba has no spot with another fall-off.
     """
     heuristic, physical = facts.pair.heuristic, dict(facts.pair.physical.children(0, EMITTER))
     inexact = {record.name for record in facts.pair.emitters if not record.exact}
@@ -28,7 +28,7 @@ def _inexact(facts: Facts, with_cone: bool) -> list[str]:
 
 
 def _replace(graph: Graph, facts: Facts, keys: Iterable[str]) -> None:
-    """Put the heuristic half's lights in the place of those under some keys of the scene."""
+    """Replace the lights under some keys of the scene by those of the heuristic half."""
     own = dict(facts.pair.heuristic.children(0, EMITTER))
     for key in keys:
         graph.attach(0, key, graft(graph, facts.pair.heuristic, own[key]))
@@ -61,7 +61,7 @@ def _shining(facts: Facts) -> list[int]:
 
 
 def _replace_shining(graph: Graph, facts: Facts) -> None:
-    """Put the heuristic half's points and spots in the place of area lights."""
+    """Replace area lights by the heuristic half's points and spots."""
     for shape in _shining(facts):
         for key, _ in graph.children(shape, EMITTER):
             graph.detach(shape, key)
@@ -104,7 +104,7 @@ ATTENUATION = Effect(
     label="distance attenuation",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
-    cost="a division a light",
+    cost="a division per light",
     rule=_attenuated,
     part="light form",
     colour="#d55e00",
@@ -117,7 +117,7 @@ CONE = Effect(
     label="spot cone",
     heuristic="6.2-6.4",
     reference="spot",
-    cost="a comparison and a power a light",
+    cost="a comparison and a power per light",
     rule=_coned,
     part="light form",
     colour="#999933",

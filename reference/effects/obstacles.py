@@ -1,7 +1,7 @@
-"""What light meets on its way: shadows, and whether it may be reflected more than once.
+"""Obstacles of light: shadows, and whether it may be reflected more than once.
 
-Each is left out by a rule of pruning (:mod:`reference.planning.premises`): its proof stands beside
-the premises that it rests on. Where one of these is not known to hold, the effect is simulated.
+Each is left out by a rule of pruning (:mod:`reference.planning.premises`), which states its proof
+and premises. If a premise is not known to hold, the effect is simulated.
 """
 
 from dataclasses import dataclass, replace
@@ -25,23 +25,22 @@ from reference.planning.premises import (
 from reference.planning.shape_tree import Queries
 
 KNOWN_SURFACES = (NO_MEDIUM, OPAQUE, STILL, CONVEX, SEEN_FROM_OUTSIDE)
-"""What both rules rest on: light meets nothing but the outer sides of convex shapes."""
+"""The premises of both rules: light hits only the outer sides of convex shapes."""
 
 FAR = 1e6
-"""Where the shadow of a directional light begins, in multiples of the scene's size."""
+"""Start of the shadow of a directional light, in multiples of the scene's size."""
 
 
 @dataclass(frozen=True)
 class Ways:
-    """Where light passes on its way to a surface: in one box around several.
+    """Boxes that hold the paths of light to surfaces.
 
-    These are the surface's own box, the same moved towards the light, and the places that the light
-    comes from.
+    Each holds the surface's own box, the same moved towards the light, and the light's places.
 
     Attributes
     ----------
     low, high
-        Box of the places, (3,); inf and -inf for none.
+        Box of the light's places, (3,); inf and -inf for none.
     back, forth
         Least and largest move along each axis, (3,).
     """
@@ -59,7 +58,7 @@ class Ways:
 
     @classmethod
     def of(cls, structure: Structure, light: LightFacts) -> "Ways":
-        """Return those of one light."""
+        """Return the ways from one light."""
         if light.position is not None:
             return cls.between(light.position, light.position)
         if light.toward is not None:
@@ -69,11 +68,11 @@ class Ways:
         if light.shape is not None:
             shape = structure.shapes[structure.numbers[light.shape]]
             return cls.between(shape.low, shape.high)
-        # An environment comes from everywhere that the receiver faces.
+        # An environment shines from everywhere that the receiver faces.
         return cls.between(np.full(3, -np.inf), np.full(3, np.inf))
 
     def __or__(self, other: "Ways") -> "Ways":
-        """Return the least that holds both."""
+        """Return the smallest ways that hold both."""
         return Ways(
             np.minimum(self.low, other.low),
             np.maximum(self.high, other.high),
@@ -82,7 +81,7 @@ class Ways:
         )
 
     def to(self, structure: Structure, receivers: np.ndarray, shining: int = -1) -> Queries:
-        """Return the questions what lies on the ways to some shapes, but for one that shines."""
+        """Return the queries for shapes on the ways to others, except for one that shines."""
         own = structure.tree.shapes.take(receivers)
         low = np.minimum(own.low + self.back, self.low)
         high = np.maximum(own.high + self.forth, self.high)
@@ -96,7 +95,7 @@ def _between(facts: Facts) -> str | None:
     judged = structure.lights[: structure.lights.index(hiding)] if hiding else structure.lights
     ways = [Ways.of(structure, light) for light in judged]
     if ways:
-        # One question about all lights answers most receivers.
+        # One query about all lights settles most receivers.
         receivers = structure.reflecting
         receivers = receivers[tree.answered(reduce(or_, ways).to(structure, receivers))]
         for light, way in zip(judged, ways, strict=True):
@@ -117,7 +116,7 @@ NO_SHADOWS = Pruning(
     name="no shadow rays",
     absent="no shape can stand between a light and a reflecting surface",
     proof="Light from a point y reaches a surface point x along a segment, which lies in the box"
-    " around y and the shape of x. A shape whose box does not meet that one does not meet the"
+    " around y and the shape of x. A shape whose box does not touch that one does not touch the"
     " segment. The shape of x itself is not an obstacle: x lies on its outer side and is seen from"
     " outside, and a segment that passes through the shape arrives from behind, where an opaque"
     " BSDF returns nothing. A light that is flat, or convex and shines outwards, does not hide the"
@@ -125,7 +124,8 @@ NO_SHADOWS = Pruning(
     premises=(
         *KNOWN_SURFACES,
         Premise(
-            "No shape's box meets the box around a light and a shape that reflects, unless it lies"
+            "No shape's box touches the box around a light and a shape that reflects, unless it"
+            " lies"
             " behind that one's only reflecting side; no light hides itself.",
             _between,
         ),
@@ -135,14 +135,14 @@ NO_SHADOWS = Pruning(
 OCCLUSION = Effect(
     order=80,
     label="occlusion",
-    heuristic="none, or where asked for",
+    heuristic="none, or if requested",
     reference="shadow rays",
-    cost="a ray a light",
+    cost="a ray per light",
     pruning=NO_SHADOWS,
     part="visibility",
     colour="#0072b2",
     differs=lambda facts, called_for: called_for and not facts.has_shadows,
-    # A sample of the BSDF would meet what hides a light.
+    # A sample of the BSDF would hit what hides a light.
     without=lambda plan: replace(plan, shadows=False, bsdf_samples=0),
     step="shadows",
 )
@@ -163,7 +163,7 @@ NO_SECOND_REFLECTION = Pruning(
     absent="no point of a reflecting surface sees another one",
     proof="A second reflection needs two surface points that see each other, both on sides that"
     " reflect. Two points on the outer side of one convex shape never do, nor do two of a flat one."
-    " The inside of a closed shape is reached by no path that begins outside. Two points of"
+    " No path that begins outside reaches the inside of a closed shape. Two points of"
     " different shapes do not where one of the shapes is flat, reflects on one side, and the other"
     " lies behind it. A shape that reflects nothing takes no part.",
     premises=(
@@ -177,7 +177,7 @@ INTERREFLECTION = Effect(
     label="interreflection",
     heuristic="none",
     reference="paths",
-    cost="samples, two rays a reflection",
+    cost="samples, two rays per reflection",
     pruning=NO_SECOND_REFLECTION,
     part="transport",
     colour="#e69f00",

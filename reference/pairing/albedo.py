@@ -1,17 +1,17 @@
-"""Albedos of Mitsuba's plastics at normal incidence, as the plugins' own formulas give them.
+"""Albedos of Mitsuba's plastics at normal incidence, by the plugins' own formulas.
 
 The directional-hemispherical albedo is ``a = 2 pi int_0^(pi/2) f(theta) cos(theta) sin(theta)
 d(theta)``. At normal incidence the half vector stands at ``theta / 2`` and the lobe has the width
 ``alpha``; with ``t = tan(theta / 2) = alpha tan(s)`` it is smooth in ``s``, and Gauss-Legendre
-nodes in ``s`` serve rough and smooth surfaces alike. There ``roughplastic`` has (Walter, Marschner,
+nodes in ``s`` suit both rough and smooth surfaces. There ``roughplastic`` has (Walter, Marschner,
 Li and Torrance 2007, and the plugin's documentation)
 
     specular  F D G(theta) / 4,      D = exp(-t^2 / alpha^2) (1 + t^2)^2 / (pi alpha^2), or GGX's
     diffuse   rho' T(1) T(cos(theta)) cos(theta) / (pi eta^2),
 
 with the tabulated ``T`` and ``R`` of :mod:`reference.pairing.coat`, and ``rho' = rho / (1 - R)``,
-or ``rho / (1 - rho R)`` where ``nonlinear`` is on. What lies outside their range is left to the
-plugin itself (:func:`by_plugin`).
+or ``rho / (1 - rho R)`` if ``nonlinear`` is on. Outside their range the plugin itself is evaluated
+(:func:`by_plugin`).
 """
 
 from collections.abc import Iterable
@@ -29,14 +29,14 @@ from reference.pairing.coat import Interface
 NODES = 96
 
 KEPT = coat.KEPT
-"""Materials of which results are kept."""
+"""Materials whose results are kept."""
 
 SHARPEST, ROUGHEST = 1e-3, 100.0
-"""Roughness for which the plugin's albedos are given to 1e-5; outside it is asked itself, though
-for the diffuse part alone below."""
+"""Roughness for which the plugin's albedos are reproduced to 1e-5. Outside, the plugin itself is
+evaluated; below, only for the diffuse part."""
 LEAST_RATIO, LARGEST_RATIO = 0.71, 20.0
-"""The same of indices of refraction. Below ``sqrt(1/2)`` facets reflect totally head on, and single
-precision tells which nodes see it."""
+"""The same for indices of refraction. Below ``sqrt(1/2)`` facets reflect totally head on, and
+single precision decides which nodes see it."""
 
 DISTRIBUTIONS = ("beckmann", "ggx")
 
@@ -46,7 +46,7 @@ class RoughPlastic:
     """Parameters of Mitsuba's ``roughplastic``.
 
     ``diffuse_reflectance`` and ``specular_reflectance`` have three components, ``int_ior`` is
-    relative to vacuum as Mitsuba has it, and ``alpha`` is the root-mean-square slope.
+    relative to vacuum, as in Mitsuba, and ``alpha`` is the root-mean-square slope.
     """
 
     diffuse_reflectance: tuple[float, float, float]
@@ -60,7 +60,7 @@ class RoughPlastic:
 
 @dataclass(frozen=True)
 class Albedo:
-    """The two parts of the albedo at normal incidence, one value a channel."""
+    """The two parts of the albedo at normal incidence, one value per channel."""
 
     diffuse: np.ndarray
     specular: np.ndarray
@@ -82,7 +82,7 @@ def of_roughplastic(plastic: RoughPlastic) -> Albedo:
 
 
 def specular_of(plastic: RoughPlastic) -> np.ndarray:
-    """Return the specular part of :func:`of_roughplastic`, which takes no kernel."""
+    """Return the specular part of :func:`of_roughplastic`; it does not need a kernel."""
     interface = _interface(plastic)
     if interface is None:
         return by_plugin(plastic).specular
@@ -90,7 +90,7 @@ def specular_of(plastic: RoughPlastic) -> np.ndarray:
 
 
 def prepare(plastics: Iterable[RoughPlastic]) -> None:
-    """Compute what takes kernels for many surfaces at once (:func:`coat.prepare`)."""
+    """Run the kernels for many surfaces at once (:func:`coat.prepare`)."""
     coat.prepare(one for one in map(_coated, plastics) if one is not None)
 
 
@@ -108,20 +108,20 @@ def of_smooth_plastic(
     leaving = weight @ ((1 - _fresnel(cosine, eta)) * cosine) / np.pi / eta**2
     returned = _smooth_return(eta)
     base = level / (1 - (level if nonlinear else 1) * returned)
-    # Beyond an index of 4 the fit throws back more than all, and the plugin's base is below 0.
+    # Beyond an index of 4 the fit reflects more than all, and the plugin's base is below 0.
     return max(float(base * (1 - mirror) * leaving), 0.0), mirror
 
 
 @lru_cache(maxsize=KEPT)
 def _smooth_return(eta: float) -> float:
-    """Return what a smooth coat throws back of diffuse light from within, by Mitsuba's fit."""
+    """Return a smooth coat's reflectance for diffuse light from within, by Mitsuba's fit."""
     return float(mi.fresnel_diffuse_reflectance(mi.Float(1 / eta))[0])
 
 
 def by_plugin(plastic: RoughPlastic) -> Albedo:
-    """Return what :func:`of_roughplastic` does by quadrature of the plugin itself, which is slow.
+    """Return the same as :func:`of_roughplastic` by quadrature of the plugin itself, which is slow.
 
-    The diffuse part is computed for each channel, since ``nonlinear`` makes it no multiple of the
+    The diffuse part is computed per channel, since with ``nonlinear`` it is not a multiple of the
     reflectance; the specular part is a multiple of ``specular_reflectance``.
     """
     levels = dict.fromkeys(plastic.diffuse_reflectance)
@@ -132,8 +132,8 @@ def by_plugin(plastic: RoughPlastic) -> Albedo:
 
 
 def _interface(plastic: RoughPlastic) -> Interface | None:
-    """Return the surface of a plastic, None where it is the plugin's to say what comes out."""
-    # The plugin keeps both in single precision, which tells near an IOR of 1.
+    """Return the surface of a plastic, None if the plugin itself must be evaluated."""
+    # The plugin keeps both in single precision, which matters near an IOR of 1.
     alpha = float(np.float32(plastic.alpha))
     with np.errstate(all="ignore"):
         eta = float(np.float32(plastic.int_ior) / np.float32(plastic.ext_ior))
@@ -202,8 +202,8 @@ def _parts(plastic, level):
     )
     theta, weight = nodes(plastic.alpha)
     si, wo = _head_on(theta)
-    # Each part by itself: near an IOR of 1 their difference from the whole would be rounding. Which
-    # component is which is told by its flags, not by its place.
+    # Each part separately: near an IOR of 1 a difference would be rounding. Flags, not places,
+    # identify components.
     parts = []
     for flag in (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection):
         context = mi.BSDFContext()
@@ -215,7 +215,7 @@ def _parts(plastic, level):
 
 @lru_cache(maxsize=KEPT)
 def nodes(alpha: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return polar angles and weights of the quadrature, ``sin(theta)`` included in the weights."""
+    """Return polar angles and weights of the quadrature; the weights include ``sin(theta)``."""
     points, weights = coat.legendre(NODES)
     end = np.arctan(1 / alpha)
     s = end * (points + 1) / 2

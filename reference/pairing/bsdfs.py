@@ -1,4 +1,4 @@
-"""Replacing the BSDFs of a scene by their counterparts, after the conventions of pairing."""
+"""Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing."""
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -20,18 +20,18 @@ COLOURS = {
     "principled": ("base_color",),
     "phong": ("k_i", "k_a", "k_d", "k_s"),
 }
-"""Colours that are read when a scene is paired, and checked before."""
+"""Colours that pairing reads; they are checked before."""
 
 
 PLASTICS = (1.3, 1.8)
-"""Indices of refraction of real plastics: fluoropolymers have 1.3, those full of sulphur 1.76."""
+"""Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
 
 
 @dataclass(frozen=True)
 class PairedBSDF:
-    """What a BSDF was replaced by, what the replacement misses, and what it has no form for.
+    """The replacement of a BSDF, the quantities that it misses, and what it has no form for.
 
-    ``note`` says what is odd about the replacement.
+    ``note`` describes anything odd about the replacement.
     """
 
     name: str
@@ -44,7 +44,7 @@ class PairedBSDF:
 
 
 def give_default(graph: Graph) -> None:
-    """Give shapes without a BSDF the one that Mitsuba gives them, so that it can be paired."""
+    """Give shapes without a BSDF Mitsuba's default, so it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
         if not graph.children(shape, BSDF) and not graph.children(shape, mi.ObjectType.Shape):
             glows = graph.children(shape, mi.ObjectType.Emitter)
@@ -53,7 +53,7 @@ def give_default(graph: Graph) -> None:
 
 
 def check(graph: Graph) -> None:
-    """Refuse coefficients that are no reflectances.
+    """Reject coefficients that are not reflectances.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def to_heuristic(graph: Graph, convention: Convention) -> list[PairedBSDF]:
     Returns
     -------
     list of PairedBSDF
-        One for each BSDF that was not ``phong``, nested ones included, those around them not.
+        One per BSDF that was not ``phong``, including nested ones, without those around them.
     """
     nodes = graph.nodes(BSDF)
     simple.prepare(graph, convention)
@@ -124,7 +124,7 @@ def _shown(graph, index, material):
 
 
 def _unfold_twosided(graph, index):
-    """Turn the mark that a replaced phong left into Mitsuba's ``twosided``."""
+    """Turn the mark left by a replaced phong into Mitsuba's ``twosided``."""
     props = graph.props(index)
     if "twosided" in props:
         del props["twosided"]
@@ -163,18 +163,18 @@ def _physical_properties(graph, index, convention):
 
 
 def physical_partner(graph: Graph, index: int, convention: Convention) -> Any:
-    """Return the properties of the physical BSDF that stands for a ``phong``."""
+    """Return the properties of the physical BSDF that replaces a ``phong``."""
     props, _ = _physical_properties(graph, index, convention)
     return props
 
 
 def _unreal(plastic):
-    """Return a note on an index of refraction that no real plastic has; empty for others."""
+    """Return a note on an index of refraction that no real plastic has, or an empty string."""
     low, high = PLASTICS
     index = plastic.int_ior / plastic.ext_ior
     if low <= index <= high:
         return ""
-    return f"no real plastic has the index {index:.3g}: theirs are {low:g} to {high:g}"
+    return f"no real plastic has the index {index:.3g}: they have {low:g} to {high:g}"
 
 
 def phong(graph: Graph, index: int) -> Phong:
@@ -183,7 +183,7 @@ def phong(graph: Graph, index: int) -> Phong:
     Raises
     ------
     InputError
-        When a coefficient is a texture or a tabulated spectrum, or not allowed.
+        If a coefficient is a texture or a tabulated spectrum, or not allowed.
     """
     props = graph.props(index)
     return Phong(

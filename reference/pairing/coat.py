@@ -1,18 +1,18 @@
-"""What Mitsuba's ``roughplastic`` lets through its coat, by that plugin's own quadratures.
+"""Transmission through the coat of Mitsuba's ``roughplastic``, by that plugin's quadratures.
 
-When it is made, the plugin tabulates by Gauss-Legendre rules over visible microfacet normals ``m``
+When created, the plugin tabulates by Gauss-Legendre rules over visible microfacet normals ``m``
 
     T(mu) = sum w G(o) (1 - F),  o the refracted direction,   at 64 cosines mu,
     R = 2 mean(mu sum w G(o) F),  o the reflected one,  seen from within, over the same cosines,
 
-for light that comes at the cosine ``mu``, with Fresnel's ``F`` and Smith's masking ``G``. The rules
-are coarse enough to show: ``1 - R`` is uneven by 1e-4 in the index of refraction, so that no table
-of it gives back what the plugin renders with. Here the same sums run as kernels over many surfaces
-at once, and those of one surface are kept. Source: the plugin's documentation, and Walter,
-Marschner, Li and Torrance (EGSR 2007) for ``F``, ``G`` and the refracted direction.
+for light that arrives at the cosine ``mu``, with Fresnel's ``F`` and Smith's masking ``G``. The
+rules are visibly coarse: ``1 - R`` is uneven by 1e-4 in the index of refraction, so no table of it
+reproduces the plugin's values. Here the same sums run as kernels over many surfaces at once, and
+results are kept. Source: the plugin's documentation, and Walter, Marschner, Li and Torrance (EGSR
+2007) for ``F``, ``G`` and the refracted direction.
 
-Two symmetries halve the work: light comes in the plane of x and z, so that slopes along y count
-once for both signs, and Beckmann's slopes along x and y are independent.
+Two symmetries halve the work: light arrives in the plane of x and z, so slopes along y count once
+for both signs, and Beckmann's slopes along x and y are independent.
 """
 
 from collections.abc import Iterable
@@ -31,13 +31,13 @@ COSINES = np.maximum(np.linspace(0, 1, ROWS, dtype=np.float32), np.float32(1e-6)
 SINES = np.sqrt(1 - COSINES * COSINES)
 
 COARSE, FINE = 32, 128
-"""Nodes along each axis of a rule: coarse into the denser side, fine out of it."""
+"""Nodes along each axis of a rule: few into the denser side, many out of it."""
 
 AT_ONCE = 64
-"""Surfaces a kernel: as many as keep all cores busy, in memory of some ten megabytes."""
+"""Surfaces per kernel: enough to keep all cores busy, in some ten megabytes of memory."""
 
 KEPT = 4096
-"""Surfaces of which the sums are kept."""
+"""Surfaces whose sums are kept."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _keep(chunk: list[Interface], distribution: str, is_denser: bool) -> None:
 
 
 def keep(found: dict, more: dict) -> None:
-    """Add results to those that are kept, and forget the oldest beyond :data:`KEPT`."""
+    """Keep results, and drop the oldest beyond :data:`KEPT`."""
     found.update(more)
     for one in list(found)[: max(len(found) - max(KEPT, len(more)), 0)]:
         del found[one]
@@ -101,7 +101,7 @@ def _sums(
 ) -> np.ndarray:
     """Return the sums over rules of ``size`` by ``size`` nodes, (interfaces, 64).
 
-    One thread is one node along the first axis, and goes through those along the second.
+    Each thread handles one node along the first axis, and loops over those along the second.
     """
     half = size // 2
     rule = _rule(size)
@@ -134,8 +134,8 @@ class Rule:
 
     ``place`` are the nodes in (0, 1), ``normal`` Beckmann's slopes at the second half of them,
     ``disc`` (x, y) GGX's points of the unit disc, first axis by half of the second. ``rounded`` is
-    what all weights come to in the plugin, which adds one after the other in single precision:
-    Beckmann's terms are mostly bare weights, and 1e-6 off ``R`` is 1e-5 of a bright base.
+    the sum of all weights in the plugin, which adds them one by one in single precision: Beckmann's
+    terms are mostly bare weights, and an error of 1e-6 in ``R`` is 1e-5 of a bright base.
     """
 
     cosine: mi.Float
@@ -154,7 +154,7 @@ def _rule(size: int) -> Rule:
 
 @cache
 def _rule_in(variant: str, size: int) -> Rule:
-    """Return the :class:`Rule` in a variant, to which its arrays belong."""
+    """Return the :class:`Rule` with the arrays of a variant."""
     nodes, weights = legendre(size)
     half = size // 2
     place: np.ndarray = np.asarray(nodes, np.float32) * np.float32(0.5) + np.float32(0.5)
@@ -165,7 +165,7 @@ def _rule_in(variant: str, size: int) -> Rule:
         mi.Float(SINES),
         mi.Float(place),
         mi.Float(weights / 2),
-        mi.Float(weights[half:]),  # half of a weight, for either sign
+        mi.Float(weights[half:]),  # half of a weight for each sign
         mi.Float(erfinv(nodes[half:])),
         (disc.x, disc.y),
         float(np.cumsum(np.float32(np.outer(weights, weights) / 4), dtype=np.float32)[-1]),
@@ -185,14 +185,14 @@ def _slopes(distribution, rule, alpha, mu, sine, node):
     half = dr.width(rule.normal)
     if distribution == "beckmann":
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, alpha)
-        # The middle of the other axis has no slope along y.
+        # The middle of the other axis has a slope of 0 along y.
         middle = mi.Point2f(dr.gather(mi.Float, rule.place, node), 0.5)
         facet, _ = facets.sample(mi.Vector3f(sine, 0, mu), middle)
         x = facet.x / facet.z
         dr.eval(x)
         return lambda index: (x, alpha * dr.gather(mi.Float, rule.normal, index))
 
-    # Heitz (JCGT 2018): the disc is seen along the stretched direction, and turned back.
+    # Heitz (JCGT 2018): project the disc along the stretched direction, and turn it back.
     length = dr.rsqrt(dr.square(alpha * sine) + dr.square(mu))
     along, across = mu * length, alpha * sine * length
     share = (1 + along) / 2
@@ -223,7 +223,7 @@ def _value(distribution, alpha, eta, inverse, mu, sine, x, y, is_refracted):
         turn, keep, share = (inside - cosine * inverse) * normal, -inverse, 1 - reflected
     else:
         turn, keep, share = 2 * cosine * normal, 1, reflected
-    # Away from the surface, on either side of it.
+    # Away from the surface, on either side.
     height = dr.fma(-keep, mu, turn)
     side = dr.square(dr.fma(turn, x, -keep * sine)) + dr.square(turn * y)
     leaves = (height > 0) & ((inside if is_refracted else cosine) > 0)

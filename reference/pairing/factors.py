@@ -1,4 +1,4 @@
-"""Pairing: which heuristic value stands for which physical one. Each factor is stated here once.
+"""Pairing: which heuristic value corresponds to which physical one. Factors are stated only here.
 
 Lights and diffuse surfaces pair exactly (:mod:`heuristic.convention`: irradiance ``E = pi I_p``):
 
@@ -49,20 +49,20 @@ INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
 
 MATCHING_TOLERANCE = 1e-5
-"""Relative; a match that is farther off is recorded as a miss."""
+"""Relative tolerance; a larger mismatch is recorded as a miss."""
 
 
 class Convention(Enum):
     """How roughplastic and phong are paired.
 
     ``LITERAL``
-        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))`` whatever the
-        form of the lobe, IOR 1.5. The other way the name ``specular_reflectance`` gives ``k_s``.
+        By parameter name, as in a port: ``rho = k_d``, ``alpha = sqrt(2 / (n + 2))`` for any form
+        of the lobe, IOR 1.5. In reverse, ``specular_reflectance`` becomes ``k_s``.
     ``MATCHED``
         By albedo at normal incidence (light along the normal, light leaving in all directions):
         ``rho`` such that the diffuse part's albedo is ``k_d``, the IOR such that the specular
-        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the lobe's top is as
-        wide (:func:`alpha_of`).
+        part's is the lobe's (:func:`specular_albedo`), and ``alpha`` such that the top of the lobe
+        has the same width (:func:`alpha_of`).
     """
 
     LITERAL = "literal"
@@ -71,7 +71,7 @@ class Convention(Enum):
 
 @dataclass(frozen=True)
 class Phong:
-    """Coefficients, exponent and form of a phong material; three components a coefficient."""
+    """Coefficients, exponent and form of a phong material; three components per coefficient."""
 
     k_d: tuple[float, float, float]
     k_s: tuple[float, float, float]
@@ -82,7 +82,7 @@ class Phong:
 
 @dataclass(frozen=True)
 class Miss:
-    """A quantity that no parameter of the other model reaches, with how near it came."""
+    """A quantity that no parameter of the other model reaches, and the nearest value."""
 
     what: str
     wanted: float
@@ -90,14 +90,15 @@ class Miss:
 
 
 def alpha_of(n: float, form: str = "phong") -> float:
-    """Return the roughness whose microfacet lobe is as wide as a lobe of exponent ``n``.
+    """Return the roughness whose microfacet lobe has the width of a lobe of exponent ``n``.
 
     At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
     ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
-    the half vector: it needs an exponent of a quarter for the same width, ``alpha = sqrt(1 / (2 n +
-    1))``. Both forms are 1 at ``n = 0``. Near the top, that is: at half their height Phong's lobe
-    and the microfacets' are within 3 % of one width from ``n = 30`` on, and 9 % apart at ``n = 9``.
+    the half vector: it needs a quarter of the exponent for the same width, ``alpha = sqrt(1 / (2 n
+    + 1))``. Both forms are 1 at ``n = 0``. The match holds near the top: at half their height the
+    widths of Phong's lobe and the microfacets' agree within 3 % from ``n = 30`` on, and differ by 9
+    % at ``n = 9``.
 
     >>> alpha_of(12)
     0.2
@@ -117,11 +118,11 @@ def exponent_of(alpha: float, form: str = "phong") -> float:
 
 
 def specular_albedo(phong: Phong) -> np.ndarray:
-    """Return the albedo of a phong's lobe at normal incidence, for each channel.
+    """Return the albedo of a phong's lobe at normal incidence, per channel.
 
     ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
     irradiance, hence ``(k_s / pi) 2 pi int cos^n cos sin d(theta)``. In general it is ``k_s`` over
-    :func:`heuristic.terms.normalisation`, and ``k_s`` itself where the lobe is normalised.
+    :func:`heuristic.terms.normalisation`, and ``k_s`` itself if the lobe is normalised.
 
     >>> specular_albedo(Phong(k_d=(0.5, 0.5, 0.5), k_s=(0.6, 0.6, 0.6), n=4)).round(9).tolist()
     [0.2, 0.2, 0.2]
@@ -131,9 +132,9 @@ def specular_albedo(phong: Phong) -> np.ndarray:
 
 
 def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, list[Miss]]:
-    """Return the :class:`RoughPlastic` that stands for a :class:`Phong`, and what it misses.
+    """Return the :class:`RoughPlastic` that corresponds to a :class:`Phong`, and its misses.
 
-    In the current variant of Mitsuba, since its own plugin tells the albedo:
+    It uses the current variant of Mitsuba, whose plugin determines the albedo:
 
     >>> grey = (0.5, 0.5, 0.5)
     >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
@@ -160,7 +161,7 @@ _whites: dict[Phong, RoughPlastic] = {}
 
 
 def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
-    """Find together the white plastics whose reflectance :func:`to_roughplastic` then chooses."""
+    """Find together the white plastics that :func:`to_roughplastic` then colours."""
     if convention is Convention.LITERAL:
         return
     found = {phong: _white(phong) for phong in phongs if phong not in _whites}
@@ -177,7 +178,7 @@ def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
 
 
 def to_phong(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list[Miss]]:
-    """Return the :class:`Phong` that stands for a :class:`RoughPlastic`, and what it misses.
+    """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`, and its misses.
 
     By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
 
@@ -197,7 +198,7 @@ def to_phong(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list
 
 
 def _white(phong):
-    """Return the white plastic with a phong's lobe, of the same specular albedo if it can."""
+    """Return the white plastic with a phong's lobe, with the same specular albedo if possible."""
     alpha = alpha_of(phong.n, phong.form)
     strength = max(phong.k_s)
     tint = tuple(k_s / strength for k_s in phong.k_s)
@@ -222,7 +223,7 @@ def _misses(wanted, reached):
 
 
 def _at_most_one(what, colour):
-    """Return a colour limited to 1, and what the limit took away."""
+    """Return a colour limited to 1, and the excess."""
     limited = tuple(min(component, 1.0) for component in colour)
     misses = [
         Miss(what, wanted, reached)

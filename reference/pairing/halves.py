@@ -1,8 +1,8 @@
 """The two halves of a pair, derived from one scene.
 
-A scene may be physical (a user's own), heuristic (a textbook figure), or a mixture: the heuristic
-half replaces what is physical, the physical half replaces what is heuristic, and what is already of
-the right kind stays. Geometry, cameras and films are those of the scene in both.
+A scene may be physical (a user's), heuristic (a textbook figure), or a mixture: the heuristic half
+replaces physical parts, the physical half replaces heuristic parts, and parts of the right kind
+stay. Both keep the scene's geometry, cameras and films.
 """
 
 from contextlib import contextmanager
@@ -41,17 +41,17 @@ class Pair:
     heuristic, physical
         Graphs of the two halves; :meth:`Graph.instantiate` makes the Mitsuba scenes.
     hide_emitters
-        Whether camera rays see lights and environment; alike in both halves.
+        Whether camera rays do not see lights and environment; the same in both halves.
     max_depth
         The scene's own limit on path length, -1 for none.
     convention, bsdfs, emitters, misses, warnings
-        What was replaced by what.
+        The replacements.
     integrator, rr_depth
-        The scene's own integrator and where it begins Russian roulette, None where not given.
+        The scene's own integrator and where it begins Russian roulette, None if omitted.
     media
         Labels and plugins of participating media.
     overridden
-        What the scene asks for and does not get, :class:`reference.scene.preparation.Overridden`.
+        What the scene requests and does not get, :class:`reference.scene.preparation.Overridden`.
     shading
         Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     """
@@ -93,27 +93,27 @@ def pair(
     convention : Convention
         How roughplastic and phong are paired.
     resolution : (width, height), optional
-        In place of the film's own.
+        Replaces the film's.
     interpolation : Interpolation
-        Of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
+        Interpolation of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
     tessellation : int, optional
-        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 if omitted;
-        given, it makes meshes for PHONG too.
+        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 if omitted. If given, PHONG
+        gets meshes too.
     prune
         Whether the kernel leaves out the terms that no material has.
     sensor
-        Number of the sensor among those of the scene.
+        Number of the scene's sensor.
     heuristic
         Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     with_partners
         Whether its materials know their physical partners (:mod:`reference.pairing.partners`), as
-        they do for every heuristic of a user's own.
+        they do for every user's heuristic.
 
     Raises
     ------
     InputError
-        When Mitsuba cannot read the scene or make it, it has no such sensor, or the heuristic is
-        not declared.
+        If Mitsuba cannot read or make the scene, it has no such sensor, or the heuristic is not
+        declared.
     """
     register()
     graph = source.parse()
@@ -125,7 +125,7 @@ def pair(
 
 @contextmanager
 def _refused_by_mitsuba(graph):
-    """Let Mitsuba say what is wrong with a scene that breaks pairing, if it refuses it too."""
+    """Prefer Mitsuba's message for a scene that breaks pairing, if it rejects it too."""
     try:
         yield
     except FotismosError:
@@ -188,7 +188,7 @@ def _paired(
 
 
 def _bare(graph):
-    """Return a copy of a graph without materials, which can take long to make."""
+    """Return a copy of a graph without materials, which can be slow to make."""
     copy = graph.copy()
     for shape in copy.nodes(mi.ObjectType.Shape):
         for kind in (mi.ObjectType.BSDF, mi.ObjectType.Medium):
@@ -208,7 +208,7 @@ def _set_integrator(graph, ambient, settings, interpolation, prune, model):
     )
     if ambient is not None:
         props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
-    props.set_id("integrator")  # by which its parameters are found
+    props.set_id("integrator")  # identifies its parameters
     graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 

@@ -27,11 +27,12 @@ def replace_shapes(
     graph : reference.scene.graph.Graph
         The graph to change. It keeps the folder that the meshes are written to until it is deleted.
     scene : mitsuba.Scene
-        The same shapes, instantiated; they are told by their ids.
+        The same shapes, instantiated; ids identify them.
     resolution
-        Of what is not a mesh yet, as in :func:`heuristic.meshes.to_mesh`; None for its default.
+        Resolution for other shapes than meshes, as in :func:`heuristic.meshes.to_mesh`; None for
+        its default.
     interpolation : Interpolation
-        Gouraud shading needs one normal a vertex, hence faces that share none where the mesh has
+        Gouraud shading needs one normal per vertex, hence separate faces if the mesh has
         ``face_normals``.
 
     Raises
@@ -40,18 +41,18 @@ def replace_shapes(
         Naming a shape that cannot be made into triangles, or a sensor without the one viewpoint
         that flat and Gouraud shading need.
     OutputError
-        Where there is no room for the meshes.
+        If there is no room for the meshes.
     """
     if interpolation is not Interpolation.PHONG:
-        viewpoint(scene.sensors()[0])  # refuses what has none before anything renders
+        viewpoint(scene.sensors()[0])  # raises before anything renders
     folder = _Folder()
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(SHAPE):
         given = graph.props(index)
         if given.id() not in shapes or graph.plugin(index) == "instance":
             raise InputError(
-                f"{graph.name}: {graph.label(index)}: instances and their groups cannot be made"
-                " into meshes of their own. Use --interpolation phong."
+                f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
+                " separate meshes. Use --interpolation phong."
             )
         mesh = meshes.to_mesh(shapes[given.id()], resolution or meshes.RESOLUTION)
         if mesh.has_face_normals():
@@ -64,11 +65,10 @@ def replace_shapes(
             mesh.write_ply(str(path))
         except RuntimeError as error:
             raise OutputError(
-                f"{graph.name}: {error}. Free some space, or name another folder for temporary"
-                " files in TMPDIR."
+                f"{graph.name}: {error}. Free some space, or set TMPDIR to another folder."
             ) from error
         children = {key: value for key, value in given.items() if isinstance(value, Reference)}
-        # The file holds world coordinates; flat faces are told by the lack of vertex normals.
+        # The file holds world coordinates; a mesh without vertex normals has flat faces.
         derived = properties("ply", filename=str(path), **children)
         if mesh.has_face_normals():
             derived["face_normals"] = True
@@ -79,7 +79,8 @@ def replace_shapes(
 class _Folder:
     """A temporary folder that goes away with the last graph that names it.
 
-    ``TemporaryDirectory`` would warn of that, and suites which make warnings errors would fail.
+    ``TemporaryDirectory`` would warn about it, and test suites that make warnings errors would
+    fail.
     """
 
     def __init__(self):

@@ -1,6 +1,6 @@
-"""What a heuristic of a user's own may ask of the physical materials: the parameters of engines.
+"""Parameters of the physical materials, as engines have them, for users' heuristics.
 
-Of each BSDF of a scene, physical or heuristic, before it is replaced:
+For each BSDF of a scene, physical or heuristic, before it is replaced:
 
 ======================  =================================  ===================  =========  =========
 BSDF                    ``base_color``                     ``alpha``            ``ior``    ``metal-
@@ -24,8 +24,8 @@ any other               albedo of its diffuse part at      measured             
                                                                                 albedo
 ======================  =================================  ===================  =========  =========
 
-``twosided``, ``mask``, ``bumpmap`` and ``normalmap`` have what is inside, ``blendbsdf`` the blend.
-An interface of index 1 is none: it reflects nothing at normal incidence.
+``twosided``, ``mask``, ``bumpmap`` and ``normalmap`` take the values of the nested BSDF,
+``blendbsdf`` the blend. Index 1 means no interface: it reflects nothing at normal incidence.
 """
 
 from dataclasses import dataclass, fields
@@ -46,12 +46,12 @@ from reference.scene.graph import Graph
 BSDF = mi.ObjectType.BSDF
 
 LARGEST_IOR = 4.0
-"""Of what is measured: germanium has 4."""
+"""Limit of measured indices: germanium has 4."""
 
 
 @dataclass(frozen=True)
 class Partner:
-    """The parameters of a physical material; values as of `nearest.operations`."""
+    """The parameters of a physical material; values as in `nearest.operations`."""
 
     base_color: Any = 0.0
     alpha: Any = 1.0
@@ -59,7 +59,7 @@ class Partner:
     metallic: Any = 0.0
 
     def named(self) -> dict[str, Any]:
-        """Return them by the names of the plugin ``phong``."""
+        """Return them under the names of the plugin ``phong``."""
         found = {each.name: getattr(self, each.name) for each in fields(self)}
         colour = found["base_color"]
         found["base_color"] = mi.ScalarColor3f(colour) if isinstance(colour, tuple) else colour
@@ -72,7 +72,7 @@ def read(graph: Graph, convention: Convention) -> dict[int, Partner]:
 
 
 def give(graph: Graph, partners: dict[int, Partner]) -> None:
-    """Give the ``phong`` that stands for each BSDF the parameters of its partner."""
+    """Give the ``phong`` that replaces each BSDF the parameters of its partner."""
     for index, partner in partners.items():
         if graph.plugin(index) == "phong":
             for name, value in partner.named().items():
@@ -127,7 +127,7 @@ def _dielectric(context: Context, index: int) -> Partner:
 def _principled(context: Context, index: int) -> Partner:
     roughness = context.value(index, "roughness", 0.5)
     specular = operations.plain(context.value(index, "specular", 0.5))
-    # Mitsuba's own reading of `specular`, F0 = 0.08 specular, as an index.
+    # Mitsuba's reading of `specular`, F0 = 0.08 specular, as an index.
     ior = 2 / (1 - sqrt(0.08 * specular)) - 1 if isinstance(specular, float) else 1.5
     return Partner(
         context.value(index, "base_color", 0.5),
@@ -148,7 +148,7 @@ def _measured(context: Context, index: int) -> Partner:
 
 
 def _alpha(context: Context, index: int) -> Any:
-    """Return the roughness of a BSDF, that of a smooth one too."""
+    """Return the roughness of a BSDF, also of a smooth one."""
     rough = context.plugin(index).startswith("rough")
     along = context.value(index, "alpha_u", 0.1)
     return _at_least(context.value(index, "alpha", along if rough else 0.0))

@@ -13,19 +13,20 @@ from reference.pairing.albedo import Albedo, RoughPlastic
 
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
-"""Reflects 2.5e-9 at normal incidence. Less is taken for that: Mitsuba refuses an IOR of 1."""
+"""Reflects 2.5e-9 at normal incidence; used for anything less, since Mitsuba rejects an IOR of
+1."""
 LARGEST_IOR = 10.0
-"""No dielectric comes near it; a larger specular albedo than it gives is recorded as missed."""
+"""No dielectric comes near it; a larger specular albedo is recorded as missed."""
 
 STEP = 1.02
-"""Ratio of logarithms of the IOR, to either side of one whose neighbours are compared."""
+"""Ratio of logarithms of the IOR between neighbours that are compared."""
 
 
 def of_lobe(plastic: RoughPlastic, wanted: float) -> float:
     """Return the IOR at which the specular albedo is ``wanted``, or the nearest one allowed.
 
     The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
-    1))^2``: its inverse is where the search begins.
+    1))^2``: the search begins at its inverse.
     """
 
     def reached(log_ior):
@@ -51,11 +52,11 @@ def of_lobe(plastic: RoughPlastic, wanted: float) -> float:
 
 
 def nearest(plastics: Sequence[RoughPlastic], wanted: Sequence[Albedo]) -> list[float]:
-    """Return the IOR, up to each plastic's own, whose albedos come nearest to the wanted ones.
+    """Return the IOR, up to each plastic's own, whose albedos are nearest to the requested ones.
 
-    A high index reflects more, and lets less through to the diffuse base and out again: no index
-    gives both parts. Nearest is the least sum of squares over the parts and channels. All are
-    searched for at once, since albedos of many surfaces take little longer than one.
+    A high index reflects more, and transmits less to the diffuse base and back: no index gives both
+    parts. The sum of squares over the parts and channels is minimised, for all plastics at once,
+    since albedos of many surfaces take little longer than one.
     """
 
     def distances(log_iors, which):
@@ -68,8 +69,8 @@ def nearest(plastics: Sequence[RoughPlastic], wanted: Sequence[Albedo]) -> list[
             [_distance(wanted[place], one) for place, one in zip(which, tried, strict=True)]
         )
 
-    # Where it is least is where it is level, values a step to either side being equal: the least
-    # value itself is too flat for single precision to tell its place.
+    # At the minimum the values one step to either side are equal: the minimum itself is too flat
+    # to locate in single precision.
     def slope(log_log_iors, which):
         log_iors = np.exp(log_log_iors)
         both = np.concatenate([log_iors * STEP, log_iors / STEP])
@@ -86,8 +87,8 @@ def nearest(plastics: Sequence[RoughPlastic], wanted: Sequence[Albedo]) -> list[
         is_rising = slope(low[searched], searched) >= 0
         between.extend(searched[~is_rising])
         searched = searched[is_rising & (low[searched] > smallest)]
-    # Where the slope rises even at the smallest IOR that one is nearest, where it never does the
-    # highest: there is nothing between.
+    # If the slope rises even at the smallest IOR, that one is nearest; if it never rises, the
+    # highest is: there is no minimum in between.
     if between:
         bracket, places = (low[between], high[between]), np.array(between)
         low[between] = find_root(slope, bracket, args=(places,), tolerances={"xatol": 1e-4}).x

@@ -1,1 +1,1 @@
-"""What a scene calls for, and the cheapest reference that simulates it."""
+"""The effects that a scene needs, and the cheapest reference that simulates them."""

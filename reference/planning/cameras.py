@@ -1,8 +1,8 @@
-"""Where camera rays begin: a set of points, not one.
+"""The origins of camera rays: a set of points, not one.
 
 A perspective camera's rays begin on its near clip plane, those of a thin lens on that plane too,
-and those of an orthographic camera on a plane as wide as the picture. Where such a set is not
-known, as for a sensor that lies on a shape, no rule may rely on where the camera stands.
+and those of an orthographic camera on a plane as wide as the picture. If the set is unknown, as for
+a sensor on a shape, no rule may rely on the camera's position.
 """
 
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ PLANAR = ("perspective", "thinlens", "orthographic")
 the lens's edge."""
 
 EDGE = 8
-"""Points along each side of the square that is mapped to the lens."""
+"""Points along each side of the square that maps to the lens."""
 
 MARGIN = 1.05
-"""The polygon of the points on a lens's edge, widened until it holds the disk; rounding as well."""
+"""Widens the polygon of points on a lens's edge until it holds the disk, with rounding."""
 
 
 @dataclass(frozen=True)
 class CameraFacts:
-    """Where the rays of the scene's camera begin.
+    """The origins of the rays of the scene's camera.
 
     Attributes
     ----------
     plugin
-        Of the sensor.
+        Plugin of the sensor.
     origins
-        Corners of a convex set that holds all origins, (N, 3); None where no such set is known.
+        Corners of a convex set that holds all origins, (N, 3); None if unknown.
     axis
         Unit normal of the plane that the set lies in, (3,).
     is_still
-        Whether the shutter opens for an instant only.
+        Whether the shutter opens only for an instant.
     """
 
     plugin: str
@@ -43,10 +43,10 @@ class CameraFacts:
     is_still: bool
 
     def is_outside(self, corners: np.ndarray) -> bool:
-        """Tell whether all rays certainly begin outside a box, given its corners (8, 3).
+        """Return whether all rays certainly begin outside a box, given its corners (8, 3).
 
-        Two convex sets are apart where a plane lies between them; tried are planes along the axes,
-        and those along the camera's own.
+        Two convex sets are apart if a plane lies between them; it tries planes along the axes and
+        along the camera's own.
         """
         if self.origins is None:
             return False
@@ -59,7 +59,7 @@ class CameraFacts:
 
 
 def camera_of(plugin: str, sensors: list[mi.Sensor]) -> CameraFacts:
-    """Return the facts of a scene's camera; of several sensors nothing is known."""
+    """Return the facts of a scene's camera; with several sensors nothing is known."""
     if len(sensors) != 1:
         return CameraFacts(plugin, None, None, False)
     (sensor,) = sensors

@@ -1,7 +1,6 @@
-"""Facts about a scene that the planning rules reason from: shapes, lights, camera.
+"""Facts about a scene for the rules of planning: shapes, lights, camera.
 
-Everything here errs on one side, so that a rule that rests on it never leaves out light that is
-there.
+Everything here errs on one side, so a rule that relies on it never leaves out light that exists.
 """
 
 from collections.abc import Iterator
@@ -30,7 +29,7 @@ BSDF, EMITTER, SENSOR, SHAPE = (
 
 @dataclass(frozen=True)
 class LightFacts:
-    """What is known about one light.
+    """The facts of one light.
 
     ``position`` belongs to a point or spot, ``toward`` the direction to a directional light,
     ``shape`` the name of the shape of an area light; the others are None.
@@ -52,16 +51,16 @@ class Structure:
     camera: CameraFacts
 
     def may_be_seen_from_inside(self, shape: ShapeFacts) -> bool:
-        """Tell whether a camera ray may begin inside a closed shape that reflects there."""
+        """Return whether a camera ray may begin inside a closed shape that reflects there."""
         return shape.is_hollow and not self.camera.is_outside(shape.corners())
 
     @cached_property
     def numbers(self) -> dict[str | None, int]:
-        """The place of each shape among them, by its name; the first of several alike."""
+        """The position of each shape among them, by its name; the first of several of that name."""
         return {shape.name: i for i, shape in reversed(list(enumerate(self.shapes)))}
 
     def shape(self, name: str | None) -> ShapeFacts | None:
-        """Return the shape of a name, None where there is none."""
+        """Return the shape of a name, None if there is none."""
         return self.shapes[self.numbers[name]] if name in self.numbers else None
 
     @cached_property
@@ -76,12 +75,12 @@ class Structure:
 
     @cached_property
     def reflecting_tree(self) -> ShapeTree:
-        """Those that reflect, in a tree."""
+        """The shapes that reflect, in a tree."""
         return self.tree.holding(self.reflecting)
 
 
 def examine(graph: Graph, scene: mi.Scene) -> Structure:
-    """Return the :class:`Structure` of a physical half: its graph, and the same instantiated."""
+    """Return the :class:`Structure` of a physical half, given its graph and its scene."""
     shapes = shape_facts(graph, scene.shapes())
     plugins = ", ".join(graph.plugin(index) for index in graph.nodes(SENSOR))
     camera = camera_of(plugins, scene.sensors())
@@ -112,9 +111,9 @@ class Facts:
     pair
         Both halves.
     structure
-        Of the physical half.
+        Structure of the physical half.
     interpolation
-        Of the heuristic half.
+        Interpolation of the heuristic half.
     """
 
     pair: Pair
@@ -123,7 +122,7 @@ class Facts:
 
     @cached_property
     def rulings(self) -> dict:
-        """What rules of pruning were judged already: rulings by rule."""
+        """Rulings so far, by rule of pruning."""
         return {}
 
     @cached_property

@@ -1,7 +1,7 @@
-"""Forms of shapes: flat, closed or convex, and which way the normals point that Mitsuba renders.
+"""Forms of shapes: flat, closed or convex, and the direction of the normals that Mitsuba renders.
 
-Everything is computed in NumPy from what a shape holds, since asking Mitsuba for surface points
-takes milliseconds per shape. The tests compare normals with those that Mitsuba's rays find.
+Everything is computed in NumPy from a shape's data, since asking Mitsuba for surface points takes
+milliseconds per shape. The tests compare the normals with those found by Mitsuba's rays.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,10 +13,10 @@ import mitsuba as mi
 import numpy as np
 
 ROUNDING = 1e-6
-"""Of a shape's size: dents less deep than single precision resolves do not count."""
+"""Share of a shape's size: dents below the resolution of single precision do not count."""
 
 ALIKE = 1 - 4e-6
-"""Cosine above which two unit normals of single precision are the same."""
+"""Cosine above which two unit normals of single precision count as equal."""
 
 LARGEST_MESH = 4_000_000
 """Vertices times faces up to which convexity is examined; larger meshes count as not convex."""
@@ -26,7 +26,7 @@ class Form(Enum):
     """What is certain about the form of a shape.
 
     ``FLAT`` lies in a plane. ``CLOSED`` bounds a convex body on all sides. ``CONVEX`` is a part of
-    the surface of a convex body, or all of it. Of ``OTHER`` nothing is known.
+    the surface of a convex body, or all of it. Nothing is known about ``OTHER``.
     """
 
     FLAT = "flat"
@@ -51,13 +51,13 @@ UNKNOWN = Geometry(Form.OTHER)
 
 
 def geometries(shapes: Sequence[mi.Shape]) -> list[Geometry]:
-    """Return the :class:`Geometry` of each shape; meshes of one size are looked at together."""
+    """Return the :class:`Geometry` of each shape; meshes of one size are examined together."""
     found = [UNKNOWN] * len(shapes)
     meshes: dict[tuple, list[int]] = {}
     for number, shape in enumerate(shapes):
         kind = shape.shape_type()
         if kind == +mi.ShapeType.Sphere:
-            # A transform that mirrors is in the flip already.
+            # The flip already includes a transform that mirrors.
             found[number] = Geometry(Form.CLOSED, not shape.has_flipped_normals())
         elif kind == +mi.ShapeType.Disk:
             found[number] = _disk(shape)
@@ -79,7 +79,7 @@ def geometries(shapes: Sequence[mi.Shape]) -> list[Geometry]:
 def _disk(shape: mi.Shape) -> Geometry:
     """A disk's normal is the third axis of its transform, which holds the flip.
 
-    Where a transform shears, that is not at right angles to the disk, but rendered all the same.
+    If a transform shears, that axis is not perpendicular to the disk, but Mitsuba renders with it.
     """
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, float).reshape(4, 4, -1)[:, :, 0]
     along_u, along_v, axis = matrix[:3, :3].T
@@ -112,7 +112,7 @@ class Meshes:
 
     @classmethod
     def of(cls, meshes: Sequence[mi.Mesh], smooth: bool) -> "Meshes":
-        """Return meshes of one size; where ``smooth``, they are shaded by normals at vertices."""
+        """Return meshes of one size; if ``smooth``, they are shaded by normals at vertices."""
         count = len(meshes)
 
         def read(buffers: Iterable[Any], kind: type) -> np.ndarray:
@@ -143,8 +143,8 @@ class Meshes:
     def convex(self) -> Iterator[Geometry]:
         """Return the facts of meshes whose vertices all lie on one side of each of their faces.
 
-        The side is the same for all faces: behind them, with normals outwards, or before them, as
-        of a bowl that is looked into.
+        The side is the same for all faces: behind them, with normals outwards, or in front of them,
+        as in a bowl seen from inside.
         """
         size = ROUNDING * np.ptp(self.points, axis=1).max(axis=1)
         places = np.sum(self.normals * self.first, axis=-1)[..., None]
@@ -161,11 +161,11 @@ def _taken(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return cross products of vectors (..., 3); NumPy's own takes several times as long."""
+    """Return cross products of vectors (..., 3); NumPy's function takes several times as long."""
     (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def _are_alike(normals: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell which vectors (..., 3), of any length, point along unit vectors."""
+    """Return which vectors (..., 3), of any length, point along unit vectors."""
     return np.sum(normals * others, axis=-1) > ALIKE * np.linalg.norm(normals, axis=-1)

@@ -1,4 +1,4 @@
-"""Where Mitsuba's integrators agree: on every light in the place of one, and on masks."""
+"""Cases in which Mitsuba's integrators agree: every light instead of one, and masks."""
 
 from reference.pairing import lights
 from reference.pairing.halves import Pair
@@ -23,18 +23,18 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
 
 LIGHT_BY_LIGHT = Pruning(
     name="light by light",
-    absent="noise of picking one light: the sum over all has the mean of one over its chance",
-    proof="Mitsuba picks a light at random and divides by the chance of that. The mean is the sum"
-    " over all lights, which `direct_all` takes at each sample. The two are equal where each"
-    " estimate of a light has the right mean, however a sample of the BSDF is weighted against it.",
+    absent="noise of picking one light: the sum over all equals the mean of one over its chance",
+    proof="Mitsuba picks a light at random and divides by its chance. The mean is the sum over"
+    " all lights, which `direct_all` takes at each sample. The two are equal if each estimate of"
+    " a light has the right mean, however a sample of the BSDF is weighted against it.",
     premises=(
         NO_MEDIUM,
         OPAQUE,
         Premise("The scene's paths have a depth of 2 or more.", _shallow),
         Premise(
             "No closed shape that shines and reflects inside is seen from inside: at points of its"
-            " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF does"
-            " not, so that its mean depends on how both are weighted.",
+            " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF"
+            " does not, so its mean depends on how both are weighted.",
             _seen_inside_a_lamp,
         ),
     ),
@@ -45,19 +45,19 @@ def _many(facts: Facts) -> str | None:
     count = len(facts.structure.lights)
     if count <= MOST_ASKED:
         return None
-    return f"{count:,} lights: {PICKS} a sample are picked, in proportion to what they give"
+    return f"{count:,} lights: {PICKS} per sample are picked, in proportion to their light"
 
 
 EVERY_LIGHT = Pruning(
     name="every light at every sample",
     absent="noise of picking some of the lights",
-    proof="Where each light is asked at each sample, none is picked. Where some are, what a light"
-    " gives is divided by how often it is expected to be picked, which is never 0: the mean is the"
+    proof="If each light is evaluated at each sample, none is picked. Otherwise a light's"
+    " contribution is divided by the expected number of picks, which is never 0: the mean is the"
     " sum over all lights.",
     premises=(
         Premise(
-            f"The scene has at most {MOST_ASKED:,} lights: of more, asking each takes longer than"
-            " the noise of picking some.",
+            f"The scene has at most {MOST_ASKED:,} lights: with more, evaluating each costs more"
+            " than the noise of picking some.",
             _many,
         ),
     ),
@@ -65,11 +65,11 @@ EVERY_LIGHT = Pruning(
 
 
 def loses_light(integrator: str, pair: Pair) -> bool:
-    """Tell whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
+    """Return whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
 
-    A camera ray that passes straight through everything that it meets, and ends in nothing that is
-    shown, counts as black, with what it gathered at the surfaces on its way. Of a closed mask of
-    opacity ``o`` before nothing, the share ``(1 - o)^2`` is lost. ``volpath`` keeps it.
+    A camera ray that passes straight through every surface, and ends in nothing visible, counts as
+    black, including the light gathered on its way. A closed mask of opacity ``o`` before nothing
+    loses the share ``(1 - o)^2``. ``volpath`` keeps it.
     """
     graph = pair.physical
     passing = any(graph.plugin(index) in ("mask", "null") for index in graph.nodes(BSDF))

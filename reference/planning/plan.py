@@ -1,10 +1,10 @@
-"""The cheapest reference that is right, chosen by what a scene calls for.
+"""The cheapest correct reference, chosen by the effects that a scene needs.
 
 ======================================  ===========================================================
-What the scene calls for                What is simulated
+The scene needs                         Simulated
 ======================================  ===========================================================
 neither occlusion nor interreflection   ``direct_all`` without shadow rays; a constant environment
-                                        from a table of the BSDF's albedo where there is one BSDF
+                                        from a table of the BSDF's albedo if there is one BSDF
 no interreflection                      ``direct_all``: points and directions exactly, the rest
                                         sampled
 interreflection between diffuse         ``direct_all`` with the indirect part sampled, and that
@@ -12,18 +12,18 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
-thousands of lights, whatever else      ``direct_all``, which picks some of them for each sample in
-                                        proportion to what they give; ``path`` picks them evenly
+thousands of lights, in any case        ``direct_all``, which picks some of them for each sample in
+                                        proportion to their light; ``path`` picks them evenly
 a BSDF that may let light through       ``path``, whatever the depth
 participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
-                                        or its extinction has a colour
+                                        or its extinction is coloured
 ======================================  ===========================================================
 
 All take the sampler of :mod:`reference.scene.sampler`: stratified, with the right mean at any
-number of samples. Samples are stratified within a pass, so that few passes of many samples are
-better than many of few; eight passes are enough for standard errors. Where neither lights nor lens
-need random numbers, only the pixel filter is left to sample, and four passes are enough to see what
-noise is left.
+number of samples. Samples are stratified within a pass, so few passes of many samples are better
+than many of few; eight passes are enough for standard errors. If neither lights nor lens need
+random numbers, only the pixel filter is sampled, and four passes are enough to see the remaining
+noise.
 """
 
 from collections.abc import Collection
@@ -59,7 +59,7 @@ SPP, PASSES = 512, 8
 """64 samples per pass take half the time of 16 for the same noise (``./run bench samplers``)."""
 
 EXACT_SPP, EXACT_PASSES = 256, 4
-"""Of plans whose only random numbers are the places of camera rays."""
+"""Passes of plans whose only random numbers are the places of camera rays."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,24 +69,26 @@ class Plan:
     Attributes
     ----------
     decisions
-        One for each effect, in their order.
+        One per effect, in their order.
     kernel_terms
-        The terms that the heuristic kernel holds.
+        The terms in the heuristic kernel.
     integrator, max_depth
-        Of the reference; ``max_depth`` counts as Mitsuba's: 2 is direct light, -1 no limit.
+        Integrator of the reference; ``max_depth`` counts like Mitsuba's: 2 is direct light, -1 no
+        limit.
     stock_integrator, scene_depth
-        What a user of Mitsuba gets without thinking, and the scene's own limit of path length.
+        The integrator that Mitsuba's users get by default, and the scene's own limit of path
+        length.
     sampler, spp, passes
-        Of both halves; ``spp`` over all passes, unless the user gives another.
+        For both halves; ``spp`` over all passes, unless the user gives another.
     exact
-        Whether nothing is random but where camera rays fall: both halves are then functions of the
-        ray alone, and their difference has no noise.
+        Whether only camera rays are random: both halves are then functions of the ray alone, and
+        their difference has no noise.
     rr_depth
-        Of ``path``: where Russian roulette begins to end paths.
+        Depth at which Russian roulette of ``path`` begins.
     shadows, bsdf_samples, tabulate_environment, light_samples
         Parameters of ``direct_all``.
     rulings
-        Of :data:`RULES`: whether each applies, and if not, which premise failed.
+        For each of :data:`RULES`: whether it applies, and if not, which premise failed.
     """
 
     decisions: tuple[Decision, ...]
@@ -108,7 +110,7 @@ class Plan:
 
     @property
     def simulated(self) -> tuple:
-        """What tells its integrator from that of another plan for the same scene."""
+        """What distinguishes its integrator from another plan's for the same scene."""
         own: tuple[Any, ...] = (
             self.shadows,
             self.bsdf_samples,
@@ -120,38 +122,38 @@ class Plan:
         return self.integrator, self.max_depth, *own
 
     def calls_for(self, effect: Effect) -> bool:
-        """Tell whether an effect is called for."""
+        """Return whether the scene needs an effect."""
         return next(d.called_for for d in self.decisions if d.effect is effect)
 
     def simulating(self, effects: Collection[Effect], max_depth: int | None = None) -> "Plan":
-        """Return this plan, simulating these of its effects and leaving out the others.
+        """Return this plan with only some of its effects.
 
-        Only the integrator's part is a plan's: what other effects change is in the scene
-        (:meth:`comparisons.effects.between.Between.of`). Leaving out what is not called for changes
-        nothing.
+        A plan covers only the integrator's part: other effects change the scene
+        (:meth:`comparisons.effects.between.Between.of`). Leaving out an effect that is not needed
+        changes nothing.
 
         Parameters
         ----------
         effects
-            Those to simulate.
+            Effects to simulate.
         max_depth
-            Of paths, in place of the plan's own; at 2 interreflection is left out.
+            Depth of paths, in place of the plan's own; at 2 interreflection is left out.
         """
         if max_depth == 2:
             effects = set(effects) - {INTERREFLECTION}
         omitted = [e for e in EFFECTS if e.without and e not in effects and self.calls_for(e)]
         plan = self.directly() if omitted else self
         for effect in omitted:
-            assert effect.without  # as was asked above
+            assert effect.without  # as checked above
             plan = effect.without(plan)
         is_limited = self.calls_for(INTERREFLECTION) and INTERREFLECTION not in omitted
         if max_depth in (None, plan.max_depth) or not is_limited:
             return plan
-        # Without shadows there is no `path`.
+        # `path` always has shadows.
         return replace(plan, integrator="direct_all" if omitted else "path", max_depth=max_depth)
 
     def directly(self) -> "Plan":
-        """Return this plan with ``direct_all``, which can leave out what ``path`` cannot."""
+        """Return this plan with ``direct_all``, which can leave out more than ``path``."""
         return replace(
             self,
             integrator="direct_all",
@@ -161,9 +163,9 @@ class Plan:
         )
 
     def unpruned(self, rule: str = "asked", evidence: str = "--everything") -> "Plan":
-        """Return the plan that prunes nothing: what a user gets without thinking.
+        """Return the plan that prunes nothing: Mitsuba's default.
 
-        ``rule`` and ``evidence`` say why, in the place of those of each effect.
+        ``rule`` and ``evidence`` give the reason, in place of each effect's.
         """
         return Plan(
             decisions=tuple(Decision(effect, True, rule, evidence) for effect in EFFECTS),
@@ -183,7 +185,7 @@ SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 
 
 def sampler(everything: bool = False) -> str:
-    """Return the sampler of a plan; it is known before the scene is, which is made with it."""
+    """Return the sampler of a plan; it is known before the scene, which is made with it."""
     return STOCK_SAMPLER if everything else SAMPLER
 
 
@@ -204,8 +206,7 @@ def plan(
     interpolation
         Of the heuristic half.
     everything
-        Switch all pruning off: what a user of Mitsuba gets without thinking, ``path`` with the
-        independent sampler.
+        Switch all pruning off, for Mitsuba's default: ``path`` with the independent sampler.
     """
     facts = Facts(pair, examine(pair.physical, scene), interpolation)
     decisions = tuple(effect.decide(facts) for effect in EFFECTS)
@@ -214,7 +215,7 @@ def plan(
 
 
 def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
-    """Return the cheapest plan that is right, by the table of the module's docstring."""
+    """Return the cheapest correct plan, by the table of the module's docstring."""
     pair, graph = facts.pair, facts.pair.physical
     stock = Plan(
         decisions=decisions,
@@ -261,9 +262,9 @@ def _holds(made: Plan, rule: Pruning) -> bool:
 
 
 def _stock(pair: Pair) -> str:
-    """Return Mitsuba's integrator for a scene: the one that it names, if that can follow media.
+    """Return Mitsuba's integrator for a scene: the one that it names, if it supports media.
 
-    ``direct`` is not a ``path`` of depth 2: that one loses light at masks.
+    ``direct`` is not a ``path`` of depth 2, which loses light at masks.
     """
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator
@@ -280,10 +281,10 @@ def _stock(pair: Pair) -> str:
 
 
 def wants_spectra(graph: Graph) -> bool:
-    """Tell whether a scene holds spectra that three numbers cannot stand for.
+    """Return whether a scene holds spectra that three numbers cannot represent.
 
-    Those are tabulated spectra, black bodies and spectral films; uniform values, RGB and Mitsuba's
-    own daylight (``d65``), which RGB values are relative to, are not.
+    These are tabulated spectra, black bodies and spectral films; not uniform values, RGB and
+    Mitsuba's daylight (``d65``), to which RGB values are relative.
     """
     if any(graph.plugin(i) == "specfilm" for i in graph.nodes(mi.ObjectType.Film)):
         return True

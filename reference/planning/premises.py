@@ -1,8 +1,8 @@
-"""Rules of pruning: what is left out, the proof that it is not there, and what the proof rests on.
+"""Rules of pruning: the part left out, the proof that it is absent, and the proof's premises.
 
-A rule is one :class:`Pruning`. Its premises are checked in their order, and it is refused at the
-first that is not known to hold. A rule is as good as its list of premises: what the list forgets is
-for the guard to find (:mod:`reference.rendering.guard`).
+A rule is one :class:`Pruning`. Its premises are checked in order, and the first that is not known
+to hold rejects it. A rule is only as good as its list of premises; the guard looks for missing ones
+(:mod:`reference.rendering.guard`).
 """
 
 from collections.abc import Callable
@@ -13,14 +13,14 @@ from reference.planning.facts import Facts
 
 @dataclass(frozen=True)
 class Premise:
-    """Something that a proof rests on.
+    """An assumption of a proof.
 
     Attributes
     ----------
     sentence
-        What has to hold.
+        What must hold.
     against
-        ``against(facts)`` returns what speaks against it, in words; None where it is known to hold.
+        ``against(facts)`` returns an objection as text; None if it is known to hold.
     """
 
     sentence: str
@@ -34,13 +34,13 @@ class Pruning:
     Attributes
     ----------
     name
-        What is done where it applies.
+        What is done if it applies.
     absent
-        What is not there where it applies, as evidence.
+        What is absent if it applies, as evidence.
     proof
-        Why it is not there, given the premises.
+        Why it is absent, given the premises.
     premises
-        In the order in which they are checked.
+        Premises, in the order of their checks.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Pruning:
     premises: tuple[Premise, ...]
 
     def judge(self, facts: Facts) -> "Ruling":
-        """Check the premises, once for all that ask: some compare every shape with every other."""
+        """Check the premises, once for all callers: some compare every shape with every other."""
         if self not in facts.rulings:
             facts.rulings[self] = self._checked(facts)
         return facts.rulings[self]
@@ -76,7 +76,7 @@ class Ruling:
 
     @property
     def words(self) -> str:
-        """What is absent, or what speaks against a premise."""
+        """What is absent, or the objection to a premise."""
         return self.rule.absent if self.holds else self.evidence
 
 
@@ -103,7 +103,7 @@ def _moving(facts: Facts) -> str | None:
     return None if facts.structure.camera.is_still else "the camera's shutter stays open"
 
 
-STILL = Premise("The shutter opens for an instant, so that nothing moves.", _moving)
+STILL = Premise("The shutter opens for an instant, so nothing moves.", _moving)
 
 
 def _seen_from_inside(facts: Facts) -> str | None:
@@ -117,8 +117,8 @@ def _seen_from_inside(facts: Facts) -> str | None:
 
 
 SEEN_FROM_OUTSIDE = Premise(
-    "No camera ray begins inside a closed shape that reflects there: near clip plane, lens and the"
-    " width of an orthographic camera included.",
+    "No camera ray begins inside a closed shape that reflects there, including near clip plane,"
+    " lens and the width of an orthographic camera.",
     _seen_from_inside,
 )
 
@@ -132,6 +132,6 @@ def _concave(facts: Facts) -> str | None:
 
 CONVEX = Premise(
     "Every side that reflects is flat, the outer side of a convex shape, or inside a closed one;"
-    " normals are those that Mitsuba renders with, flips included, and shading normals equal them.",
+    " normals are those of Mitsuba's renderings, including flips, and shading normals equal them.",
     _concave,
 )

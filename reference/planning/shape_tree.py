@@ -1,9 +1,9 @@
-"""A tree over the bounding boxes of shapes, to find those that a surface may see in some region.
+"""A tree over the bounding boxes of shapes, to find those that a surface may see in a region.
 
 A binary tree is kept as one set of arrays per level. Shapes are sorted along a curve through
 positions and facing directions (Morton's order), and each node of a level holds two neighbours of
-the level below: their common box, and bounds of the half spaces that they look into. A bound that a
-node fails, every shape in it fails, in rounded numbers too: products and sums of rounded numbers
+the level below: their common box, and bounds of the half spaces that they look into. If a node
+fails a bound, so does every shape in it, even with rounding: products and sums of rounded numbers
 keep their order.
 """
 
@@ -17,13 +17,13 @@ from reference.planning.forms import ROUNDING
 from reference.planning.shapes import ShapeFacts
 
 BITS = 8
-"""Of each of the six coordinates that shapes are sorted by."""
+"""Bits of each of the six coordinates that sort shapes."""
 
 LARGEST_STEP = 2**22
-"""Pairs of a query and a shape that one step may have to look at; it bounds memory."""
+"""Pairs of a query and a shape per step, at most; it bounds memory."""
 
 FIRST_STEP = 16
-"""Queries of the first step: most scenes answer at once."""
+"""Queries of the first step: it settles most scenes."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Level:
     low, high
         Box, (N, 3).
     margin
-        How far before a plane a box has to reach to count, (N,): the least of the shapes within.
+        How far in front of a plane a box must reach to count, (N,): the least of the shapes within.
     least, most
-        Bounds of the directions of the half spaces that the shapes look into, (N, 3); of a shape
+        Bounds of the directions of the half spaces that the shapes look into, (N, 3); for a shape
         both are its own direction.
     offset
-        The least offset of these half spaces, (N,); -inf where a shape may receive light from
+        The least offset of these half spaces, (N,); -inf if a shape may receive light from
         anywhere.
     """
 
@@ -71,7 +71,7 @@ class Level:
         return Level(**{name: values[rows] for name, values in vars(self).items()})
 
     def paired(self) -> "Level":
-        """Return the level above, in which each node holds two neighbours, the last maybe one."""
+        """Return the level above, in which each node holds two neighbours, the last perhaps one."""
         starts = np.arange(0, len(self.low), 2)
         smallest, largest = np.minimum.reduceat, np.maximum.reduceat
         return Level(
@@ -86,14 +86,14 @@ class Level:
 
 @dataclass(frozen=True)
 class Queries:
-    """What surfaces may see in boxes: one row per question, in the order in which they count.
+    """Queries for what surfaces may see in boxes: one row per query, by priority.
 
     Attributes
     ----------
     receiver
         (Q,): the shape that looks.
     low, high
-        (Q, 3): the box that an answer has to meet.
+        (Q, 3): the box that an answer must touch.
     other
         (Q,): one more shape that is not an answer, -1 for none. The receiver never is.
     """
@@ -105,12 +105,12 @@ class Queries:
 
     @classmethod
     def everywhere(cls, receiver: np.ndarray) -> "Queries":
-        """Return questions about all that lies before some shapes, however far."""
+        """Return queries for everything in front of some shapes, at any distance."""
         end = np.full((len(receiver), 3), np.inf)
         return cls(receiver, -end, end, np.full(len(receiver), -1))
 
     def steps(self, shapes: int) -> Iterator["Queries"]:
-        """Return the questions in parts that grow."""
+        """Yield the queries in parts of growing size."""
         begin, size, most = 0, FIRST_STEP, max(LARGEST_STEP // max(shapes, 1), 1)
         while begin < len(self.receiver):
             part = slice(begin, begin + min(size, most))
@@ -135,7 +135,7 @@ class ShapeTree:
 
     @classmethod
     def of(cls, shapes: Sequence[ShapeFacts]) -> "ShapeTree":
-        """Return the tree of some shapes, which are known by their place from then on."""
+        """Return the tree of some shapes, which their positions identify from then on."""
         level = Level.of(shapes)
         return cls(level, _sorted(level, np.arange(len(shapes))))
 
@@ -151,23 +151,23 @@ class ShapeTree:
 
     @cached_property
     def levels(self) -> tuple[Level, ...]:
-        """From the root, which holds all, to the shapes along the curve."""
+        """Levels from the root, which holds all, to the shapes along the curve."""
         levels = [self.shapes.take(self.order)]
         while len(levels[0].low) > 1:
             levels.insert(0, levels[0].paired())
         return tuple(levels)
 
     def first(self, queries: Queries, mutual: bool = False) -> tuple[int, int] | None:
-        """Return the first question that has an answer, and the first shape that is one.
+        """Return the first query that has an answer, and the first shape that is one.
 
-        An answer meets the question's box and lies before the receiver's only reflecting side.
+        An answer touches the query's box and lies in front of the receiver's only reflecting side.
 
         Parameters
         ----------
         queries
-            The questions.
+            The queries.
         mutual
-            Whether the receiver has to lie before the answer's only reflecting side, too.
+            Whether the receiver must also lie in front of the answer's only reflecting side.
         """
         begin = 0
         for part in queries.steps(len(self.order)):
@@ -179,7 +179,7 @@ class ShapeTree:
         return None
 
     def answered(self, queries: Queries) -> np.ndarray:
-        """Tell which questions have an answer, (Q,)."""
+        """Return which queries have an answer, (Q,)."""
         found = [np.zeros(0, bool)]
         for part in queries.steps(len(self.order)):
             has_answer = np.zeros(len(part.receiver), bool)
@@ -188,7 +188,7 @@ class ShapeTree:
         return np.concatenate(found)
 
     def _answers(self, queries: Queries, mutual: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return all pairs of a question, counted within these, and a shape that answers it."""
+        """Return all pairs of a query, counted within these, and a shape that answers it."""
         query = np.arange(len(queries.receiver)) if len(self.order) else np.arange(0)
         node = np.zeros(len(query), int)
         for level, below in zip(self.levels, (*self.levels[1:], None), strict=True):
@@ -206,7 +206,7 @@ class ShapeTree:
     def _may_hold(
         self, level: Level, node: np.ndarray, queries: Queries, query: np.ndarray, mutual: bool
     ) -> np.ndarray:
-        """Tell whether nodes may hold an answer; of shapes, whether they are one."""
+        """Return whether nodes may hold an answer; for shapes, whether they are one."""
         receiver = queries.receiver[query]
         own = self.shapes.take(receiver)
         there = level.take(node)
@@ -220,14 +220,14 @@ class ShapeTree:
 
 
 def _reach(low: np.ndarray, high: np.ndarray, least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Return how far boxes reach along directions, (N,): the most that bounds of these allow."""
-    with np.errstate(invalid="ignore"):  # the box of a mesh without faces; it reaches nowhere
+    """Return how far boxes reach along directions, (N,): the most that their bounds allow."""
+    with np.errstate(invalid="ignore"):  # the empty box of a mesh without faces
         ends = [np.maximum(low * towards, high * towards) for towards in (least, most)]
         return np.maximum(*ends).sum(axis=1)
 
 
 def _sorted(level: Level, numbers: np.ndarray) -> np.ndarray:
-    """Return numbers of shapes along Morton's curve, but for meshes without faces."""
+    """Return numbers of shapes along Morton's curve, without meshes that have no faces."""
     has_faces = np.all(level.low <= level.high, axis=1)
     numbers = numbers[has_faces[numbers]]
     if not len(numbers):

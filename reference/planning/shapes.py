@@ -1,7 +1,7 @@
-"""Facts about shapes: what they are, which of their sides reflect, and which way normals point.
+"""Facts about shapes: their form, which sides reflect, and which way normals point.
 
-Everything here errs on one side: a shape is called flat, closed or convex only where that is
-certain (:mod:`reference.planning.forms`).
+Everything here errs on one side: a shape is called flat, closed or convex only if that is certain
+(:mod:`reference.planning.forms`).
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ CORNERS = np.array(list(product((False, True), repeat=3)))
 
 @dataclass(frozen=True)
 class ShapeFacts:
-    """What is known about one shape.
+    """The facts of one shape.
 
     Attributes
     ----------
@@ -35,14 +35,14 @@ class ShapeFacts:
     form
         What is certain about its form.
     outer, inner
-        Whether the side away from the body reflects, and the side towards it. Of a flat shape the
-        outer side is the one that its normal points to.
+        Whether the side away from the body reflects, and the side towards it. The outer side of a
+        flat shape is the one that its normal points to.
     shines_outwards
-        Whether its normals, on whose side an area light shines, point away from the body.
+        Whether its normals point away from the body; an area light shines on their side.
     plane
         ``(point, normal)`` of a flat shape, else None.
     opaque
-        Whether its BSDF only reflects; a light that comes through is beyond all rules.
+        Whether its BSDF only reflects; no rule covers transmitted light.
     """
 
     name: str
@@ -64,7 +64,7 @@ class ShapeFacts:
     def is_convex(self) -> bool:
         """Whether no point of a side that reflects sees another one of the shape, from outside.
 
-        The inner side of a closed body is not seen from there. That of a part of one is.
+        The inner side of a closed body is not seen from there; that of an open part is.
         """
         if self.form is Form.OTHER:
             return False
@@ -72,19 +72,19 @@ class ShapeFacts:
 
     @property
     def is_hollow(self) -> bool:
-        """Whether it is closed and reflects inside, which only a camera inside would see."""
+        """Whether it is closed and reflects inside, which only a camera inside sees."""
         return self.form is Form.CLOSED and self.inner
 
     @property
     def hides_itself(self) -> bool:
-        """Whether it may stand in the way of the light that it sends out."""
+        """Whether it may block its own light."""
         return self.form is Form.OTHER or not (self.form is Form.FLAT or self.shines_outwards)
 
     @property
     def facing(self) -> tuple[np.ndarray, float] | None:
         """``(direction, offset)`` of the half space that its only reflecting side looks into.
 
-        It holds the points ``x`` with ``direction · x > offset``. None where light may come from
+        It holds the points ``x`` with ``direction · x > offset``. None if light may come from
         anywhere.
         """
         if self.plane is None or self.outer == self.inner:
@@ -99,7 +99,7 @@ class ShapeFacts:
 
 
 def shape_facts(graph: Graph, shapes: Sequence[mi.Shape]) -> tuple[ShapeFacts, ...]:
-    """Return the facts of a scene's shapes, given the graph that they were made of."""
+    """Return the facts of a scene's shapes, given the graph that they were made from."""
     nodes = {graph.props(index).id(): index for index in graph.nodes(SHAPE)}
     return tuple(
         _facts(graph, nodes.get(shape.id()), shape, form)
@@ -108,10 +108,10 @@ def shape_facts(graph: Graph, shapes: Sequence[mi.Shape]) -> tuple[ShapeFacts, .
 
 
 def _facts(graph: Graph, index: int | None, shape: mi.Shape, found: Geometry) -> ShapeFacts:
-    """Return the facts of a shape, given its node in the graph (None for what has none)."""
+    """Return the facts of a shape, given its node in the graph (None if it has none)."""
     box = shape.bbox()
     nested = graph.children(index, BSDF) if index is not None else []
-    bsdf = nested[0][1] if nested else None  # an instance has those of its group
+    bsdf = nested[0][1] if nested else None  # an instance has its group's
     plugins, front, back = _sides(graph, bsdf)
     return ShapeFacts(
         name=shape.id(),

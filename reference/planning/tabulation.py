@@ -17,7 +17,7 @@ def _not_one(facts: Facts) -> str | None:
     if shapes != 1:
         return f"{shapes} shapes"
     if bsdfs - len(wrapped) != 1:
-        return "two sides that reflect each in their own way"
+        return "two sides that reflect differently"
     return None
 
 
@@ -26,7 +26,7 @@ def _not_uniform(facts: Facts) -> str | None:
     extended = [kind for kind in kinds if not kind.exact]
     if len(extended) == 1 and extended[0].uniform:
         return None
-    return f"{facts.lights_in_words}: not one constant environment, and else points and directions"
+    return f"{facts.lights_in_words}: not one constant environment plus points and directions"
 
 
 def _textured(facts: Facts) -> str | None:
@@ -60,11 +60,11 @@ def _lit_twice(facts: Facts) -> str | None:
 
 TABULATED_ENVIRONMENT = Pruning(
     name="environment from a table",
-    absent="noise: what is reflected of the environment is its radiance times an albedo",
-    proof="Where nothing is hidden, a surface point receives the radiance L from all directions of"
-    " the half space that it is seen from. It reflects L times the albedo of its BSDF for the view"
-    " direction, which for an isotropic BSDF that is the same everywhere is a function of the"
-    " cosine alone; of a two-sided one, of its absolute value.",
+    absent="noise: the reflected environment is its radiance times an albedo",
+    proof="If nothing is hidden, a surface point receives the radiance L from all directions of"
+          " the half space that it is seen from. It reflects L times the albedo of its BSDF for"
+          " the view direction. For an isotropic BSDF that is the same everywhere this depends"
+          " only on the cosine; for a two-sided one, on its absolute value.",
     premises=(
         Premise("There is one shape, and one BSDF, the same on both sides that reflect.", _not_one),
         Premise("One light is a constant environment; the others are points, spots and directions.",

@@ -16,21 +16,21 @@ SAMPLES = 8192
 class AlbedoTable:
     """The albedo of a uniform, isotropic BSDF over the cosine of the view direction, RGB.
 
-    Where nothing stands between a surface and a constant environment of radiance ``L``, the
-    reflected radiance is ``L a(mu)``: the albedo for the view direction of cosine ``mu``. It is
-    tabulated once, by Mitsuba's own sampling of the BSDF on a rank-1 lattice, and looked up at each
+    If nothing stands between a surface and a constant environment of radiance ``L``, the reflected
+    radiance is ``L a(mu)``, with the albedo for the view direction of cosine ``mu``. It is
+    tabulated once, by Mitsuba's sampling of the BSDF on a rank-1 lattice, and looked up at each
     camera ray, without Monte Carlo in the image.
 
-    Nodes are even in ``sqrt(mu)``: towards grazing, Fresnel's terms bend most. A BSDF that reflects
-    on its back too does so as on its front.
+    Nodes are even in ``sqrt(mu)``: Fresnel's terms bend most towards grazing. A BSDF that also
+    reflects on its back does so in the same way.
     """
 
-    DRJIT_STRUCT: ClassVar = {"table": Any}  # what dr.freeze has to know of
+    DRJIT_STRUCT: ClassVar = {"table": Any}  # what dr.freeze must know of
 
     def __init__(self, bsdf: Any):
         self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         mu = np.linspace(1e-3, 1, NODES) ** 2
-        # Spread out by the kernel: millions of numbers need not come from here.
+        # Spread out in the kernel: millions of numbers need not be sent.
         places = dr.arange(mi.UInt32, NODES * SAMPLES)
         grid_mu = dr.gather(mi.Float, mi.Float(mu), places // SAMPLES)
         rows = lattice(SAMPLES)[:3]

@@ -1,28 +1,28 @@
 """The integrator plugin ``direct_all``: direct light from every emitter at every sample.
 
-Indirect light is added where it is asked for.
+Indirect light is added if requested.
 
-Mitsuba's ``direct`` picks one emitter at random for each sample, so that two point lights already
-make noise. This one asks each emitter in turn: point, spot and directional lights, which need no
-random number, are then exact at each camera ray, and only what has an extent is sampled, by emitter
-and by BSDF, with the balance heuristic. Of thousands of lights it can pick some, in proportion to
-what they give. BSDFs, emitters and visibility are Mitsuba's.
+Mitsuba's ``direct`` picks one emitter at random for each sample, so even two point lights make
+noise. This one evaluates each emitter in turn: point, spot and directional lights, which need no
+random number, are then exact at each camera ray, and only lights with an extent are sampled, by
+emitter and by BSDF, with the balance heuristic. From thousands of lights it can pick some, in
+proportion to their contribution. BSDFs, emitters and visibility are Mitsuba's.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
-``hide_emitters``   boolean (false)     as of Mitsuba's ``direct``
-``shadows``         boolean (true)      trace shadow rays; off where nothing can be hidden, or
-                                        where shadows are to be missing
+``hide_emitters``   boolean (false)     as in Mitsuba's ``direct``
+``shadows``         boolean (true)      trace shadow rays; off if nothing can be hidden, or
+                                        to leave shadows out
 ``bsdf_samples``    integer (1)         samples of the BSDF that look for lights, 0 or 1. Such a
-                                        ray meets what hides a light: without shadows, 0 where
-                                        something does. Mirrors and glass take theirs all the same,
-                                        since nothing else finds a light in them
-``light_samples``   integer (0)         lights that are picked at random for each sample, of points
-                                        and directions and of the others, where there are more, and
+                                        ray hits what hides a light: without shadows, 0 if something
+                                        does. Mirrors and glass still take theirs, since nothing
+                                        else finds a light in them
+``light_samples``   integer (0)         lights picked at random for each sample, of points
+                                        and directions and of the others, if there are more, and
                                         more than 16 (:mod:`reference.rendering.light_choice`); 0
-                                        asks each
-``max_depth``       integer (2)         as of Mitsuba's ``path``: more than 2, or -1 for no limit,
+                                        evaluates each
+``max_depth``       integer (2)         as in Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================
 """
@@ -41,7 +41,7 @@ _registered: set[str] = set()
 
 
 def register() -> None:
-    """Make the plugin known to Mitsuba, for the current variant. Calling it again does nothing."""
+    """Register the plugin with Mitsuba for the current variant. Calling it again does nothing."""
     if mi.variant() not in _registered:
         _define()
         _registered.add(mi.variant())
@@ -59,11 +59,11 @@ def _define():
             self.light_samples = props.get("light_samples", 0)
             self._choices = {}
             self.environment_albedo = None
-            """An `AlbedoTable` in place of sampling the environment,
-            for a scene of one BSDF that nothing hides from it; set after construction."""
+            """An `AlbedoTable` to replace sampling of the environment, for a scene with one BSDF
+            and nothing that hides it; set after construction."""
 
         def prepare(self, scene):
-            """Find the chances of lights, which the first sample does else."""
+            """Find the probabilities of lights; otherwise the first sample does."""
             delta, others = _parted(scene.emitters())
             for lights in (delta, [e for e in others if not self._is_tabulated(e)]):
                 self._choice(scene, lights)
@@ -74,7 +74,7 @@ def _define():
             delta, others = _parted(scene.emitters())
             si = self._first_surface(scene, ray, active)
             colour = mi.Spectrum(0)
-            if others or len(delta) <= light_sums.UNROLLED:  # no ray meets points or directions
+            if others or len(delta) <= light_sums.UNROLLED:  # rays never hit points or directions
                 seen = active & (si.is_valid() | (not self.hide_emitters))
                 colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
             hit = active & si.is_valid()
@@ -117,7 +117,7 @@ def _define():
             return self.environment_albedo is not None and emitter.is_environment()
 
         def _choice(self, scene, lights, picks=None):
-            """Return what picks lights of a list, None where each is asked."""
+            """Return the choice among the lights of a list, None if each is evaluated."""
             most = max(self.light_samples, light_sums.UNROLLED)
             if not self.light_samples or len(lights) <= most:
                 return None
@@ -145,15 +145,15 @@ def _parted(emitters):
 
 
 def _has_delta(scene):
-    """Tell whether a BSDF of the scene reflects or transmits in single directions."""
+    """Return whether a BSDF of the scene reflects or transmits in single directions."""
     bsdfs = (shape.bsdf() for shape in scene.shapes())
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
 def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples, choice):
-    """One sample of the BSDF, for the emitter that it happens to meet.
+    """One sample of the BSDF, for the emitter that it happens to hit.
 
-    Without ``bsdf_samples`` only directions count that no sample of an emitter takes.
+    Without ``bsdf_samples`` only directions that emitter sampling never takes count.
     """
     context = mi.BSDFContext()
     bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
@@ -176,7 +176,7 @@ RR_DEPTH = 3
 of the variance, on the Cornell box and on glossy spheres alike; the mean stays the same."""
 
 SURVIVAL = 0.95
-"""Largest chance that Russian roulette lets a path go on, as in Mitsuba's ``path``."""
+"""Largest chance that Russian roulette lets a path continue, as in Mitsuba's ``path``."""
 
 
 @dr.syntax
@@ -193,13 +193,13 @@ def indirect_light(
 ) -> Colour:
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
-    Paths begin with a sample of the BSDF there. The direct light takes every light in turn; this
-    picks one at random at each later vertex: as Mitsuba's ``path`` does everywhere, or by a choice.
+    Paths begin with a sample of the BSDF there. Direct light takes every light in turn; this picks
+    one at random at each later vertex, as Mitsuba's ``path`` does everywhere, or by a choice.
 
     Parameters
     ----------
     scene, sampler, si, bsdf, active
-        As of Mitsuba's integrators.
+        Same as in Mitsuba's integrators.
     max_depth
         As Mitsuba counts: 2 is direct light, for which the result is 0; -1 is no limit.
     shadows, bsdf_samples
@@ -218,7 +218,7 @@ def indirect_light(
         context, si, sampler.next_1d(active), sampler.next_2d(active), active
     )
     ray = si.spawn_ray(si.to_world(bs.wo))
-    depth = mi.UInt32(2)  # of what the ray finds, seen from the camera
+    depth = mi.UInt32(2)  # of the ray's hit, seen from the camera
     previous = mi.Interaction3f(si)
     previous_pdf = mi.Float(bs.pdf)
     previous_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
@@ -226,11 +226,11 @@ def indirect_light(
 
     while active:
         si = scene.ray_intersect(ray, active)
-        # What the first ray meets shines directly on the surface that it left, which is not ours.
+        # The first ray's hit shines directly on the surface that it left, which is not ours.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
         seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
-        # No sample of an emitter takes a direction that a mirror, glass or a mask demands.
+        # Emitter samples never take the direction that a mirror, glass or a mask needs.
         emitter_pdf = light_sums.density(scene, previous, ds, seen & ~previous_delta, choice)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)

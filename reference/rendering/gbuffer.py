@@ -1,4 +1,4 @@
-"""What the camera sees of a scene's geometry."""
+"""The geometry that the camera sees."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from heuristic.arrays import Scene
 from heuristic.errors import InputError
 
 GRID = 192
-"""Rays along each side for means over what is seen: some 37,000, enough for three digits."""
+"""Rays along each side for means over visible surfaces: some 37,000, enough for three digits."""
 
 
 @dataclass(frozen=True)
 class Owners:
-    """What each pixel (H, W) sees, as its place among ids; -1 for nothing."""
+    """The object seen by each pixel (H, W), as its position among ids; -1 for none."""
 
     places: np.ndarray
     names: tuple[str, ...]
@@ -30,11 +30,11 @@ class GBuffer:
     Attributes
     ----------
     position, normal
-        (H, W, 3); the unit shading normal of the side that is seen. Zero where nothing is hit.
+        (H, W, 3); the unit shading normal of the visible side. Zero where nothing is hit.
     hit
-        (H, W), whether the ray meets a surface.
+        (H, W), whether the ray hits a surface.
     shape, bsdf
-        Whose surface it is, and of which material.
+        The shape and the material of the surface.
     """
 
     position: np.ndarray
@@ -62,25 +62,25 @@ class GBuffer:
 
 
 def require_surface(hit: np.ndarray, name: str) -> None:
-    """Refuse a picture of nothing, whose difference would be 0 whatever is wrong with it.
+    """Reject an empty picture, whose difference would be 0 whatever is wrong with it.
 
     Raises
     ------
     InputError
-        Naming the scene, where no pixel (H, W) sees a surface.
+        If no pixel (H, W) sees a surface; the message names the scene.
     """
     if not hit.any():
         height, width = hit.shape
         raise InputError(
             f"{name}: no pixel sees a surface: the rays through the centres of all"
-            f" {width}x{height} pixels meet nothing. Check the camera (to_world, fov,"
-            " near_clip, far_clip, the film's crop) and the shapes in front of it. To"
-            " compare or check an empty picture all the same, give --allow-empty."
+            f" {width}x{height} pixels hit nothing. Check the camera (to_world, fov, near_clip,"
+            " far_clip, the film's crop) and the shapes in front of it. To"
+            " allow an empty picture, give --allow-empty."
         )
 
 
 def image_size(scene: Scene) -> tuple[int, int]:
-    """Return width and height of the images of a scene's first sensor: those of its film's crop."""
+    """Return width and height of the images of a scene's first sensor: its film's crop."""
     width, height = scene.sensors()[0].film().crop_size()
     return int(width), int(height)
 
@@ -116,7 +116,7 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
 
 
 def _owners(pointers, seen):
-    """Return the :class:`Owners` of an array of pointers, one a pixel."""
+    """Return the :class:`Owners` of an array of pointers, one per pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
     named = zip(found, first, strict=True)

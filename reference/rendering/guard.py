@@ -1,20 +1,20 @@
 """A probe of each pruned scene: the plan's light compared with everything simulated.
 
-A rule of pruning holds under premises, and a list of premises may lack one. So some camera rays are
-drawn at random and followed twice: by the plan's integrator, and by the one that a user of Mitsuba
-gets without thinking, both with independent samples. Equal rays make equal pixels and edges cancel,
-so that the difference ``d`` of a ray has only the noise of the light.
+A rule of pruning holds under premises, and a list of premises may be incomplete. So some camera
+rays are drawn at random and followed twice: by the plan's integrator, and by Mitsuba's default,
+both with independent samples. Pixels and edges of equal rays cancel, so the difference ``d`` of a
+ray has only the noise of the light.
 
-*The test.* After ``n``, ``2 n``, ``4 n``, … rays, up to the budget, the mean of ``d`` is held
-against Student's t over :data:`BATCHES` batches, beyond a tolerance of :data:`TOLERANCE` of the
-mean radiance; the level :data:`LOOKING` is shared out equally among the looks. A look that shows
-agreement ends the test. One that finds a departure is not believed: :data:`MOST` new rays decide,
-which have to find one of the same sign at the level :data:`DECIDING`.
+*The test.* After ``n``, ``2 n``, ``4 n``, … rays, up to the budget, the mean of ``d`` is tested by
+Student's t over :data:`BATCHES` batches, beyond a tolerance of :data:`TOLERANCE` of the mean
+radiance; the level :data:`LOOKING` is divided equally among the looks. A look that shows agreement
+ends the test. A look that finds a departure is not trusted: :data:`MOST` new rays decide, which
+must find one of the same sign at the level :data:`DECIDING`.
 
-*False alarms.* For nearly normal means a right plan is rejected with a chance of at most
-``LOOKING x DECIDING``, one in a million. The rest up to the stated one in a thousand is left to
-heavy tails: a mean that has not yet seen its rarest paths looks too dark, and seems certain of it.
-A million rays have to miss them for an alarm.
+*False alarms.* For nearly normal means a right plan is rejected with a chance of at most ``LOOKING
+x DECIDING``, one in a million. The rest up to the stated one in a thousand is reserved for heavy
+tails: a mean without its rarest paths looks too dark, with too small an error. A million rays must
+miss them for an alarm.
 """
 
 from collections.abc import Iterator
@@ -31,24 +31,24 @@ from reference.rendering.passes import Stream, pass_seed
 from reference.rendering.renderer import physical_integrator
 
 SHARE = 0.02
-"""Of the reference's samples: the most rays that are followed, within the next two limits."""
+"""Share of the reference's samples that bounds the rays, within the next two limits."""
 
 FEWEST, MOST = 2**13, 2**20
-"""Rays: of the first look, and of all looks at most; the latter also of a decision."""
+"""Rays of the first look, and of all looks at most; the latter also of a decision."""
 
 TOLERANCE = 0.005
-"""Of the mean radiance: departures below are neither looked for nor counted."""
+"""Share of the mean radiance; smaller departures are ignored."""
 
 LOOKING, DECIDING = 0.01, 1e-4
 """Levels of the looks together, and of the decision; two-sided."""
 
 BATCHES = 32
 PIECE = 2**18
-"""Rays that are followed at once."""
+"""Rays followed at once."""
 
 
 class Verdict(Enum):
-    """What the probe found; ``NOT_NEEDED`` where nothing is left out."""
+    """The probe's verdict; ``NOT_NEEDED`` if nothing is left out."""
 
     AGREED = "agreed"
     DISAGREED = "disagreed"
@@ -57,19 +57,19 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Guard:
-    """What the probe of a plan found.
+    """The result of the probe of a plan.
 
     Attributes
     ----------
     state
         The verdict.
     rays
-        Camera rays that were followed both ways.
+        Camera rays followed both ways.
     departure, error
         Mean of the plan minus the mean of everything, and its standard error, as shares of the
-        larger mean radiance; of the rays that decided.
+        larger mean radiance; from the rays that decided.
     seconds
-        Time that the probe took, with compilation.
+        Time of the probe, with compilation.
     """
 
     state: Verdict
@@ -80,7 +80,7 @@ class Guard:
 
     @property
     def words(self) -> str:
-        """What was found, as a sentence."""
+        """The result as a sentence."""
         return (
             f"the plan's mean is {self.departure:+.2%} off the mean of everything simulated, with a"
             f" standard error of {self.error:.2%}, over {self.rays} camera rays"
@@ -89,7 +89,7 @@ class Guard:
 
 @dataclass(frozen=True)
 class _Tally:
-    """Means of batches of rays: of the difference, and the two mean radiances."""
+    """Means of batches of rays: the difference, and the two mean radiances."""
 
     batches: np.ndarray
     level: float
@@ -103,11 +103,11 @@ class _Tally:
         return float(self.batches.std(ddof=1) / np.sqrt(len(self.batches)))
 
     def departs(self, level: float) -> bool:
-        """Tell whether the mean is off by more than tolerance and noise, at a level."""
+        """Return whether the mean is off by more than tolerance and noise, at a level."""
         return abs(self.mean) > TOLERANCE * self.level + self._quantile(level) * self.error
 
     def agrees(self, level: float) -> bool:
-        """Tell whether the mean is within the tolerance, noise included, at a level."""
+        """Return whether the mean is within the tolerance, including noise, at a level."""
         return abs(self.mean) + self._quantile(level) * self.error <= TOLERANCE * self.level
 
     def _quantile(self, level: float) -> float:
@@ -129,15 +129,15 @@ def examine_plan(
     Parameters
     ----------
     plan
-        What is simulated.
+        The plan.
     scene
         The physical half, instantiated.
     hide_emitters
         Of the pair.
     samples
-        Of the reference in all, over all pixels.
+        Samples of the reference, over all pixels.
     seed
-        Of the run; the probe has a stream of its own.
+        Seed of the run; the probe has its own stream.
     """
     whole = plan.unpruned()
     if (plan.integrator, plan.max_depth) == (whole.integrator, whole.max_depth):
@@ -163,7 +163,7 @@ def examine_plan(
 
 
 def _looks(budget: int) -> Iterator[int]:
-    """Yield the numbers of rays after which the test looks: doubled, and the budget last."""
+    """Yield the numbers of rays after which the test looks: doubling, and the budget last."""
     size = FEWEST
     while 2 * size <= budget:
         yield size
@@ -176,7 +176,7 @@ def _width(rays: np.ndarray) -> int:
 
 
 def _tally(found: list[np.ndarray]) -> _Tally:
-    """Sum rays up: (2, N) radiances by the plan and by everything, in pieces."""
+    """Sum up rays: (2, N) radiances by the plan and by everything, in pieces."""
     planned, whole = np.concatenate(found, axis=1)
     count = len(planned) // BATCHES * BATCHES
     batches = (planned - whole)[:count].reshape(BATCHES, -1).mean(axis=1)
@@ -186,7 +186,7 @@ def _tally(found: list[np.ndarray]) -> _Tally:
 def _followed(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[int]) -> np.ndarray:
     """Return the radiances of random camera rays by each integrator, (2, count), mean of channels.
 
-    The rays come from everywhere on the film and lens, as those of a picture do.
+    The rays come from everywhere on the film and lens, like those of a picture.
     """
     sensor, sampler = scene.sensors()[0], mi.load_dict({"type": "independent"})
     sampler.seed(dr.opaque(mi.UInt32, next(seeds)), count)
@@ -200,5 +200,5 @@ def _followed(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[in
         value = dr.mean(mi.unpolarized_spectrum(radiance * weight))
         found.append(dr.select(dr.isfinite(value), value, 0))
     dr.eval(found)
-    # A camera of a single ray, and no other random number, give one value for all.
+    # A camera with a single ray, and no other random number, gives one value for all.
     return np.array([np.broadcast_to(np.array(value, float), count) for value in found])

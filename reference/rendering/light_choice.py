@@ -1,13 +1,13 @@
-"""Which of thousands of lights to ask: picked in proportion to what they give.
+"""Which of thousands of lights to evaluate: picked in proportion to their contribution.
 
-``N`` lights are picked for a sample, light ``i`` with the chance ::
+``N`` lights are picked per sample, light ``i`` with the chance ::
 
     p_i = (1 - u) g_i / sum_k g_k + u / n,    g_i = mean over points x of |cos theta| E_i(x)
 
-of ``n`` lights. ``E_i(x)`` is what Mitsuba's sample of the light gives at ``x``, its mean over the
-channels, without shadows; the points are :data:`PROBES` that the camera sees. What a picked light
-gives is divided by ``N p_i``: its mean is the sum over all lights, as long as no chance is 0. The
-uniform share ``u`` sees to that, and bounds what a light weighs that the points do not see.
+of ``n`` lights. ``E_i(x)`` is Mitsuba's sample of the light at ``x``, its mean over the channels,
+without shadows; the points are :data:`PROBES` that the camera sees. A picked light's contribution
+is divided by ``N p_i``: its mean is the sum over all lights, as long as no chance is 0. The uniform
+share ``u`` ensures that, and bounds the weight of a light that the points do not see.
 """
 
 from typing import Any
@@ -21,10 +21,10 @@ from reference.pairing.nearest.probe import lattice
 from reference.rendering.light_sums import sampled
 
 MOST_ASKED = 4096
-"""Lights up to which each is asked at every sample."""
+"""Up to this many lights each is evaluated at every sample."""
 
 PICKS = 16
-"""Lights that are picked for a sample where there are more."""
+"""Lights picked per sample if there are more."""
 
 PROBES = 1024
 UNIFORM_SHARE = 0.1
@@ -36,11 +36,11 @@ class LightChoice:
     Parameters
     ----------
     scene
-        The Mitsuba scene, whose first sensor says what is seen.
+        The Mitsuba scene, with its first sensor.
     lights
-        Emitters to choose among.
+        Emitters to choose from.
     picks
-        How many are picked for a sample, ``N``.
+        How many are picked per sample, ``N``.
 
     Attributes
     ----------
@@ -67,11 +67,11 @@ class LightChoice:
         return index, self.picks * chance
 
     def is_delta(self, number: Array, active: Mask) -> Mask:
-        """Tell whether the light of a number is a point or direction."""
+        """Return whether the light of a number is a point or direction."""
         return dr.gather(mi.UInt32, self._delta, number, active) > 0
 
     def expected(self, emitter: Any, active: Mask) -> Number:
-        """Return how often a light is expected that a ray has met, 0 for any other."""
+        """Return how often a light that a ray has hit is expected, 0 for any other."""
         place = dr.minimum(_number(emitter), len(self._by_pointer) - 1)
         return self.picks * dr.gather(mi.Float, self._by_pointer, place, active)
 
@@ -89,7 +89,7 @@ def _by_pointer(lights, chances):
 
 
 def _given(scene, lights):
-    """Return the sum of what each light gives the points that are seen, (n,)."""
+    """Return each light's total contribution to the visible points, (n,)."""
     numbers = [mi.Float(row) for row in lattice(PROBES)[:5]]
     sensor = scene.sensors()[0]
     film, sample = mi.Point2f(*numbers[:2]), mi.Point2f(*numbers[2:4])

@@ -1,13 +1,12 @@
-"""Direct light of a list of lights, at the points that rays meet.
+"""Direct light of a list of lights, at the points that rays hit.
 
-Up to :data:`UNROLLED` lights are unrolled: each is code of its own in the kernel. For more of them
-LLVM would take longer than in proportion, so that they become the targets of one call in a loop.
-Dr.Jit merges targets whose code is the same: the kernel grows with the kinds of lights, not with
-their number.
+Up to :data:`UNROLLED` lights are unrolled: each has its own code in the kernel. For more, LLVM's
+time would grow faster than their number, so they become the targets of one call in a loop. Dr.Jit
+merges targets with the same code: the kernel grows with the kinds of lights, not with their number.
 
-Each function takes ``scene``, ``si``, ``bsdf``, ``sampler`` and ``active`` as Mitsuba's integrators
-do, and ``shadows`` and ``bsdf_samples`` as :mod:`reference.rendering.direct`. ``is_delta`` tells
-whether the lights are points or directions, which need no random number.
+Each function takes ``scene``, ``si``, ``bsdf``, ``sampler`` and ``active`` like Mitsuba's
+integrators, and ``shadows`` and ``bsdf_samples`` like :mod:`reference.rendering.direct`.
+``is_delta`` is whether the lights are points or directions, which need no random number.
 """
 
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ from heuristic import numerics
 from heuristic.arrays import Array, Colour, Direction, Interaction, Mask, Number, Position, Scene
 
 UNROLLED = 16
-"""Lights of a list that are code of their own."""
+"""Lights of a list that have their own code."""
 
 
 def of_one(
@@ -35,7 +34,7 @@ def of_one(
     shadows: bool,
     bsdf_samples: int,
 ) -> Colour:
-    """Return what a light gives."""
+    """Return the contribution of a light."""
     drawn = _sampled(light, si, _numbers(sampler, is_delta, active), active)
     return _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples)
 
@@ -52,10 +51,10 @@ def of_many(
     bsdf_samples: int,
     choice: Any = None,
 ) -> Colour:
-    """Return what a list of lights gives.
+    """Return the contribution of a list of lights.
 
     ``choice`` picks some of them (:class:`reference.rendering.light_choice.LightChoice`); without
-    it each is asked.
+    it each is evaluated.
     """
     given = is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples
     return _each(lights, *given) if choice is None else _picked(choice, *given)
@@ -66,8 +65,8 @@ def sampled(
 ) -> tuple[Position, Direction, Number, Colour]:
     """Sample the direction to lights by their numbers: point, direction, density and weight.
 
-    Through the emitters' pointers Dr.Jit would trace every emitter that is alive, those of the
-    heuristic half included.
+    Through the emitters' pointers Dr.Jit would trace every live emitter, including the heuristic
+    half's.
     """
     return dr.switch(number, [partial(_sampled, light) for light in lights], si, sample, active)
 
@@ -82,7 +81,7 @@ def any_one(
 ) -> tuple[Direction, Number, Mask, Colour]:
     """Sample the direction to one light of the scene: direction, density, whether it is a delta.
 
-    The fourth is the weight. Without a ``choice`` Mitsuba picks the light, most often evenly.
+    The fourth is the weight. Without a ``choice`` Mitsuba picks the light, usually evenly.
     """
     if choice is None:
         ds, weight = scene.sample_emitter_direction(si, sample, shadows, active)
@@ -98,7 +97,7 @@ def any_one(
 def density(
     scene: Scene, reference: Interaction, ds: Any, active: Mask, choice: Any = None
 ) -> Number:
-    """Return the density of :func:`any_one` for a direction in which a ray met a light."""
+    """Return the density of :func:`any_one` for a direction in which a ray hit a light."""
     if choice is None:
         return scene.pdf_emitter_direction(reference, ds, active)
     found = ds.emitter.pdf_direction(reference, ds, active)
@@ -111,10 +110,10 @@ def _sampled(light, si, sample, active):
 
 
 def _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples, expected=1):
-    """Return what a sample of a light gives.
+    """Return the contribution of a sample of a light.
 
-    Where a sample of the BSDF can find the light too, it is weighted against that by the balance
-    heuristic. ``expected`` is how many samples of the light are taken on average.
+    If a sample of the BSDF can also find the light, the balance heuristic weights the two.
+    ``expected`` is the mean number of samples of the light.
     """
     point, direction, density, weight = drawn
     active = active & (density > 0)
@@ -129,9 +128,9 @@ def _reflected(scene, si, bsdf, drawn, active, is_delta, shadows, bsdf_samples, 
 
 @dr.syntax
 def _each(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
-    """Ask one light after the other."""
+    """Evaluate one light after the other."""
     number = mi.UInt32(0)
-    # A sum of thousands would lose what is smaller than its last digit (Neumaier).
+    # A sum of thousands would lose terms below its last digit (Neumaier).
     total, lost = mi.Spectrum(0), mi.Spectrum(0)
     while number < len(lights):
         drawn = sampled(lights, number, si, _numbers(sampler, is_delta, active), active)
@@ -143,8 +142,8 @@ def _each(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samp
 
 @dr.syntax
 def _picked(choice, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
-    """Ask lights that are picked at random."""
-    # One random number for all: stratified, and each pick by itself is as it should be.
+    """Evaluate lights picked at random."""
+    # One random number for all: stratified, and each single pick has the right distribution.
     start = sampler.next_1d(active)
     number, total = mi.UInt32(0), mi.Spectrum(0)
     while number < choice.picks:

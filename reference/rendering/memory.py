@@ -1,4 +1,4 @@
-"""Whether memory holds what is about to be rendered, asked before anything is."""
+"""A check that memory is enough, before anything is rendered."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ BYTES_A_PIXEL = 250
 """At the peak of a comparison, while it renders: `tests/benchmarks/scaling.py` measures it."""
 
 BASE = 200 * 2**20
-"""What a comparison takes whatever its size, beside what the process has before it."""
+"""Memory that a comparison of any size takes, in addition to the process before it."""
 
 
 def require(name: str, width: int, height: int) -> None:
-    """Refuse an image that memory does not hold.
+    """Reject an image that does not fit into memory.
 
     Raises
     ------
     InputError
-        With the need, what is there, and the largest image of the same shape that fits.
+        With the memory needed, the memory free, and the largest image of the same shape that fits.
     """
     free = available()
     need = BASE + BYTES_A_PIXEL * width * height
@@ -43,7 +43,7 @@ def require(name: str, width: int, height: int) -> None:
 
 
 def largest(width: int, height: int, free: int) -> tuple[int, int] | None:
-    """Return width and height of the largest image of a shape that so many bytes hold, or None."""
+    """Return width and height of the largest image of a shape within some bytes, or None."""
     pixels = max(free - BASE, 0) // BYTES_A_PIXEL
     wide = min(isqrt(pixels * width // height), width)
     high = min(wide * height // width, height)
@@ -51,12 +51,12 @@ def largest(width: int, height: int, free: int) -> tuple[int, int] | None:
 
 
 def available() -> int | None:
-    """Return the bytes that this process may still take; None where nobody says.
+    """Return the bytes that this process may still take; None if unknown.
 
     The least of: ``MemAvailable`` of ``/proc/meminfo`` (what programs can take without swapping);
     what the process's control group and those around it leave of ``memory.max`` (version 2) or
-    ``memory.limit_in_bytes`` (version 1), pages of files that can be dropped not counted; and what
-    ``RLIMIT_AS`` (``ulimit -v``) leaves.
+    ``memory.limit_in_bytes`` (version 1), without droppable pages of files; and what ``RLIMIT_AS``
+    (``ulimit -v``) leaves.
     """
     return min([*_of_machine(), *_of_groups(), *_of_limit()], default=None)
 

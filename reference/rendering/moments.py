@@ -1,8 +1,8 @@
-"""Sums of the passes of a difference that tell how far its noise is from a normal distribution.
+"""Sums of the passes of a difference, to measure how far its noise is from a normal distribution.
 
-Path-traced noise is skewed: rare paths carry much of the light, and as long as none has come a
-pixel looks darker and surer than it is. The third moment of the passes tells how large such
-contributions are, and means of groups of passes tell how any number made of the image scatters.
+Path-traced noise is skewed: rare paths carry much of the light, and until one arrives a pixel looks
+darker, with a smaller error, than it is. The third moment of the passes measures such
+contributions, and means of groups of passes show how any number computed from the image scatters.
 """
 
 from collections.abc import Callable
@@ -16,13 +16,13 @@ import numpy as np
 from reference.rendering.sums import Accumulator, Estimate, Mean, flattened, values
 
 GROUPS = 8
-"""Of passes, at most: seven degrees of freedom for an interval."""
+"""Groups of passes, at most: seven degrees of freedom for an interval."""
 
 BLOCK = 8
-"""Side in pixels of the blocks that are sampled, and that marks are tested in."""
+"""Side in pixels of the blocks for sampling and for testing marks."""
 
 BLOCKS = 256
-"""Sampled at most: 16,384 pixels, all of an image of 128 x 128. It bounds memory and time."""
+"""Blocks sampled, at most: 16,384 pixels, all of a 128 x 128 image. It bounds memory and time."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class DifferenceSums(Accumulator):
     counted
         (H, W): the pixels from which blocks are sampled.
     compact
-        As for :class:`reference.rendering.sums.Mean`.
+        See :class:`reference.rendering.sums.Mean`.
     """
 
     SUMS: tuple[str, ...] = (*Accumulator.SUMS, "cubes")
@@ -95,7 +95,7 @@ class DifferenceSums(Accumulator):
         self._groups = np.zeros((GROUPS, flat.size))
 
     def add(self, image: Any, less: Any = None) -> None:
-        """Add a pass: a tensor (H, W, 3), less another one if that is given."""
+        """Add a pass: a tensor (H, W, 3), less another one if given."""
         super().add(image, less)
         if self._index.shape[0]:
             found = values(flattened(image, less), self._index)
@@ -104,8 +104,8 @@ class DifferenceSums(Accumulator):
     def _step(self, sums, image):
         count, step = self.count, image - sums["mean"]
         share = step / dr.opaque(mi.Float64, count)
-        # The update of a third central moment by one value (Pébay 2008, equation 2.8), which takes
-        # the mean and the squares as they were before.
+        # The update of a third central moment by one value (Pébay 2008, equation 2.8) takes the old
+        # mean and squares.
         cubic = dr.opaque(mi.Float64, (count - 1) * (count - 2))
         sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
         super()._step(sums, image)
@@ -119,12 +119,12 @@ class DifferenceSums(Accumulator):
         return super().shapes(size) | {"groups": self._groups.shape}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
+        """Resume from the arrays of another :meth:`state`, which are removed from it."""
         super().restore(state)
         self._groups = np.array(state["groups"])
 
     def estimate(self, dtype: type = float, last: bool = False) -> DifferenceEstimate:
-        """Return what the passes so far say, as the base does; the third cumulant in doubles."""
+        """Return the estimate so far, like the base; the third cumulant in doubles."""
         third, n = self._array("cubes", float, last), self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
@@ -144,12 +144,12 @@ class DifferenceSums(Accumulator):
 class SumsOfHalves(DifferenceSums):
     """Running sums of a difference; its mean is the difference of the halves' means.
 
-    Each pass is added to it before it is added to those.
+    Add each pass here before adding it to those.
 
     Parameters
     ----------
     counted, compact
-        As for :class:`DifferenceSums`.
+        See :class:`DifferenceSums`.
     halves
         The :class:`Mean` of each half.
     """
@@ -184,7 +184,7 @@ def block_numbers(counted: np.ndarray) -> np.ndarray:
 
 
 def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Draw blocks that hold counted pixels; the same ones for the same image.
+    """Draw blocks that hold counted pixels; always the same for the same image.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """
     own = block_numbers(counted)
     numbers = np.unique(own)
-    # A random draw, not every n-th block: a stride would fall in step with the image.
+    # A random draw, not every n-th block: a stride could align with the image.
     chosen = np.random.default_rng(0).permutation(len(numbers))[:BLOCKS]
     chosen = numbers[np.sort(chosen)]
     inside = np.isin(own, chosen)

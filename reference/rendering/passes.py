@@ -1,6 +1,6 @@
 """The one loop that renders: passes of several renderers in turn.
 
-In turn, so that a drift of the machine hits all alike. All renderers take the same seed for a pass:
+In turn, so a drift of the machine affects all equally. All renderers take the same seed for a pass:
 their camera rays are the same, and pixel filter and edges cancel in a difference.
 """
 
@@ -18,7 +18,7 @@ Progress = Callable[[str, int, int], None]
 
 
 class Stream(IntEnum):
-    """What passes are for; passes of different streams are independent at any seed."""
+    """The purpose of passes; passes of different streams are independent at any seed."""
 
     COMPARED = 0
     OTHER_SIDE = 1
@@ -29,8 +29,8 @@ class Stream(IntEnum):
 def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
     """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
 
-    Both halves, and all methods that are compared, take the same one for a pass. So their camera
-    rays cancel, while runs of different seeds have no pass in common.
+    Both halves, and all compared methods, take the same seed for a pass. So their camera rays
+    cancel, while runs of different seeds have no pass in common.
     """
     sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
     return int(sequence.generate_state(1)[0])
@@ -55,22 +55,22 @@ def passes(
     progress: Progress | None = None,
     stage: str = "rendering",
 ) -> Iterator[Pass]:
-    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each as it is done.
+    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each when done.
 
     Parameters
     ----------
     renderers
         Each renders in its own variant.
     seed
-        Of the run.
+        Seed of the run.
     count
-        Number of passes in all.
+        Total number of passes.
     first
-        Passes that were rendered before.
+        Number of passes rendered before.
     stream
-        What the passes are for.
+        Purpose of the passes.
     progress, stage
-        Told before each pass, and once more when all are done or the caller has seen enough.
+        Called before each pass, and once more when all are done or the caller stops.
     """
     done = first
     try:
@@ -81,14 +81,14 @@ def passes(
             made = Pass(number, own, _images(renderers, own))
             done = number + 1
             yield made
-            del made  # else its images would be there beside the next ones
+            del made  # else its images would stay alongside the next ones
     finally:
         if progress:
             progress(stage, done, done)
 
 
 def _images(renderers: Sequence[Renderer], seed: int) -> tuple:
-    """Render one pass, those of one variant together: a change takes as long as a small image."""
+    """Render one pass, grouped by variant: a change takes as long as a small image."""
     images: dict[int, Any] = {}
     for name in dict.fromkeys(renderer.variant for renderer in renderers):
         with variant(name):

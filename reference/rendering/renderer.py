@@ -1,9 +1,9 @@
 """Rendering in independent passes, with mean, standard error and times.
 
-Both halves of a pair are rendered pass by pass with the same sampler and the same seed, so that the
-camera rays of a pass are the same in both and pixel filter and edges cancel in the difference.
-Passes differ in seed alone and are independent; samples within a pass are stratified and are not,
-so that every standard error here comes from the spread of passes.
+Both halves of a pair are rendered pass by pass with the same sampler and seed. So the camera rays
+of a pass are the same in both, and pixel filter and edges cancel in the difference. Passes differ
+only in seed and are independent; samples within a pass are stratified and are not. So every
+standard error here comes from the spread of passes.
 """
 
 import gc
@@ -39,9 +39,9 @@ ROUNDING = 1e-5
 class PassTimes:
     """Times of the passes of one half, in seconds.
 
-    ``first`` is the time of the first pass, which traces and compiles; ``compilation`` the part of
-    it that LLVM took, next to nothing for kernels in Dr.Jit's cache on disk. ``median`` is of
-    the passes after the first (of the first if it is alone).
+    ``first`` is the time of the first pass, which traces and compiles; ``compilation`` the part
+    that LLVM took, almost nothing for kernels in Dr.Jit's cache on disk. ``median`` is of the
+    passes after the first (or of the first if it is alone).
     """
 
     median: float
@@ -65,17 +65,17 @@ class Renderer:
     label
         Name in error messages.
     size
-        Width and height to render in place of the film's, of the same shape; None leaves them.
+        Width and height to render in place of the film's, of the same shape; None keeps the film's.
 
     Attributes
     ----------
     replays
-        Whether passes after the first replay its kernels, without tracing anything again.
+        Whether passes after the first replay its kernels, without tracing again.
 
     Raises
     ------
     InputError
-        For more samples than :data:`LARGEST_PASS` in a pass, when it is rendered.
+        When rendering, for more samples in a pass than :data:`LARGEST_PASS`.
     """
 
     def __init__(
@@ -89,14 +89,14 @@ class Renderer:
         self.scene = scene
         self.integrator = integrator or scene.integrator()
         self.spp = spp
-        shading = getattr(self.integrator, "model", None)  # of the integrator `heuristic` alone
+        shading = getattr(self.integrator, "model", None)  # only the integrator `heuristic` has it
         self._is_users = shading is not None and not shading.is_own
         self.label = f"{label} ({shading.name})" if shading and self._is_users else label
         self.size = size
         self.variant = mi.variant()
         self.times: list[float] = []
         self.compilation = 0.0
-        # Of a user's own code nobody knows whether it can be recorded: NumPy ends the process.
+        # A user's code may be impossible to record: NumPy ends the process.
         self._replayed = None if self._is_users else dr.freeze(_rendered)
 
     def render(self, seed: int) -> Any:
@@ -105,11 +105,11 @@ class Renderer:
         Raises
         ------
         InputError
-            With Mitsuba's own reason when it cannot render the scene.
+            With Mitsuba's own reason if it cannot render the scene.
         NonFiniteError
-            Naming the first pixel that is NaN or infinite, and how many there are.
+            With the first pixel that is NaN or infinite, and their number.
         InputError
-            Likewise where a heuristic of a user's own gives negative light.
+            Likewise if a user's heuristic gives negative light.
         """
         if self.size:
             resize(self.scene, self.size)
@@ -130,7 +130,7 @@ class Renderer:
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
             kernels = dr.kernel_history([dr.KernelType.JIT])
-        # The film keeps what it has developed, which is as large as the image.
+        # The film keeps its developed image.
         self.scene.sensors()[0].film().clear()
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
         if image.shape[2] == 1:
@@ -146,16 +146,17 @@ class Renderer:
         """See the class."""
         return self._replayed is not None
 
-    def sampled(self, spp):
-        """Return a renderer of the same with another number of samples."""
+    def sampled(self, spp: int) -> "Renderer":
+        """Return the same renderer with another number of samples."""
         other = copy(self)
         other.spp, other.times, other.compilation = spp, [], 0.0
         return other
 
     def _image(self, seed):
-        """Render, later passes by replaying the kernels of the first where Dr.Jit can do so.
+        """Render; later passes replay the kernels of the first if Dr.Jit can.
 
-        It cannot where a plugin has arrays that it does not know of, as Mitsuba's spectral tables.
+        It cannot if a plugin has arrays that it does not know of, such as Mitsuba's spectral
+        tables.
         """
         given = self.scene, self.integrator, self.spp, seed
         if self._replayed is not None:
@@ -164,14 +165,14 @@ class Renderer:
                     self.integrator.prepare(self.scene)
                 with _no_collection():
                     return self._replayed(*given)
-            except InputError:  # what is asked for cannot be prepared
+            except InputError:  # the scene cannot be prepared
                 raise
-            except Exception:  # whatever a plugin raises, it says better when it is traced
+            except Exception:  # a plugin's message is better when it is traced
                 self._replayed = None
         return _rendered(*given)
 
     def _may_overshoot(self):
-        """Tell whether the film's filter has negative lobes."""
+        """Return whether the film's filter has negative lobes."""
         found = self.scene.sensors()[0].film().rfilter().class_name()
         return not any(kind in found for kind in ("Box", "Tent", "Gaussian"))
 
@@ -179,9 +180,9 @@ class Renderer:
         width, height = image_size(self.scene)
         if width * height * self.spp > LARGEST_PASS:
             raise InputError(
-                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once are"
-                f" too many: {LARGEST_PASS} samples per pass are allowed. Give fewer with --spp, or"
-                " a smaller image with --resolution."
+                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once"
+                f" are too many: at most {LARGEST_PASS} samples per pass are allowed."
+                " Give fewer with --spp, or a smaller image with --resolution."
             )
 
     def pass_times(self) -> PassTimes:
@@ -198,7 +199,7 @@ class Renderer:
 
 @contextmanager
 def variant(name: str) -> Iterator[None]:
-    """Switch to a Mitsuba variant for the block, if it is not the current one already."""
+    """Switch to a Mitsuba variant for the block, unless it is the current one."""
     if name == mi.variant():
         yield
         return
@@ -218,7 +219,7 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
     names = ("shadows", "bsdf_samples", "light_samples")
     own = {name: getattr(plan, name) for name in names}
     integrator = mi.load_dict(description | own)
-    # An effect that is left out may be the environment itself.
+    # The effect left out may be the environment itself.
     if plan.tabulate_environment and scene.environment() is not None:
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
@@ -226,7 +227,7 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
 
 @contextmanager
 def _no_collection():
-    """Keep garbage: a recording, collected while another one is made, ends the process."""
+    """Postpone garbage collection: during a recording it would end the process."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -241,7 +242,7 @@ def _rendered(scene, integrator, spp, seed):
 
 
 def _chain(error):
-    """Yield an error, and those that led to it: Dr.Jit wraps what Python code raised."""
+    """Yield an error, and those that led to it: Dr.Jit wraps errors of Python code."""
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
@@ -250,8 +251,8 @@ def _chain(error):
 def require_finite(image: np.ndarray, layer: str) -> None:
     """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity.
 
-    The message names the layer, how many pixels are concerned and the first one as (x, y), counted
-    from the top left in reading order.
+    The message gives the layer, the number of pixels and the first one as (x, y), counted from the
+    top left in reading order.
     """
     finite = np.isfinite(image)
     if not finite.all():
@@ -266,13 +267,13 @@ def require_light(image: np.ndarray, layer: str) -> None:
     right = image >= -ROUNDING
     if not right.all():
         raise InputError(
-            f"{layer}: {_wrong(image, right, 'negative')}. Light is 0 or more: clamp what can be"
-            " negative, such as a cosine, by drjit.maximum(cosine, 0)."
+            f"{layer}: {_wrong(image, right, 'negative')}. Light must be 0 or more: clamp what"
+            " can be negative, such as drjit.maximum(cosine, 0)."
         )
 
 
 def _wrong(image, right, what):
-    """Say how many pixels are wrong, and which is the first."""
+    """Return how many pixels are wrong, and the first."""
     wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
     place = np.unravel_index(np.argmax(wrong), wrong.shape)
     return (

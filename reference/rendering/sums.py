@@ -19,7 +19,7 @@ POWERS = {"signed": 1, "squares": 2, "cubes": 3}
 ROOTS = {1: lambda value: value, 2: dr.sqrt, 3: dr.cbrt}
 
 PART = 2**20
-"""Values of a sum that are updated at a time: Dr.Jit's memory comes in powers of two."""
+"""Values of a sum updated at a time: Dr.Jit's memory comes in powers of two."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Estimate:
     standard_error
         Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
     noise
-        An image with the distribution of ``mean``'s error: the passes summed with alternating
+        An image with the distribution of ``mean``'s error: the sum of the passes with alternating
         signs, divided by their number.
     """
 
@@ -47,13 +47,13 @@ class Mean:
     """The running mean of passes.
 
     Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering; in
-    parts of :data:`PART` values, so that updating them takes next to no memory beside them.
+    parts of :data:`PART` values, so updates take almost no extra memory.
 
     Parameters
     ----------
     compact
-        Whether all sums but the mean are kept in single precision, as roots of their power: so
-        their range is the images' own. Each pass adds less than 2e-7 of a sum to its error.
+        Whether all sums except the mean are kept in single precision, as roots of their power,
+        which gives them the images' range. Each pass adds less than 2e-7 of a sum to its error.
     """
 
     SUMS: tuple[str, ...] = ("mean",)
@@ -65,7 +65,7 @@ class Mean:
         self._parts: list[dict[str, Array]] = []
 
     def add(self, image: Any, less: Any = None) -> None:
-        """Add a pass: a tensor (H, W, 3), less another one if that is given."""
+        """Add a pass: a tensor (H, W, 3), less another one if given."""
         flat = flattened(image, less)
         if self.count == 0:
             self._shape = tuple(image.shape)
@@ -100,7 +100,7 @@ class Mean:
         return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from the arrays of the :meth:`state` of another one, which are taken out of it."""
+        """Resume from the arrays of another :meth:`state`, which are removed from it."""
         self.count = int(state["count"])
         self._shape = state[self.SUMS[0]].shape
         self._parts = [{} for _ in self._ranges()]
@@ -114,7 +114,7 @@ class Mean:
         sums["mean"] += (image - sums["mean"]) / dr.opaque(mi.Float64, self.count)
 
     def _sums(self, number, size):
-        """Return the sums of a part, of so many values, in doubles."""
+        """Return the sums of a part of ``size`` values, in doubles."""
         return {name: self.part(name, number) for name in self.SUMS}
 
     def _packed(self, name, total):
@@ -135,7 +135,7 @@ class Mean:
         return [range(start, min(start + PART, size)) for start in range(0, size, PART)]
 
     def _array(self, name, dtype=float, last=False):
-        """Return a sum as an array; with ``last`` its memory is given back."""
+        """Return a sum as an array; ``last`` frees its memory."""
         found = np.empty(prod(self._shape), dtype)
         for part, kept in zip(self._ranges(), self._parts, strict=True):
             total = self._unpacked(name, kept.pop(name) if last else kept[name])
@@ -146,7 +146,7 @@ class Mean:
 
 
 class Deviations(Mean):
-    """The running mean of passes, and how far they are from it."""
+    """The running mean and spread of passes."""
 
     SUMS: tuple[str, ...] = ("mean", "squares")
 
@@ -170,7 +170,7 @@ class Accumulator(Deviations):
 
     def _step(self, sums, image):
         super()._step(sums, image)
-        # Rounded as the sum is, so that equal passes cancel.
+        # Rounded like the sum, so equal passes cancel.
         image = mi.Float64(mi.Float32(image)) if self._compact else image
         sums["signed"] += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
 
@@ -181,14 +181,14 @@ class Accumulator(Deviations):
         return noise
 
     def estimate(self, dtype: type = float, last: bool = False) -> Estimate:
-        """Return what the passes so far say; their number should be even and at least 2.
+        """Return the estimate so far; the number of passes should be even and at least 2.
 
         Parameters
         ----------
         dtype
-            Of the arrays.
+            Type of the arrays.
         last
-            Whether the sums are done with: each is given back as soon as its array is made.
+            Whether the sums are no longer needed: each is freed as soon as its array is made.
         """
         noise, error = self.noise(dtype, last), self.standard_error(dtype, last)
         return Estimate(self.mean(dtype, last), error, noise, self.count)
@@ -209,7 +209,7 @@ def values(images: Any, places: Array) -> Array:
 def add_difference(sums: Any, images: Any) -> None:
     """Add the images of both halves, and their difference, to three sums."""
     heuristic, reference = images
-    # First, since it may build on the means of the passes before.
+    # First, since it may use the means of earlier passes.
     sums[2].add(heuristic, reference)
     sums[0].add(heuristic)
     sums[1].add(reference)

@@ -1,1 +1,1 @@
-"""Scenes as Mitsuba reads them: files, graph, sensor and film."""
+"""Scenes as read by Mitsuba: files, graph, sensor and film."""

@@ -1,8 +1,8 @@
-"""What the values of a scene's elements may be, looked at before anything is made.
+"""Allowed values of a scene's elements, checked before anything is made.
 
-Mitsuba refuses some values that cannot be meant, and renders others in silence: a sphere of radius
-NaN is not there, an infinite index of refraction is black. Numbers are compared with :data:`RULES`,
-transforms against :func:`_transform`, and every number has to be one that single precision has.
+Mitsuba rejects some values that make no sense, and silently renders others: a sphere of radius NaN
+is missing, an infinite index of refraction is black. Numbers are checked by :data:`RULES`,
+transforms by :func:`_transform`, and every number must exist in single precision.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,23 +17,22 @@ from heuristic.errors import InputError
 from reference.scene.graph import Graph
 
 LARGEST_ALPHA = 1000.0
-"""Roughness: the plugins' own arithmetic overflows far above, and all light is lost far below."""
+"""Largest roughness: arithmetic overflows far above it, and all light is lost far below it."""
 
 FILM = (768, 576)
-"""Width and height that Mitsuba takes where a film has none."""
+"""Mitsuba's width and height for a film without its own."""
 
 SMALLEST_RATIO = 1e-14
-"""Of the singular values of a matrix with rows and columns of length 1; less is rounding."""
+"""Ratio of singular values of a matrix with rows and columns of length 1; less is rounding."""
 
 LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What the parameters of some names may be; ``allowed`` says it, after "give".
+    """Allowed values of some parameters; ``allowed`` is the text after "give".
 
-    ``is_met`` looks at the parameter's numbers, (n,). ``plugins`` are those that it holds for, all
-    where there is none.
+    ``is_met`` checks the parameter's numbers, (n,). It applies to ``plugins``, or to all if empty.
     """
 
     keys: tuple[str, ...]
@@ -42,7 +41,7 @@ class Rule:
     plugins: tuple[str, ...] = ()
 
     def holds_for(self, plugin: str, key: str) -> bool:
-        """Tell whether a parameter of a plugin is one of those that the rule is about."""
+        """Return whether the rule applies to a parameter of a plugin."""
         return key in self.keys and plugin in (self.plugins or (plugin,))
 
 
@@ -105,19 +104,19 @@ RULES = (
 
 
 def check(graph: Graph) -> None:
-    """Refuse values that cannot be meant, in all elements that are in use.
+    """Reject values that make no sense, in all elements in use.
 
     Raises
     ------
     InputError
-        Naming the element, the parameter, its value, and what is allowed.
+        With the element, the parameter, its value, and what is allowed.
     """
     for index in graph.nodes_in_use():
         check_node(graph, index)
 
 
 def check_node(graph: Graph, index: int) -> None:
-    """Refuse values of one element, as :func:`check` does."""
+    """Reject values of one element, like :func:`check`."""
     props, plugin = graph.props(index), graph.plugin(index)
     for key, value in props.items():
         for allowed in _objections(plugin, key, value):
@@ -131,7 +130,7 @@ def _refusal(graph: Graph, index: int, objection: str) -> InputError:
 
 
 def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
-    """Yield what would be allowed in place of a value that is not."""
+    """Yield what would be allowed in place of a wrong value."""
     if isinstance(value, bool):
         return
     if _is_transform(value):
@@ -148,7 +147,7 @@ def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
 
 
 def _numbers(key: str, value: Any) -> np.ndarray | None:
-    """Return the numbers that a value has, (n,); None for what has none."""
+    """Return the numbers in a value, (n,); None if it has none."""
     if isinstance(value, Real):
         return np.array([float(value)])
     if hasattr(value, "wavelengths"):  # a spectrum, whose type Mitsuba does not name
@@ -163,12 +162,12 @@ def _numbers(key: str, value: Any) -> np.ndarray | None:
 
 
 def _is_transform(value: Any) -> bool:
-    """Tell whether a value is a transform; vectors, too, have something called a matrix."""
+    """Return whether a value is a transform; vectors also have an attribute ``matrix``."""
     return "Transform" in type(value).__name__
 
 
 def _table(text: str) -> np.ndarray | None:
-    """Return the numbers of a text; None for one with other words, which Mitsuba refuses."""
+    """Return the numbers of a text; None for one with other words, which Mitsuba rejects."""
     try:
         return np.array(text.replace(",", " ").split(), float)
     except ValueError:
@@ -176,10 +175,10 @@ def _table(text: str) -> np.ndarray | None:
 
 
 def _transform(matrix: np.ndarray, of_texture: bool) -> Iterator[str]:
-    """Yield what is wrong with a transform.
+    """Yield the faults of a transform.
 
-    A texture may be stretched without end, which makes stripes. All else is seen or lit through the
-    inverse, which has to be one in single precision.
+    A texture may be stretched without end, which makes stripes. Everything else uses the inverse,
+    which must exist in single precision.
     """
     if not (np.abs(matrix) <= LARGEST).all():
         yield "finite numbers (a lookat has none where its target is its origin or lies along up)"
@@ -202,7 +201,7 @@ def _is_invertible(matrix: np.ndarray) -> bool:
 
 
 def _missing(graph: Graph, index: int) -> Iterator[str]:
-    """Yield what an element lacks, where Mitsuba does not refuse it but ends the process."""
+    """Yield what an element lacks, if Mitsuba would end the process instead of rejecting it."""
     plugin, props = graph.plugin(index), graph.props(index)
     if plugin == "bitmap" and not any(key in props for key in PICTURES):
         yield f"it has no picture: give one of {', '.join(PICTURES)}."
@@ -210,11 +209,11 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
         kind, count = CHILDREN[plugin]
         found = len(graph.children(index, kind))
         if found != count:
-            yield f"it has {found} of the {count} {kind.name} elements that it takes: give {count}."
+            yield f"it needs {count} {kind.name} elements, and has {found}."
 
 
 def _between(plugin: str, props: mi.Properties) -> Iterator[str]:
-    """Yield what is wrong between parameters that are allowed one by one."""
+    """Yield conflicts between parameters that are allowed individually."""
     if plugin == "cylinder" and "p0" in props and "p1" in props:
         ends = [np.ravel(np.asarray(props[key], float)) for key in ("p0", "p1")]
         if (ends[0] == ends[1]).all():

@@ -1,13 +1,13 @@
-"""Files that Mitsuba reads in silence though something in them is wrong.
+"""Damaged files that Mitsuba reads silently.
 
-Vertex numbers of PLY and serialized meshes it takes as they are: it reads whatever lies beyond the
-mesh in memory, or the process ends there, and takes numbers below 0 for 0. OBJ files it checks by
-itself.
+Mitsuba does not check the vertex numbers of PLY and serialized meshes: it reads memory beyond the
+mesh, or the process ends there, and takes numbers below 0 for 0. It does check OBJ files.
 
-A tensor file, as of `measured` materials, says where each of its fields lies: magic ``tensor_file``
-and a null byte, a version of two bytes, the number of fields (uint32), and for each field the
-length of its name (uint16), the name, the number of axes (uint16), the type (uint8), the offset
-(uint64) and the lengths of its axes (uint64). Mitsuba does not look whether the file goes as far.
+A tensor file, as used by `measured` materials, gives the place of each of its fields: magic
+``tensor_file`` and a null byte, a version of two bytes, the number of fields (uint32), and for each
+field the length of its name (uint16), the name, the number of axes (uint16), the type (uint8), the
+offset (uint64) and the lengths of its axes (uint64). Mitsuba does not check whether the file is
+that long.
 """
 
 import os
@@ -26,7 +26,7 @@ from reference.scene.graph import Graph
 MAGIC = b"tensor_file\0"
 
 BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 8, 8: 8, 9: 2, 10: 4, 11: 8}
-"""Of a number, by its type: integers of 8 to 64 bits, without sign and with, and floats."""
+"""Bytes of a number, by type: integers of 8 to 64 bits, unsigned and signed, and floats."""
 
 
 TYPES = {
@@ -38,12 +38,12 @@ TYPES = {
 
 
 def check(graph: Graph) -> None:
-    """Refuse meshes and tables of which something is lost, or whose faces or vertices are nowhere.
+    """Reject incomplete meshes and tables, and those with invalid faces or vertices.
 
     Raises
     ------
     InputError
-        Naming the element, its file, and what is wrong with it.
+        With the element, its file, and the fault.
     """
     for index in graph.nodes_in_use():
         faults = FAULTS.get(graph.plugin(index), ())
@@ -62,17 +62,17 @@ def check(graph: Graph) -> None:
 
 @lru_cache(maxsize=1024)
 def _fault_of_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
-    """Return what is wrong with a mesh; nothing for one that Mitsuba refuses by itself.
+    """Return the fault of a mesh; empty for one that Mitsuba itself rejects.
 
-    ``stamp`` tells one content of the file from another.
+    ``stamp`` identifies the content of the file.
     """
-    # With face normals nothing is computed at vertices, which may not be there.
+    # With face normals nothing is computed at vertices, which may not exist.
     description = {"type": plugin, "filename": path, "face_normals": True}
     if plugin == "serialized":
         description["shape_index"] = number
     try:
         mesh = mi.load_dict(description)
-    except Exception:  # whatever it is, the scene's own attempt raises it again
+    except Exception:  # making the scene raises it again
         return ""
     faces, count = np.array(mesh.faces_buffer()), mesh.vertex_count()
     if len(faces) and faces.max() >= count:
@@ -88,7 +88,7 @@ def _fault_of_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
 
 @lru_cache(maxsize=1024)
 def _fault_of_tensor(path: str, number: int, stamp: tuple) -> str:
-    """Return what is lost of a tensor file; nothing of one that Mitsuba refuses by itself."""
+    """Return what a tensor file lacks; empty for one that Mitsuba itself rejects."""
     size = stamp[1]
     with Path(path).open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
@@ -114,7 +114,7 @@ def _unpacked(file: BinaryIO, form: str) -> tuple:
 
 @lru_cache(maxsize=1024)
 def _fault_of_ply(path: str, number: int, stamp: tuple) -> str:
-    """Return which face of a PLY file names a vertex below 0, if its faces are lists alone."""
+    """Return which face of a PLY file names a vertex below 0, if its faces are only lists."""
     with Path(path).open("rb") as file:
         form, elements = _head_of_ply(file)
         for name, count, properties in elements:
@@ -123,7 +123,7 @@ def _fault_of_ply(path: str, number: int, stamp: tuple) -> str:
                 found = _negative(file, form, count, properties[0]) if are_lists else None
                 return "" if found is None else f"face {found} names a vertex below 0."
             if form == b"ascii":
-                # A file may promise more lines than it has.
+                # A file may declare more lines than it has.
                 if any(not file.readline() for _ in range(count)):
                     return ""
             elif any(words[:1] == [b"list"] or words[0] not in TYPES for words in properties):
@@ -151,7 +151,7 @@ def _head_of_ply(file: BinaryIO) -> tuple[bytes, list[tuple[bytes, int, list[lis
 
 
 def _negative(file: BinaryIO, form: bytes, count: int, words: list[bytes]) -> int | None:
-    """Return the first of some faces that has a negative number, None where none has."""
+    """Return the first of some faces with a negative number, None if none has one."""
     if form == b"ascii":
         lines = zip(range(count), file, strict=False)
         return next((i for i, line in lines if b"-" in line), None)
@@ -164,7 +164,7 @@ def _negative(file: BinaryIO, form: bytes, count: int, words: list[bytes]) -> in
     content = np.frombuffer(file.read(), np.uint8)
     face = np.dtype([("length", length), ("corners", number, (3,))])
     triangles = content[: len(content) // face.itemsize * face.itemsize].view(face)[:count]
-    # Lists of other lengths end what is known of where the next one begins.
+    # After a list of another length the start of the next one is unknown.
     known = np.cumprod(triangles["length"] == 3, dtype=bool)
     bad = np.flatnonzero(known & (triangles["corners"] < 0).any(axis=1))
     return int(bad[0]) if len(bad) else None
@@ -175,5 +175,5 @@ FAULTS = {
     "ply": (_fault_of_ply, partial(_fault_of_mesh, "ply")),
     "serialized": (partial(_fault_of_mesh, "serialized"),),
 }
-"""What looks for faults in the files of plugins: their path, number of the mesh, and a stamp that
-tells one content of the file from another; it returns what is wrong, or nothing."""
+"""Functions that find faults in the files of plugins, given the path, the number of the mesh, and a
+stamp of the file's content; they return the fault, or an empty string."""

@@ -1,4 +1,4 @@
-"""Folders of scenes: which of the files in them, and in their subfolders, are scenes."""
+"""Folders of scenes: which files in them, and in their subfolders, are scenes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROOT = re.compile(r"<scene\b")
 
 @dataclass(frozen=True)
 class Found:
-    """The scenes of a folder by path: files of Mitsuba's, and Python files, which are code."""
+    """The scenes of a folder by path: Mitsuba's files, and Python files, which are code."""
 
     written: tuple[Path, ...]
     scripts: tuple[Path, ...]
@@ -33,7 +33,7 @@ def scenes_in(folder: Path) -> Found:
     Raises
     ------
     InputError
-        When there is none.
+        If there is none.
     """
     files = list(_files(folder))
     written = [path for path in files if path.suffix == ".xml"]
@@ -62,7 +62,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _may_be_scene(path: Path) -> bool:
-    """Tell whether a file has a scene; one that cannot be read fails as a scene, by itself."""
+    """Return whether a file has a scene; an unreadable one counts, and fails later."""
     return not os.access(path, os.R_OK) or ROOT.search(_text(path)) is not None
 
 
@@ -74,7 +74,7 @@ def _text(path: Path) -> str:
 
 
 def _defines_scene(path: Path) -> bool:
-    """Tell whether a Python file gives the name to something, without running it."""
+    """Return whether a Python file defines the name, without running it."""
     try:
         body = ast.parse(_text(path)).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

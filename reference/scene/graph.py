@@ -1,7 +1,7 @@
 """A scene as Mitsuba's parser reads it: a graph of nodes that can be edited before it is made.
 
 Both halves of a pair are derived from one such graph. It comes from an XML file or from a Python
-dictionary, and knows the file and line of each node, which is what error messages name.
+dictionary, and knows the file and line of each node for error messages.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from heuristic.errors import InputError, unknown
 from heuristic.plugins import mapped
 
 FILENAME = "filename"
-"""The parameter by which every plugin names the file that it reads."""
+"""The parameter with which every plugin names its file."""
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -49,19 +49,19 @@ def set_variant(variant: str) -> None:
 class Graph:
     """The nodes of one scene, with the edits that pairing needs.
 
-    A node is named by its index. Nodes are only ever added or replaced, so that indices stay valid.
+    An index identifies a node. Nodes are only added or replaced, so indices stay valid.
     """
 
     def __init__(self, name: str, config: Any, state: Any):
         self.name = name
         self.config = config
         self.state = state
-        self.folders: list[Any] = []  # temporary ones with files that nodes refer to
+        self.folders: list[Any] = []  # temporary, with files that nodes refer to
         self.kinds: dict[str, Any] = {}  # of plugins written in Python
-        self.resolver = None  # where relative names of files begin, if not as Mitsuba has it
+        self.resolver = None  # finds files with relative names, if not Mitsuba's own
 
     def copy(self) -> "Graph":
-        """Return a graph that can be edited apart from this one."""
+        """Return a copy that can be edited independently."""
         copy = Graph(self.name, self.config, Parser.ParserState(self.state))
         copy.folders = list(self.folders)
         copy.kinds = self.kinds
@@ -69,13 +69,13 @@ class Graph:
         return copy
 
     def part(self, index: int) -> "Graph":
-        """Return a graph of a node, which comes first, and of copies of all that it refers to."""
+        """Return a graph of a node, which comes first, and copies of everything it refers to."""
         part = Graph(self.name, self.config, Parser.ParserState())
         part.state.files = self.state.files
         part.folders, part.kinds, part.resolver = list(self.folders), self.kinds, self.resolver
         given = [index, *(one for one in self.nodes_in_use(index) if one != index)]
         places = {one: place for place, one in enumerate(given)}
-        paths = list(self.state.node_paths)  # none of files, and of nodes that were added
+        paths = list(self.state.node_paths)  # without files and added nodes
         if paths:
             part.state.node_paths = [paths[one] if one < len(paths) else "" for one in given]
         for one in given:
@@ -89,29 +89,29 @@ class Graph:
         return part
 
     def instantiate(self, index: int = 0) -> Any:
-        """Make the Mitsuba scene, without merging shapes; or the object of another node alone.
+        """Make the Mitsuba scene, without merging shapes; or only the object of another node.
 
         Raises
         ------
         InputError
-            With Mitsuba's own message when a plugin refuses its parameters.
+            With Mitsuba's own message if a plugin rejects its parameters.
         """
         state = Parser.ParserState(self.state)
         if index:
             state.nodes[0] = Parser.SceneNode(state.nodes[index])
         for node in state.nodes:
-            for key in node.props.keys():  # noqa: SIM118 Properties are no mapping
-                if isinstance(node.props[key], mi.TensorXf):  # a plugin takes it away
+            for key in node.props.keys():  # noqa: SIM118  Properties is not a mapping
+                if isinstance(node.props[key], mi.TensorXf):  # a plugin removes it
                     node.props[key] = mi.TensorXf(node.props[key])
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
-        # A plugin written in Python that evaluates something, made by one of several threads, would
-        # wait for ever for another that waits for Python.
+        # A Python plugin that evaluates something while several threads make plugins would wait
+        # forever for a thread that waits for Python.
         self.config.parallel = not any(map(_is_python, state.nodes))
         try:
             with resolving(self.resolver):
                 made = Parser.instantiate(self.config, state)
-        except Exception as error:  # whatever a plugin raises, in Python or in Mitsuba
+        except Exception as error:  # plugins may raise anything, in Python or in Mitsuba
             raise InputError(f"{self.name}: {_message(error)}{self._culprits(error)}") from error
         made = made[0] if isinstance(made, list) else made
         if isinstance(made, mi.Scene):
@@ -119,7 +119,7 @@ class Graph:
         return made
 
     def _culprits(self, error):
-        """Name the files that cannot be read, where a message names none."""
+        """Name the files that cannot be read, if a message does not."""
         files = {index: self.file(index) for index in self.nodes_in_use()}
         known = [(index, path) for index, path in files.items() if path is not None]
         told = str(error).rpartition("plugin of type")[2]
@@ -129,7 +129,7 @@ class Graph:
         return f" (the file {', '.join(found)})" if found else ""
 
     def _fails(self, index):
-        """Tell whether a node cannot be made by itself either."""
+        """Return whether a node cannot be made on its own either."""
         state = Parser.ParserState(self.state)
         state.nodes[0] = Parser.SceneNode(state.nodes[index])
         try:
@@ -140,7 +140,7 @@ class Graph:
         return False
 
     def _require_extents(self, scene):
-        """Refuse shapes that reach to infinity, of which no ray meets anything."""
+        """Reject shapes that extend to infinity, which rays never hit."""
         for shape in scene.shapes():
             box = shape.bbox()
             ends = np.array([np.ravel(box.min), np.ravel(box.max)])
@@ -148,7 +148,7 @@ class Graph:
             if not (is_empty or np.isfinite(ends).all()):
                 raise InputError(
                     f"{self.name}: {shape.id()}: the shape reaches from {ends[0]} to {ends[1]}."
-                    " Give it a finite size and place, its transforms and files included."
+                    " Give it a finite size and place; check its transforms and files."
                 )
 
     def nodes(self, kind: Any) -> list[int]:
@@ -156,7 +156,7 @@ class Graph:
         return [index for index in self.nodes_in_use() if self.kind(index) == kind]
 
     def kind(self, index: int) -> Any:
-        """Return the kind of a node; Mitsuba does not know that of plugins written in Python."""
+        """Return the kind of a node; Mitsuba does not know it for Python plugins."""
         kind = self.state.nodes[index].type
         if kind != mi.ObjectType.Unknown:
             return kind
@@ -166,7 +166,7 @@ class Graph:
         return self.kinds[plugin]
 
     def _kind_of_object(self, index):
-        """Return the kind of a user's own plugin: the kind of the object that it makes."""
+        """Return the kind of a user's plugin: the kind of the object that it makes."""
         made = self.instantiate(index)
         for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
             if isinstance(made, getattr(mi, kind)):
@@ -178,22 +178,22 @@ class Graph:
         return self.props(index).plugin_name()
 
     def props(self, index: int) -> Any:
-        """Return a node's properties. They are its own: changing them changes the graph."""
+        """Return a node's properties. Changing them changes the graph."""
         return self.state.nodes[index].props
 
     def label(self, index: int) -> str:
-        """Return a short name of a node for records and messages: its id, or else its place."""
+        """Return a short name of a node for records and messages: its id, or else its location."""
         identifier = self.props(index).id()
         return identifier or f"{self.plugin(index)} at {self.location(index)}"
 
     def location(self, index: int) -> str:
-        """Return where a node was written, as a person would look it up."""
+        """Return where a node was written, in readable form."""
         return Parser.file_location(self.state, self.state.nodes[index])
 
     def file(self, index: int) -> Path | None:
-        """Return the path of the file that a node reads; None where it reads none, or a lost one.
+        """Return the path of the file that a node reads, None if there is none.
 
-        It is where Mitsuba finds it.
+        It is the path where Mitsuba finds the file.
         """
         props = self.props(index)
         name = props.get(FILENAME, None)
@@ -207,7 +207,7 @@ class Graph:
             return None
 
     def children(self, index: int, kind: Any) -> list[tuple[str, int]]:
-        """Return ``(key, index)`` for the children of a node that are of a kind."""
+        """Return ``(key, index)`` of a node's children of a kind."""
         return [
             (key, value.index())
             for key, value in self.props(index).items()
@@ -222,15 +222,15 @@ class Graph:
         return len(self.state.nodes) - 1
 
     def attach(self, parent: int, key: str, child: int) -> None:
-        """Make a node the child of another, in place of what was under that key."""
+        """Make a node the child of another, replacing any under that key."""
         self.props(parent)[key] = Reference(child)
 
     def detach(self, parent: int, key: str) -> None:
-        """Take a child away."""
+        """Remove a child."""
         del self.props(parent)[key]
 
     def remove(self, index: int) -> None:
-        """Take a node out of its parent, the scene."""
+        """Remove a node from its parent, the scene."""
         for key, value in list(self.props(0).items()):
             if isinstance(value, Reference) and value.index() == index:
                 self.detach(0, key)
@@ -243,7 +243,7 @@ class Graph:
         self.state.nodes[index] = node
 
     def nodes_in_use(self, root: int = 0) -> list[int]:
-        """Return the indices of all nodes that the scene, or another, refers to, and its own."""
+        """Return the indices of the scene, or another node, and all nodes that it refers to."""
         seen, queue = set(), [root]
         while queue:
             index = queue.pop()
@@ -257,7 +257,7 @@ class Graph:
 
 
 def files_from(folder: Path) -> Any:
-    """Return what looks for files in a scene's own folder first, as Mitsuba's own command does."""
+    """Return a resolver that searches a scene's own folder first, like Mitsuba's command."""
     widened = mi.FileResolver(mi.file_resolver())
     widened.prepend(str(folder))
     return widened
@@ -265,7 +265,7 @@ def files_from(folder: Path) -> Any:
 
 @contextmanager
 def resolving(resolver: Any) -> Iterator[None]:
-    """Let Mitsuba look for files with a resolver, to which a ``<path>`` in a scene adds places."""
+    """Let Mitsuba find files with a resolver, to which a ``<path>`` in a scene adds places."""
     if resolver is None:
         yield
         return
@@ -278,13 +278,13 @@ def resolving(resolver: Any) -> Iterator[None]:
 
 
 def _is_python(node):
-    """Tell whether a node's plugin is written in Python, a user's own included."""
+    """Return whether a node's plugin is written in Python, including a user's."""
     is_unknown = node.type == mi.ObjectType.Unknown
     return is_unknown or node.props.plugin_name() in KINDS_OF_OWN_PLUGINS
 
 
 def _message(error):
-    """Return Mitsuba's message; of a plugin written in Python, what it said and where it stands."""
+    """Return Mitsuba's message; for a Python plugin, its message and location."""
     text = str(error).strip()
     if "Traceback" not in text:
         return text
@@ -301,7 +301,7 @@ def properties(plugin: str, **values: Any) -> Any:
 
 
 def graft(graph: Graph, other: Graph, index: int) -> int:
-    """Copy a node of another graph, and all that it refers to, and return its index here."""
+    """Copy a node of another graph with everything it refers to, and return its index here."""
     props = mi.Properties(other.props(index))
     for key, value in list(props.items()):
         if isinstance(value, Reference):

@@ -1,4 +1,4 @@
-"""A digest of all that a scene is made of, by which results are found again."""
+"""A digest of everything in a scene, which identifies its results."""
 
 import hashlib
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ def digest(source: Source) -> str:
     """Return a digest of a scene in the current variant, and of every file that it reads.
 
     It holds the graph with all values at full precision, objects that a script made, and the
-    content of :meth:`Source.files`. What a script takes from environment variables, the clock or
-    random numbers counts as far as it shows in the graph.
+    content of :meth:`Source.files`. Environment variables, the clock and random numbers used by a
+    script count as far as they show in the graph.
 
     Raises
     ------
     InputError
-        When the scene or one of its files cannot be read.
+        If the scene or one of its files cannot be read.
     """
     found = hashlib.sha256()
     graph = source.parse()

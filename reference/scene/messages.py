@@ -1,7 +1,7 @@
-"""What Mitsuba says about a scene while it is read, made and rendered.
+"""Mitsuba's messages about a scene while it is read, made and rendered.
 
-Its own logger writes to standard output, which is for results. Here its messages are collected, so
-that a record can state them.
+Mitsuba's logger writes to standard output, which is for results. Here its messages are collected,
+so a record can state them.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ class _Listener(mi.Appender):
 
 
 class _Plain(mi.Formatter):
-    """The words of a message alone, without time, thread and line of code."""
+    """Only the words of a message, without time, thread and line of code."""
 
     def format(self, *told: Any) -> str:
         return told[-1]
 
 
 def divert(hear: Callable[[str], Any]) -> None:
-    """Send what Mitsuba says from now on to ``hear``, a line or more at a time."""
+    """Send Mitsuba's messages from now on to ``hear``, one or more lines at a time."""
     logger = mi.logger()
     logger.clear_appenders()
     logger.set_formatter(_Plain())
@@ -45,7 +45,7 @@ def divert(hear: Callable[[str], Any]) -> None:
 
 @contextmanager
 def collected(into: list[str]) -> Iterator[None]:
-    """Collect what Mitsuba says while the block runs, and keep it from where it went before."""
+    """Collect Mitsuba's messages while the block runs, and keep them from their former target."""
     logger = mi.logger()
     appenders = [logger.appender(number) for number in range(logger.appender_count())]
     formatter = logger.formatter()
@@ -60,9 +60,9 @@ def collected(into: list[str]) -> Iterator[None]:
 
 
 def counted(messages: Iterable[str]) -> tuple[str, ...]:
-    """Return each message once, in the order in which they came, with its count if it came again.
+    """Return each message once, in order, with its count if it was repeated.
 
-    A message is one line here.
+    Each line is a message here.
     """
     lines = Counter(" ".join(message.split()) for message in messages)
     return tuple(

@@ -1,4 +1,4 @@
-"""What both halves of a pair need of a scene: its sensor, film, integrator, ids and BSDFs."""
+"""Preparation for both halves of a pair: sensor, film, integrator, ids and BSDFs."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,17 +16,17 @@ FILM, INTEGRATOR, MEDIUM, SAMPLER, SENSOR, SHAPE = (
 )
 
 PATHS = ("path", "volpath", "volpathmis")
-"""Integrators whose light is the reference's: all paths up to a length."""
+"""Integrators with the same light as the reference: all paths up to a length."""
 
 PIXEL_FORMATS = ("luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza")
-"""Those of Mitsuba's films."""
+"""Pixel formats of Mitsuba's films."""
 
 FILM_SIZES = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
 @dataclass(frozen=True)
 class Overridden:
-    """Something that the scene asks for, and what is done in its place."""
+    """Something that the scene requests, and what is done instead."""
 
     what: str
     given: str
@@ -35,9 +35,9 @@ class Overridden:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the scene's own integrator asks for.
+    """The settings of the scene's own integrator.
 
-    ``integrator`` is its plugin, None where the scene has none; ``max_depth`` counts as Mitsuba's,
+    ``integrator`` is its plugin, None if the scene has none; ``max_depth`` counts like Mitsuba's,
     -1 for no limit; ``rr_depth`` is None if omitted.
     """
 
@@ -51,10 +51,10 @@ class Settings:
 
 
 def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:
-    """Check the graph, fill in what both halves need, and return its :class:`Settings`.
+    """Check the graph, add what both halves need, and return its :class:`Settings`.
 
-    Of several sensors one is kept, by its number among those of the Mitsuba scene. The integrator
-    is taken out: each half gets its own.
+    One of several sensors is kept, by its number in the Mitsuba scene. The integrator is removed:
+    each half gets its own.
     """
     _open_merged(graph)
     bsdfs.give_default(graph)
@@ -79,7 +79,7 @@ def media(graph: Graph) -> list[int]:
 
 
 def _open_merged(graph):
-    """Put the shapes inside ``merge`` in its place: merging is an optimisation, and hides ids."""
+    """Replace ``merge`` by the shapes inside it: merging is an optimisation, and hides ids."""
     for index in graph.nodes(SHAPE):
         if graph.plugin(index) == "merge":
             for _, child in graph.children(index, SHAPE):
@@ -88,7 +88,7 @@ def _open_merged(graph):
 
 
 def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
-    """Return the width and height that the film of a sensor is given."""
+    """Return the given width and height of a sensor's film."""
     films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
     for _, film in films:
         allowed.check_node(graph, film)
@@ -96,7 +96,7 @@ def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
 
 
 def _size(film):
-    """Return a film's width and height, or what Mitsuba takes where they are not given."""
+    """Return a film's width and height, or Mitsuba's defaults if omitted."""
     width, height = allowed.FILM
     return int(film.get("width", width)), int(film.get("height", height))
 
@@ -107,7 +107,7 @@ def keep_sensor(graph: Graph, number: int) -> int:
     Raises
     ------
     InputError
-        When there is none of this number.
+        If there is no sensor with this number.
     """
     places = []
     for key, value in graph.props(0).items():
@@ -121,8 +121,7 @@ def keep_sensor(graph: Graph, number: int) -> int:
         raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
     if not 0 <= number < len(places):
         raise InputError(
-            f"{graph.name}: there is no sensor {number}. Its sensors have the numbers 0 to"
-            f" {len(places) - 1}."
+            f"{graph.name}: there is no sensor {number}: choose one from 0 to {len(places) - 1}."
         )
     for place, (parent, key, _) in enumerate(places):
         if place != number:
@@ -131,7 +130,7 @@ def keep_sensor(graph: Graph, number: int) -> int:
 
 
 def _prepare_film(graph, sensor, resolution, overridden):
-    """Set the film to linear RGB floats, and to the resolution that was asked for."""
+    """Set the film to linear RGB floats, and to the requested resolution."""
     films = graph.children(sensor, FILM)
     if not films:
         films = [("film", graph.add(FILM, properties("hdrfilm")))]
@@ -177,7 +176,7 @@ def _resize(props, resolution):
 
 
 def _note_sampler(graph, sensor, overridden):
-    """Record the scene's own samples, which those of the plan replace."""
+    """Record the scene's own samples, which the plan's replace."""
     for _, index in graph.children(sensor, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
         given = f"{graph.plugin(index)}, {count} samples per pixel"
@@ -185,7 +184,7 @@ def _note_sampler(graph, sensor, overridden):
 
 
 def _take_integrator(graph, overridden):
-    """Read the scene's integrator, inside of those that only add channels, and take it out."""
+    """Read the scene's integrator, inside those that only add channels, and remove it."""
     settings = Settings(overridden=overridden)
     for key, index in graph.children(0, INTEGRATOR):
         graph.detach(0, key)
@@ -200,9 +199,9 @@ def _take_integrator(graph, overridden):
 
 
 def _require_made(graph, index):
-    """Refuse an integrator that Mitsuba does not know, or knows and would not make as it is.
+    """Reject an integrator that Mitsuba does not know or cannot make.
 
-    What another one takes the place of may need a variant that this is not.
+    A replaced integrator may need another variant than this.
     """
     try:
         graph.instantiate(index)
@@ -216,7 +215,7 @@ def _settings(graph, index, overridden):
     hidden = props.get("hide_emitters", None)
     if plugin == "heuristic":
         ambient = props.get("ambient", None)
-        # The chapters' background is black, though their ambient light fills the room.
+        # The chapters' background is black, although their ambient light fills the room.
         return Settings(
             integrator=plugin,
             ambient=ambient,
@@ -226,7 +225,7 @@ def _settings(graph, index, overridden):
         )
     _require_made(graph, index)
     if plugin not in (*PATHS, "direct"):
-        used = "path: all light, which is what the comparison is with"
+        used = "path: all light, as the comparison requires"
         overridden.append(Overridden("integrator", plugin, used))
     return Settings(
         integrator=plugin,

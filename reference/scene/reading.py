@@ -1,8 +1,7 @@
-"""The files of a scene, looked at before Mitsuba opens them.
+"""The files of a scene, checked before Mitsuba opens them.
 
-Mitsuba's parser recurses and can be made to crash, a pipe blocks whoever opens it, and includes can
-fan out for ever. No more is checked than what would end the process or never end; all else is
-Mitsuba's to refuse.
+Mitsuba's parser recurses and can crash, a pipe blocks whoever opens it, and includes can fan out
+forever. Only faults that would end or hang the process are checked; Mitsuba rejects the others.
 """
 
 import re
@@ -15,13 +14,13 @@ from heuristic.errors import InputError
 from reference.scene.graph import FILENAME, Graph
 
 DEEPEST = 100
-"""Elements within elements. Scenes need about ten; the parser's stack is full at some thousands."""
+"""Nested elements. Scenes need about ten; some thousands fill the parser's stack."""
 
 MOST_INCLUDES = 1000
 """Files that a scene includes, each as often as it is included."""
 
 LONGEST = 2**26
-"""Bytes of a scene's text, its includes counted in. Meshes and images are files of their own."""
+"""Bytes of a scene's text, with its includes. Meshes and images are separate files."""
 
 TAG = re.compile(r"""<(/?)[A-Za-z_](?:"[^"]*"|'[^']*'|[^"'<>])*?(/?)>""")
 INCLUDE = re.compile(r"""<include\b[^<>]*?\bfilename\s*=\s*["']([^"']*)["']""")
@@ -36,13 +35,13 @@ COMMENT = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
 def included(path: Path, parameters: Mapping[str, str] | None = None) -> list[Path]:
     """Return a scene file and those that it includes, after ensuring that all can be read.
 
-    ``parameters`` are values for placeholders, which may be in names of files.
+    ``parameters`` are values for placeholders, which names of files may contain.
 
     Raises
     ------
     InputError
-        When one is not a file or cannot be read, has a NUL, includes itself, or is too deep, or
-        there are more of them than :data:`MOST_INCLUDES` or :data:`LONGEST` allow.
+        If one is not a file or cannot be read, has a NUL, includes itself, or is too deep, or there
+        are more of them than :data:`MOST_INCLUDES` or :data:`LONGEST` allow.
     """
     reading = _Reading(dict(parameters or {}))
     reading.read(path, ())
@@ -59,7 +58,7 @@ def placeholders(path: Path) -> set[str]:
 
 
 def require_files(graph: Graph) -> None:
-    """Refuse elements that name a folder, pipe, socket or device where a file belongs.
+    """Reject elements that name a folder, pipe, socket or device instead of a file.
 
     Raises
     ------
@@ -75,7 +74,7 @@ def require_files(graph: Graph) -> None:
 
 
 def require_named_files(description: Mapping[str, Any]) -> None:
-    """Refuse the same in a dictionary, whose spectra are read while it is parsed.
+    """Reject the same in a dictionary, whose spectra are read during parsing.
 
     Raises
     ------
@@ -93,7 +92,7 @@ def require_named_files(description: Mapping[str, Any]) -> None:
 
 @dataclass
 class _Reading:
-    """The reading of one scene file and its includes: what is known and counted so far."""
+    """The state of reading one scene file and its includes."""
 
     parameters: dict[str, str]
     found: list[Path] = field(default_factory=list)
@@ -101,15 +100,14 @@ class _Reading:
     size: int = 0
 
     def read(self, path: Path, outer: tuple[Path, ...]) -> None:
-        """Check a file, which lies within ``outer`` ones, and all that it includes."""
+        """Check a file, included by the ``outer`` ones, and everything that it includes."""
         if path.resolve() in outer:
-            raise InputError(f"{path}: it includes itself. Take the <include> out that leads back.")
+            raise InputError(f"{path}: it includes itself. Remove the <include> that leads back.")
         if len(outer) >= DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} files include each other.")
         if len(self.found) > MOST_INCLUDES:
             raise InputError(
-                f"{path}: the scene includes more than {MOST_INCLUDES} files, each counted as often"
-                " as it is included. Join them."
+                f"{path}: the scene includes files more than {MOST_INCLUDES} times. Join them."
             )
         text = self._text(path)
         self.found.append(path.resolve())
@@ -124,7 +122,7 @@ class _Reading:
             self.read(inner, (*outer, path.resolve()))
 
     def _places(self, path: Path, names: list[str]) -> Iterator[Path]:
-        """Yield where named files are, of those that exist: beside the file, or where one works."""
+        """Yield the paths of named files that exist: next to the file, or in the current folder."""
         for name in names:
             given = self._filled(name)
             if "\0" in given or not given:
@@ -147,28 +145,25 @@ class _Reading:
     def _text(self, path: Path) -> str:
         """Return a file's text without its comments."""
         if not path.is_file():
-            raise InputError(
-                f"{path}: there is no such file, or it is not a regular one. Give a Mitsuba scene"
-                " (.xml)."
-            )
+            raise InputError(f"{path}: there is no such regular file. Give a Mitsuba scene (.xml).")
         try:
             self.size += path.stat().st_size
             if self.size > LONGEST:
                 raise InputError(
-                    f"{path}: with it the scene has {self.size} bytes of text, and {LONGEST} are"
-                    " allowed. Put meshes and images into files of their own."
+                    f"{path}: with it the scene has {self.size} bytes of text; at most {LONGEST}"
+                    " are allowed. Put meshes and images into separate files."
                 )
             content = path.read_bytes()
         except OSError as error:
             raise InputError(f"{path}: {error.strerror}. Ensure that it can be read.") from error
         if b"\0" in content:
-            raise InputError(f"{path}: it holds a NUL byte, which no XML file in UTF-8 has.")
+            raise InputError(f"{path}: it holds a NUL byte. Save it as XML in UTF-8.")
         try:
             return COMMENT.sub(b"", content).decode("utf-8")
         except UnicodeDecodeError as error:
             raise InputError(
-                f"{path}: it is not in UTF-8: there is {error.object[error.start]:#04x} in it. Save"
-                " it in UTF-8."
+                f"{path}: it holds {error.object[error.start]:#04x}, which is not UTF-8. Save it"
+                " in UTF-8."
             ) from error
 
 
@@ -178,7 +173,7 @@ def _require_flat(path: Path, text: str) -> None:
         depth += -1 if end else 0 if empty else 1
         if depth > DEEPEST:
             raise InputError(
-                f"{path}: elements lie more than {DEEPEST} deep in each other. Write it flatter."
+                f"{path}: elements are nested more than {DEEPEST} deep. Write it flatter."
             )
 
 

@@ -1,17 +1,17 @@
 """The sampler plugin ``rotated_multijitter``: stratified, with the right mean at any depth.
 
 A pixel's n samples are stratified in every dimension: sample i falls into stratum π(i), with one
-permutation π per dimension. An estimate is unbiased where each sample alone is uniform in all
+permutation π per dimension. An estimate is unbiased if each single sample is uniform in all
 dimensions together. So π(i) must be uniform, and independent from one dimension to the next.
-Mitsuba's ``multijitter`` hashes π with too few outcomes where n is small. Its dimensions depend on
-each other then, and what multiplies many of them, such as a long path, is biased: by −2.2 % inside
-a sphere of albedo 0.9 with 16 samples per pixel. Here a random number turns the strata ::
+Mitsuba's ``multijitter`` hashes π with too few outcomes if n is small. Its dimensions then depend
+on each other, and a product of many, such as a long path, is biased: by −2.2 % inside a sphere of
+albedo 0.9 with 16 samples per pixel. Here a random number rotates the strata ::
 
     π(i) = (p(i) + r) mod n,    r uniform in 0 … n − 1, by pixel, dimension and seed
 
-which is uniform and independent whatever the permutation p is. Pairs of dimensions are stratified
-in each axis and in cells, as correlated multi-jittered samples are; the place within a cell is
-turned in the same way.
+which is uniform and independent for any permutation p. Pairs of dimensions are stratified in each
+axis and in cells, like correlated multi-jittered samples; the place within a cell is rotated in the
+same way.
 
 =================  ==============  ==============================================================
 Parameter          Type (default)  Meaning
@@ -35,16 +35,16 @@ from reference.scene.graph import Graph, properties
 
 SAMPLER = "rotated_multijitter"
 STOCK_SAMPLER = "independent"
-"""The sampler of Mitsuba's own examples."""
+"""The sampler of Mitsuba's examples."""
 
 _ALONG, _ACROSS = 0x68BC21EB, 0x02E5BE93
-"""Odd numbers that tell apart the permutations of one dimension."""
+"""Odd numbers that distinguish the permutations of one dimension."""
 
 _registered: set[str] = set()
 
 
 def register() -> None:
-    """Make the plugin known to Mitsuba, for the current variant. Calling it again does nothing."""
+    """Register the plugin with Mitsuba for the current variant. Calling it again does nothing."""
     if mi.variant() not in _registered:
         _define()
         _registered.add(mi.variant())
@@ -62,7 +62,7 @@ def with_sampler(graph: Graph, plugin: str) -> Graph:
 
 
 def cells(count: int) -> tuple[int, int]:
-    """Return the two factors of a number of samples that are nearest to its root, small first."""
+    """Return the two factors of a number of samples nearest to its root, the smaller first."""
     small = next(factor for factor in range(isqrt(count), 0, -1) if count % factor == 0)
     return small, count // small
 
@@ -104,7 +104,7 @@ def _define() -> None:
             return mi.Point2f(_under_one(x * (1 / columns)), _under_one(y * (1 / rows)))
 
         def _stratum(self, active):
-            """Return the stratum of each sample in the next dimension, and what it was made of."""
+            """Return the stratum of each sample in the next dimension, and its random numbers."""
             permutation, turn = mi.sample_tea_32(self.pixel, self.dimension)
             self.dimension += 1
             stratum = turned(self.index, self.sample_count(), permutation, turn, active)
@@ -136,7 +136,7 @@ def _define() -> None:
 
 
 def _under_one(number):
-    """Keep a number below 1, which rounding can reach."""
+    """Keep a number below 1, which it could reach by rounding."""
     return dr.minimum(number, dr.one_minus_epsilon(mi.Float))
 
 

@@ -9,14 +9,14 @@ from heuristic.errors import InputError
 from heuristic.user_code import contained
 
 NAME = "scene"
-"""What a Python file calls its dictionary, or the function that returns it."""
+"""Name of a Python file's dictionary, or of the function that returns it."""
 
 
 @dataclass(frozen=True)
 class Script:
     """A function that runs a Python file and returns its scene, a dictionary.
 
-    ``files`` are those that the last run read: the file itself, modules of the user's own, and what
+    ``files`` are those that the last run read: the file itself, the user's modules, and files that
     they opened through Python (:func:`heuristic.opened.noted`).
     """
 
@@ -29,19 +29,19 @@ class Script:
         Raises
         ------
         InputError
-            When it raises anything, or has no scene.
+            If it raises anything, or has no scene.
         """
         try:
             with contained(self.path) as read:
                 scene = runpy.run_path(str(self.path)).get(NAME)
                 made = scene() if callable(scene) else scene
-        except (Exception, SystemExit) as error:  # whatever a user's own code raises
+        except (Exception, SystemExit) as error:  # a user's code may raise anything
             raise InputError(f"{self.path}: {type(error).__name__}: {error}") from error
         self.files.clear()
         self.files.update({self.path.resolve()} | read)
         if not isinstance(made, Mapping):
             raise InputError(
-                f"{self.path}: `{NAME}` is {type(made).__name__}. It has to be a dictionary as"
-                " mitsuba.load_dict takes it, or a function that returns one."
+                f"{self.path}: `{NAME}` is {type(made).__name__}. It must be a dictionary for"
+                " mitsuba.load_dict, or a function that returns one."
             )
         return made

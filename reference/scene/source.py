@@ -1,4 +1,4 @@
-"""Where a scene comes from, read once: the file parsed, the script run, its files named."""
+"""The source of a scene, read once: the file parsed, the script run, its files listed."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,15 +20,15 @@ Edit = Callable[[Graph], None]
 
 @dataclass(frozen=True)
 class Source:
-    """Where a scene comes from: a name, and an XML file or a dictionary.
+    """The source of a scene: a name, and an XML file or a dictionary.
 
     Parameters
     ----------
     name
         Name in reports and of the output folder.
     content
-        Path of a Mitsuba XML file, a dictionary as ``mitsuba.load_dict`` takes it, or a function
-        that returns one.
+        Path of a Mitsuba XML file, a dictionary for ``mitsuba.load_dict``, or a function that
+        returns one.
     parameters
         Values for the ``$name`` placeholders of an XML file.
     edits
@@ -42,7 +42,7 @@ class Source:
     _read: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def edited(self, edit: Edit) -> "Source":
-        """Return the same scene with one more change to its graph; it is not read again."""
+        """Return the same scene with one more edit of its graph; it is not read again."""
         other = replace(self, edits=(*self.edits, edit))
         object.__setattr__(other, "_read", self._read)
         return other
@@ -50,13 +50,13 @@ class Source:
     def parse(self) -> Graph:
         """Return the scene's graph for the current variant, to be edited freely.
 
-        A file is parsed once for each variant; a function is called once.
+        A file is parsed once per variant; a function is called once.
 
         Raises
         ------
         InputError
-            With Mitsuba's own message, which names file, line and column, when the file is missing,
-            is not XML, or uses something that Mitsuba does not know.
+            With Mitsuba's own message, which names file, line and column, if the file is missing,
+            is not XML, or uses something unknown to Mitsuba.
         """
         variant = mi.variant()
         if variant not in self._read:
@@ -69,15 +69,15 @@ class Source:
 
     @property
     def said(self) -> list[str]:
-        """What Mitsuba said when it read the scene."""
+        """Mitsuba's messages while it read the scene."""
         return self._read.setdefault("said", [])
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
 
-        These are the scene's own file, what it includes, every file that an element names, and what
-        a script read as it ran (:class:`reference.scene.script.Script`). The
-        tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
+        These are the scene's own file, its includes, every file that an element names, and files
+        that a script read (:class:`reference.scene.script.Script`). The tables of a ``<spectrum
+        filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
         found = set(getattr(self.content, "files", ()))
@@ -113,19 +113,17 @@ class Source:
                     state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
-        except (RuntimeError, ValueError) as error:  # the latter of bytes that are not UTF-8
+        except (RuntimeError, ValueError) as error:  # the latter for bytes that are not UTF-8
             raise InputError(f"{self.name}: {error}") from error
         if state.root.type != mi.ObjectType.Scene:
-            raise InputError(
-                f"{self.name}: this is not a scene. Its outermost element must be a scene."
-            )
+            raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
 
 
 def _file(resolver: mi.FileResolver, value: str) -> Path | None:
-    """Return the file that a text names, if it names one."""
+    """Return the file that a text names, if any."""
     if not value or len(value) > 4096 or "\0" in value or "\n" in value:
         return None
     path = Path(str(resolver.resolve(value)))

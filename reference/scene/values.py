@@ -1,4 +1,4 @@
-"""Reading and scaling the values of a scene's parameters, as the parser keeps them."""
+"""Reading and scaling the values of a scene's parameters, in the parser's form."""
 
 from collections.abc import Iterable
 from numbers import Real
@@ -20,7 +20,7 @@ def colour(graph: Graph, index: int, key: str, default: Any) -> tuple[float, flo
     Raises
     ------
     InputError
-        When it is a texture or a tabulated spectrum, or negative or not finite.
+        If it is a texture or a tabulated spectrum, negative, or not finite.
     """
     props = graph.props(index)
     value = props.get(key, default)
@@ -33,8 +33,8 @@ def colour(graph: Graph, index: int, key: str, default: Any) -> tuple[float, flo
         components = (float(value.values[0]),) * 3
     else:
         raise InputError(
-            f"{graph.name}: {graph.label(index)}: {key} is a texture or a tabulated spectrum, which"
-            f" {props.plugin_name()} cannot be paired with yet. Give a number or RGB."
+            f"{graph.name}: {graph.label(index)}: {key} is a texture or a tabulated spectrum,"
+            f" which {props.plugin_name()} does not support yet. Give a number or RGB."
         )
     if not all(np.isfinite(components)) or min(components) < 0:
         raise InputError(
@@ -45,12 +45,12 @@ def colour(graph: Graph, index: int, key: str, default: Any) -> tuple[float, flo
 
 
 def check_colours(graph: Graph, index: int, keys: Iterable[str]) -> None:
-    """Refuse plain values that are negative or not finite; textures and spectra pass unread.
+    """Reject plain values that are negative or not finite; textures and spectra are not read.
 
     Raises
     ------
     InputError
-        Naming the parameter, its value and its place.
+        With the parameter, its value and its place.
     """
     props = graph.props(index)
     for key in keys:
@@ -64,7 +64,7 @@ def number(graph: Graph, index: int, key: str, default: Any) -> float:
     Raises
     ------
     InputError
-        When it is not one; with Mitsuba's own message, where Mitsuba refuses it too.
+        If it is not one; with Mitsuba's own message, if Mitsuba rejects it too.
     """
     props = graph.props(index)
     value = props.get(key, default)
@@ -79,12 +79,12 @@ def number(graph: Graph, index: int, key: str, default: Any) -> float:
 
 
 def index_of_refraction(graph: Graph, index: int, key: str, default: Any) -> float:
-    """Return an index of refraction, given as a number or as the name of a material."""
+    """Return an index of refraction, given as a number or a material's name."""
     return float(mi.lookup_ior(graph.props(index), key, default))
 
 
 def may_be_nonzero(value: Any) -> bool:
-    """Tell whether a parameter can be other than zero; textures and spectra can."""
+    """Return whether a parameter can be non-zero; textures and spectra can."""
     if isinstance(value, Real):
         return value != 0
     if isinstance(value, COLOURS):
@@ -93,7 +93,7 @@ def may_be_nonzero(value: Any) -> bool:
 
 
 def scaled(components: Colour, factor: Colour) -> tuple[float, ...]:
-    """Return a colour times a factor, itself a number or one value for each channel."""
+    """Return a colour times a factor, which is a number or one value per channel."""
     return tuple(float(value) for value in np.multiply(components, factor))
 
 

@@ -1,7 +1,7 @@
-"""Lights: one declaration a kind, paired both ways (table in :mod:`reference.pairing.factors`).
+"""Lights: one declaration per kind, paired both ways (table in :mod:`reference.pairing.factors`).
 
 The kinds are the :class:`LightKind` at the top of this package's modules; nothing else lists them.
-What the table has no row for gets the nearest light that there is:
+Lights without a row in the table get the nearest light:
 
 ==================================  ===============================================================
 Physical                            Nearest
@@ -15,15 +15,14 @@ any other                           none: it is left out
 ==================================  ===============================================================
 
 **Level.** A light without an exact pair differs from its form in the other half by shape. Its level
-follows one rule, so that shape alone is what differs:
+follows one rule, so only the shape differs:
 
-*Equal flux, where the light says what it sends; equal mean irradiance over the surface that the
-camera sees, where it does not.*
+*Equal flux if the light's parameters determine it; otherwise equal mean irradiance over the surface
+that the camera sees.*
 
-A light says what it sends where its own parameters tell its flux: what falls off as the inverse
-square sends the same flux through any sphere about it. Its pair then depends neither on the scene
-nor on the view. A light of another ``f_att`` has no flux: what it sends depends on how far one
-goes, and only the scene says how far that is.
+A light that falls off as the inverse square sends the same flux through any sphere about it. Its
+pair then depends neither on the scene nor on the view. A light with another ``f_att`` has no single
+flux: it depends on the distance, which only the scene determines.
 
 ===============================  ==================================================================
 Equal flux                       ``spot`` both ways, textured ``spot``, ``projector``; ``area``, in
@@ -61,18 +60,18 @@ _by_plugin |= {kind.model.plugin: kind for kind in KINDS if kind.model is not No
 def of(plugin: str) -> LightKind:
     """Return the kind of an emitter, of either half, by the name of its plugin.
 
-    An unknown one is taken for an environment, which is what premises may least rely on.
+    An unknown one counts as an environment, about which premises may assume the least.
     """
     return _by_plugin.get(plugin, environments.ENVIRONMENT)
 
 
 def is_heuristic(plugin: str) -> bool:
-    """Tell whether an emitter is one of the heuristic's own lights."""
+    """Return whether an emitter is one of the heuristic's own lights."""
     return plugin in PLUGINS
 
 
 def check(graph: Graph) -> None:
-    """Refuse intensities that are negative or not finite.
+    """Reject intensities that are negative or not finite.
 
     Raises
     ------
@@ -117,8 +116,8 @@ def to_heuristic(
 def to_physical(graph: Graph, surface: Callable[[], Any]) -> list[PairedEmitter]:
     """Replace heuristic lights by physical ones.
 
-    ``surface()`` returns the `GBuffer` that the mean irradiance is taken over where the attenuation
-    is not the inverse square.
+    ``surface()`` returns the `GBuffer` for the mean irradiance, which is used if the attenuation is
+    not the inverse square.
     """
     own = [index for index in graph.nodes(EMITTER) if is_heuristic(graph.plugin(index))]
     ways = [(index, of(graph.plugin(index)).to_physical) for index in own]
@@ -126,7 +125,7 @@ def to_physical(graph: Graph, surface: Callable[[], Any]) -> list[PairedEmitter]
 
 
 def _lights(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
-    """Return shape, key and node of the physical lights, those of shapes last."""
+    """Return shape, key and node of the physical lights; those of shapes come last."""
     on_shapes = [
         (shape, key, index)
         for shape in graph.nodes(SHAPE)

@@ -1,4 +1,4 @@
-"""Shapes that shine: ``area``. In the far field a point or an even spot, near by a glow ``k_i``."""
+"""Shapes that shine: ``area``. In the far field a point or an even spot; nearby a glow ``k_i``."""
 
 from typing import Any
 
@@ -14,10 +14,10 @@ from reference.scene.graph import Graph, Reference, properties
 EMITTER, SHAPE, BSDF = (getattr(mi.ObjectType, kind) for kind in ("Emitter", "Shape", "BSDF"))
 
 FLATNESS = 0.5
-"""A light whose mean normal is longer shines to one side; a closed one has a mean normal of 0."""
+"""A light with a longer mean normal shines to one side; a closed one has a mean normal of 0."""
 
 FLAT = 1 - 1e-4
-"""And one whose mean normal is longer than this is flat."""
+"""A light with a mean normal longer than this is flat."""
 
 
 def _to_heuristic(light: Given) -> PairedEmitter:
@@ -58,7 +58,7 @@ def _far_light(
 
 
 def _varies(graph: Graph, value: Any) -> bool:
-    """Tell whether a value is a texture that differs from point to point."""
+    """Return whether a value is a texture that differs from point to point."""
     if not isinstance(value, Reference):
         return False
     return graph.instantiate(value.index()).is_spatially_varying()
@@ -86,7 +86,7 @@ def _glow(graph: Graph, shape: int, radiance: Any) -> None:
 def add_glowing_shapes(graph: Graph) -> list[PairedEmitter]:
     """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
 
-    To be called while the shapes still have their ``phong``.
+    Call it while the shapes still have their ``phong``.
     """
     records = []
     for shape in graph.nodes(SHAPE):

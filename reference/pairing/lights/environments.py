@@ -1,8 +1,8 @@
 """Light from all around: ``constant``, ``envmap``, daylight, and the model's ambient light ``I_a``.
 
-Any other plugin whose light surrounds the scene is taken for an ``envmap``. What is neither an
-environment nor of another kind is left out: it has no nearest form. Of ``sunsky`` and
-``timed_sunsky`` the sky is ``I_a``, and the sun a directional light.
+Any other plugin whose light surrounds the scene counts as an ``envmap``. A light that is neither an
+environment nor of another kind is left out: it has no nearest form. The sky of ``sunsky`` and
+``timed_sunsky`` is ``I_a``, and the sun a directional light.
 """
 
 from typing import Any
@@ -46,11 +46,11 @@ CONSTANT = LightKind(
 def add_environment(
     physical: Graph, graph: Graph, ambient: Any, convention: Convention
 ) -> PairedEmitter:
-    """Add the constant environment that stands for ``I_a`` to the physical half of a graph.
+    """Add the constant environment that corresponds to ``I_a`` to the physical half of a graph.
 
-    A physical surface has one diffuse reflectance, where the model has ``k_a`` beside ``k_d``. The
-    ``matched`` radiance is ``I_a k_a / k_d``, by least squares where materials differ; the
-    ``literal`` one is ``I_a``.
+    A physical surface has one diffuse reflectance, whereas the model has ``k_a`` and ``k_d``. The
+    ``matched`` radiance is ``I_a k_a / k_d``, by least squares if materials differ; the ``literal``
+    one is ``I_a``.
     """
     ratio: tuple[float, ...] = (1.0,) * 3
     exact = True
@@ -68,7 +68,7 @@ def add_environment(
 
 
 def _ambient_ratio(graph: Graph) -> tuple[tuple[float, ...], bool]:
-    """Return ``k_a / k_d`` for each channel by least squares, and whether it fits all materials."""
+    """Return ``k_a / k_d`` per channel by least squares, and whether it fits all materials."""
     pairs, has_lobe = [], False
     for index in graph.nodes(mi.ObjectType.BSDF):
         if graph.plugin(index) == "phong":

@@ -1,4 +1,4 @@
-"""What a kind of light declares, and what its rules read.
+"""The declaration of a kind of light, and the light that its rules read.
 
 A kind is one :class:`LightKind` at the top of a module of :mod:`reference.pairing.lights`.
 """
@@ -22,7 +22,7 @@ FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), st
 
 @dataclass(frozen=True)
 class PairedEmitter:
-    """What a light was replaced by, the factor between the intensities, and what has no form."""
+    """The replacement of a light, the factor between the intensities, and what has no form."""
 
     name: str
     given: str
@@ -35,17 +35,17 @@ class PairedEmitter:
 
 @dataclass(frozen=True)
 class Given:
-    """A light of a graph that is becoming one of the halves, as rules read and replace it.
+    """A light of a graph that becomes one of the halves; rules read and replace it.
 
     Attributes
     ----------
     graph, index
         The graph and the light's node.
     shape
-        Node of the shape that shines, None for lights that belong to no shape.
+        Node of the shape that shines, None for lights without a shape.
     geometry, surface : callable
         Return the Mitsuba scene without materials, for the size and place of shapes, and the
-        `GBuffer` that mean irradiances are taken over.
+        `GBuffer` for mean irradiances.
     hide_emitters
         Whether camera rays look through lights.
     """
@@ -69,7 +69,7 @@ class Given:
 
     @cached_property
     def emitter(self) -> mi.Emitter:
-        """The light as Mitsuba makes it."""
+        """The light as a Mitsuba object."""
         return self.graph.instantiate(self.index)
 
     def value(self, key: str, default: Any) -> Any:
@@ -86,13 +86,13 @@ class Given:
         return [float(component) for component in np.array(matrix)[:3, number]]
 
     def vector(self, key: str, default: tuple, column: int) -> np.ndarray:
-        """Return a position or direction (3,), given as itself or as a column of ``to_world``."""
+        """Return a position or direction (3,), given directly or as a column of ``to_world``."""
         is_moved = "to_world" in self.graph.props(self.index)
         given = self.column(column) if is_moved else self.value(key, default)
         return np.ravel(given).astype(float)
 
     def position(self) -> np.ndarray:
-        """Return the place of a light that shines from a point, (3,) in world space."""
+        """Return the position of a light that shines from a point, (3,) in world space."""
         return self.vector("position", (0, 0, 0), 3)
 
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
@@ -103,17 +103,17 @@ class Given:
     def replace(
         self, props: mi.Properties, factor: float, exact: bool = True, note: str = ""
     ) -> PairedEmitter:
-        """Put a light of another plugin in its place, and return the record of it."""
+        """Replace it by a light of another plugin, and return the record."""
         given = self.plugin
         self.graph.replace(self.index, props)
         return PairedEmitter(self.label, given, props.plugin_name(), factor, exact, note)
 
     def becomes_ambient(self, note: str = "", lost: str = "") -> PairedEmitter:
-        """Return the record of an environment that is ``I_a``; its node stays as a background."""
+        """Return the record of an environment that becomes ``I_a``; the node stays."""
         return PairedEmitter(self.label, self.plugin, "ambient", 1.0, not lost, note, lost)
 
     def leave_out(self) -> PairedEmitter:
-        """Take the light out of the scene, and return the record of it."""
+        """Remove the light from the scene, and return the record."""
         self.graph.remove(self.index)
         note, lost = "left out: it has no nearest form", "this kind of light"
         return PairedEmitter(self.label, self.plugin, "none", 0.0, False, note, lost)
@@ -128,21 +128,22 @@ class LightKind:
     plugins
         Mitsuba's emitters of this kind.
     to_heuristic, to_physical
-        Put the nearest form in the light's place, and return the record. The second is None where
-        the heuristic has no light of its own for it.
+        Replace the light by the nearest form, and return the record. The second is None if the
+        heuristic has no light of this kind.
     model
         Its class in :mod:`heuristic.lights`, or None.
     ambient
         Returns the radiance that becomes ``I_a``, as the parser keeps it, or None.
     colour
-        The parameter that holds the intensity, where the kind is paired by its parameters.
+        The parameter that holds the intensity, if the kind is paired by its parameters.
     place
         Returns ``position`` or ``toward``, the direction to the light, (3,) each; nothing for
-        lights that have neither.
+        lights with neither.
     exact, surrounds, uniform, on_shapes
-        Whether it needs no random numbers, comes from everywhere, evenly so, belongs to a shape.
+        Whether it needs no random numbers, shines from everywhere, shines evenly from everywhere,
+        belongs to a shape.
     edits
-        What a study can edit in place: for each plugin and property, its name below
+        Properties that a study can edit in place: for each plugin and property, its name in
         ``mitsuba.traverse``.
     """
 
@@ -160,12 +161,12 @@ class LightKind:
     edits: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
-        """Tell whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
+        """Return whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
         return self.model is not None and _has(self.model, name)
 
 
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
-    """Return the properties of a heuristic light, which falls off as Mitsuba's do."""
+    """Return the properties of a heuristic light with the fall-off of Mitsuba's."""
     falloff = FALLOFF_OF_MITSUBA if _has(PLUGINS[plugin], "attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
 

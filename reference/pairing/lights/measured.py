@@ -1,6 +1,6 @@
 """Lights measured by their own sampling: means over directions and surfaces, for pairing.
 
-Every mean is over a rank-1 lattice of samples, and comes as a value that a graph can hold.
+Every mean is over a rank-1 lattice of samples, and is a value that a graph can hold.
 """
 
 from collections.abc import Sequence
@@ -43,8 +43,7 @@ def mean_radiance(graph: Graph, emitter: mi.Emitter) -> Any:
 def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | None:
     """Return ``int L dw`` of a distant light as intensity ``I_p``, and its mean direction.
 
-    The direction, in which the light travels, is the mean of the directions that it comes
-    from, weighted by radiance. None where no light arrives.
+    The direction is the mean direction of travel, weighted by radiance. None if no light arrives.
     """
     means, toward = _arriving(emitter)
     if not means.any():
@@ -55,7 +54,7 @@ def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | N
 def beam(
     graph: Graph, emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float]
 ) -> Beam | None:
-    """Return the :class:`Beam` of a light at a position; None where it sends nothing.
+    """Return the :class:`Beam` of a light at a position; None if it sends nothing.
 
     Directions are spread evenly over a cone about the axis, first the hemisphere, then the
     narrowest cone that holds all light found there.
@@ -87,7 +86,7 @@ def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
 
 
 def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``int L dw`` a channel, and the unit mean direction towards the light."""
+    """Return ``int L dw`` per channel, and the unit mean direction towards the light."""
     it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
     x, y = _lattice()
     means, toward = [], np.zeros(3)
@@ -137,5 +136,5 @@ def _at(it, wavelengths):
 
 
 def _channel_means(spectrum):
-    """Return the mean of each channel; sky models dip a little below 0, which no light can."""
+    """Return the mean of each channel, at least 0: sky models dip slightly below."""
     return np.array([max(np.mean(np.array(channel, float)), 0.0) for channel in spectrum])

@@ -1,6 +1,6 @@
 """Points and parallel light: ``point`` and ``directional``, in both models.
 
-Parallel light is an exact pair; a point is one where it falls off as Mitsuba's do.
+Parallel light is an exact pair; so is a point with the fall-off of Mitsuba's.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def _to_physical(light: Given) -> PairedEmitter:
 
 @dataclass(frozen=True)
 class Level:
-    """The factor from ``I_p0`` to Mitsuba's intensity, whether both send one flux, and a note."""
+    """The factor from ``I_p0`` to Mitsuba's intensity, whether fluxes are equal, and a note."""
 
     factor: float
     keeps_flux: bool
@@ -54,12 +54,12 @@ def level(
     Parameters
     ----------
     light
-        The light, whose ``f_att`` decides: of equal flux where it is the inverse square, of equal
-        mean irradiance over the visible surface where it is another.
+        The light, whose ``f_att`` decides: equal flux for the inverse square, otherwise equal mean
+        irradiance over the visible surface.
     cone, derived_cone
         Factors of the light and of Mitsuba's in directions of travel (N, 3).
     flux_ratio
-        The light's flux over that of Mitsuba's, both of one intensity on the axis.
+        The light's flux over Mitsuba's, for the same intensity on the axis.
     """
     defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
     k0, k1, k2 = (light.number(key, default) for key, default in defaults)

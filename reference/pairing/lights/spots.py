@@ -1,13 +1,13 @@
 """Spots: ``spot`` and ``heuristic_spot``, whose fall-offs are fitted to each other; ``projector``.
 
 Mitsuba's ``spot`` is even up to its beam width and falls linearly in the angle to 0 at its cutoff;
-the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can be the other. The fit minimises
-``int (s f(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle, ``g`` being
-the fall-off that is given and ``f`` the other's. The level ``s`` is not fitted: it is the one of
-equal flux, ``s int f sin = int g sin``, after the rule of :mod:`reference.pairing.lights`. On the
-axis the two then differ.
+the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The fit
+minimises ``int (s f(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid angle,
+where ``g`` is the given fall-off and ``f`` the other one. The level ``s`` is not fitted: it gives
+equal flux, ``s int f sin = int g sin``, by the rule of :mod:`reference.pairing.lights`. On the axis
+the two then differ.
 
-The nearest form of a picture thrown by a point is the even cone of the same flux.
+The nearest form of a picture projected from a point is the even cone of the same flux.
 """
 
 from collections.abc import Callable
@@ -68,8 +68,8 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
 def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
     """Return the cutoff and beam width of the linear fall-off that is nearest to ``cos^m``.
 
-    At equal flux, and in degrees. A sharp beam ends long before its cone does, so that the cutoff
-    is fitted too, up to the cone's.
+    At equal flux, and in degrees. A sharp beam ends long before its cone, so the cutoff is fitted
+    too, up to the cone's.
     """
     theta, weight = _cone(cutoff)
     wanted, flux = power_falloff(theta, exponent), power_flux(cutoff, exponent)
@@ -79,7 +79,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
         return np.sum(weight * (fitted - wanted) ** 2)
 
     def best_beam(edge):
-        # Mitsuba refuses a beam as wide as the cone; just below it the cone is even.
+        # Mitsuba rejects a beam as wide as the cone; just below it the cone is even.
         return _least(lambda beam_width: distance(edge, beam_width), 0.0, edge * (1 - 1e-4))
 
     edge = _least(lambda edge: distance(edge, best_beam(edge)), 1e-3 * cutoff, cutoff)
@@ -87,7 +87,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function of one minimum is least, the ends of the interval included."""
+    """Return the minimum of a function that has only one, including the ends of the interval."""
     found = minimize_scalar(function, bounds=(low, high), method="bounded").x
     return float(min((low, high, found), key=function))
 
@@ -98,14 +98,14 @@ def linear_falloff(theta: np.ndarray, cutoff: float, beam_width: float) -> np.nd
 
 
 def linear_flux(cutoff: float, beam_width: float) -> float:
-    """Return ``int g(t) sin(t) dt`` of that: ``1 - (sin c - sin b) / (c - b)``; in degrees."""
+    """Return its ``int g(t) sin(t) dt``: ``1 - (sin c - sin b) / (c - b)``; in degrees."""
     c, b = np.radians((cutoff, min(beam_width, cutoff * (1 - 1e-9))))
     # The quotient of the sines as a product: for narrow beams it is nearly 1.
     return float(1 - np.cos((c + b) / 2) * np.sinc((c - b) / (2 * np.pi)))
 
 
 def power_falloff(theta: np.ndarray, exponent: float) -> np.ndarray:
-    """Return ``cos^m(theta)``, 0 beyond a right angle but for ``m = 0``; ``theta`` in degrees."""
+    """Return ``cos^m(theta)``, 0 beyond a right angle unless ``m = 0``; ``theta`` in degrees."""
     if exponent == 0:
         return np.ones_like(theta)
     return np.maximum(np.cos(np.radians(theta)), 0) ** exponent * (theta < 90)

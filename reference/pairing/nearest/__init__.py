@@ -1,4 +1,4 @@
-"""The phong material that is nearest to each of Mitsuba's BSDFs: one rule a plugin.
+"""The phong material that is nearest to each of Mitsuba's BSDFs: one rule per plugin.
 
 A rule is one function, declared by :func:`reference.pairing.nearest.material.rule`.
 
@@ -11,7 +11,7 @@ BSDF                                                Rule
 ``thindielectric``
 ``twosided``, ``mask``, ``blendbsdf``, ``bumpmap``, :mod:`reference.pairing.nearest.wrapped`
 ``normalmap``
-any other, a user's own included                    :func:`reference.pairing.nearest.probe.nearest`
+any other, including a user's                    :func:`reference.pairing.nearest.probe.nearest`
 ==================================================  ================================================
 """
 
@@ -39,7 +39,7 @@ def nearest_of(
 ) -> Nearest:
     """Return the :class:`Nearest` material of a BSDF node.
 
-    ``found``, where given, is completed with it and with those of nested nodes, by index.
+    ``found``, if given, receives it and those of nested nodes, by index.
     """
     found = {} if found is None else found
 

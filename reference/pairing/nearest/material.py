@@ -1,4 +1,4 @@
-"""What a rule of :mod:`reference.pairing.nearest` returns, and what it may use."""
+"""The result of a rule of :mod:`reference.pairing.nearest`, and the tools that it may use."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,15 +17,14 @@ BSDF = mi.ObjectType.BSDF
 
 @dataclass(frozen=True)
 class Nearest:
-    """The phong material that stands for a BSDF; values as of `nearest.operations`.
+    """The phong material that replaces a BSDF; values as in `nearest.operations`.
 
     Attributes
     ----------
     k_i, k_a, k_d, k_s, n, form, normalised, twosided, transmittance, tilt
         Parameters of the plugin ``phong``.
     lost
-        What the heuristic model has no form for, and the rule by which the rest was found; two
-        words a rule.
+        Pairs of something that the heuristic model has no form for, and the rule for the rest.
     misses
         Quantities that were not reached, :class:`reference.pairing.factors.Miss`.
     """
@@ -44,7 +43,7 @@ class Nearest:
     misses: tuple = ()
 
     def properties(self) -> mi.Properties:
-        """Return the properties of the node ``phong``; what has its default is left out."""
+        """Return the properties of the node ``phong``, without defaults."""
         props = properties("phong")
         for name in (*COEFFICIENTS, "n", "transmittance"):
             value = getattr(self, name)
@@ -92,11 +91,11 @@ class Context:
 
 @dataclass(frozen=True)
 class Rule:
-    """How the nearest material of a BSDF is found, and what planning knows of the BSDF.
+    """How to find the nearest material of a BSDF, and what planning knows about the BSDF.
 
-    ``reflectances`` are the parameters, with their defaults, without which it reflects nothing; it
-    has them if it only reflects, on the side that the normal points to, and None otherwise.
-    ``wraps`` tells that it is made of other BSDFs.
+    ``reflectances`` are parameters with defaults; it reflects nothing if all are 0. They are None
+    unless it only reflects, on the side of the normal. ``wraps`` is whether it is made of other
+    BSDFs.
     """
 
     nearest: Callable[[Context, int], Nearest]
@@ -121,7 +120,7 @@ def rule(
 
 
 def alike(graph: Graph, first: Nearest, second: Nearest) -> tuple[Nearest, Nearest]:
-    """Return two materials with their lobes scaled in one way, so that ``k_s`` can be mixed."""
+    """Return two materials with their lobes scaled in the same way, so ``k_s`` can be mixed."""
     if first.normalised == second.normalised:
         return first, second
     return _normalised(graph, first), _normalised(graph, second)

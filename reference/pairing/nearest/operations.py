@@ -1,7 +1,7 @@
 """Arithmetic on the values of a scene's parameters: numbers and colours at once, textures later.
 
-A value is a number, three components, or what the parser keeps of a texture or tabulated spectrum.
-Where all operands are plain the result is plain too; otherwise it is a reference to a new node of
+A value is a number, three components, or the parser's form of a texture or tabulated spectrum. If
+all operands are plain the result is plain; otherwise it is a reference to a new node of
 :mod:`heuristic.plugins.mapped`, which computes the same at each point.
 """
 
@@ -19,7 +19,7 @@ TEXTURE = mi.ObjectType.Texture
 
 
 def plain(value: Any) -> float | tuple[float, ...] | None:
-    """Return a value as a float or three floats, None where it is a texture or spectrum."""
+    """Return a value as a float or three floats, None if it is a texture or spectrum."""
     if isinstance(value, Real):
         return float(value)
     if isinstance(value, (tuple, *COLOURS)):
@@ -30,7 +30,7 @@ def plain(value: Any) -> float | tuple[float, ...] | None:
 
 
 def is_zero(value: Any) -> bool:
-    """Tell whether a value is plain and 0."""
+    """Return whether a value is plain and 0."""
     known = plain(value)
     return known is not None and not np.any(known)
 
@@ -83,7 +83,7 @@ def blend(graph: Graph, a: Any, b: Any, weight: Any) -> Any:
 
 
 def sides(graph: Graph, front: Any, back: Any) -> Any:
-    """Return ``front`` where the front of a surface is seen, else ``back``."""
+    """Return ``front`` on the front of a surface, else ``back``."""
     if _same(front, back):
         return front
     return node(graph, "heuristic_sides", front=front, back=back)

@@ -1,15 +1,14 @@
-"""The rule for any BSDF: what it reflects, measured by its own sampling, as k_d, k_s and n.
+"""The rule for any BSDF: k_d, k_s and n measured by its own sampling.
 
-It serves plugins that no other rule knows, a user's own included, and parts of other rules.
+It serves plugins that no other rule knows, including users', and parts of other rules.
 
 At normal incidence, by a rank-1 lattice of samples that also covers the texture plane:
 
-* albedos of what is reflected and of what passes through, as ``sample`` weighs it (light as
-  particles, so that a refraction's change of solid angle does not count);
-* the diffuse part ``k_d = pi f``, with the BRDF ``f`` 60 degrees off the normal, beside the lobe;
-* the lobe's width from the median slope of what is left, over half vectors: for Beckmann's lobe
-  ``tan^2`` is distributed exponentially, with the median ``alpha^2 ln 2``. A mean would rest on the
-  tail, which is where the diffuse part is not quite even.
+* albedos of reflection and transmission, as weighted by ``sample`` (light as particles, so a
+refraction's change of solid angle does not count); * the diffuse part ``k_d = pi f``, with the BRDF
+``f`` 60 degrees off the normal, outside the lobe; * the lobe's width from the median slope of the
+rest, over half vectors: for Beckmann's lobe ``tan^2`` is distributed exponentially, with the median
+``alpha^2 ln 2``. A mean would depend on the tail, where the diffuse part is not quite even.
 
 Textures are averaged.
 """
@@ -38,12 +37,12 @@ LATTICE = (1, 3547, 1663, 5413, 2689)
 OFF_LOBE = radians(60.0)
 
 WAVELENGTHS = np.linspace(360.0, 830.0, 48)
-"""Where a spectral variant is probed, nanometres; as Mitsuba's own range."""
+"""Wavelengths at which a spectral variant is probed, nm; Mitsuba's own range."""
 
 
 @dataclass(frozen=True)
 class Probed:
-    """Albedos at normal incidence, one value a channel or wavelength, and the lobe's width."""
+    """Albedos at normal incidence, one value per channel or wavelength, and the lobe's width."""
 
     reflected: np.ndarray
     diffuse: np.ndarray
@@ -53,12 +52,12 @@ class Probed:
 
     @property
     def specular(self) -> np.ndarray:
-        """Albedo of the lobe: what is reflected beside the diffuse part."""
+        """Albedo of the lobe: all reflection except the diffuse part."""
         return np.maximum(self.reflected - self.diffuse, 0)
 
 
 def probe(bsdf: mi.BSDF) -> Probed | None:
-    """Return what is :class:`Probed` of a BSDF; None where it cannot be sampled."""
+    """Return a BSDF as :class:`Probed`; None if it cannot be sampled."""
     wavelengths = WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
     try:
         parts = [_at(bsdf, chosen) for chosen in wavelengths]
@@ -75,7 +74,7 @@ def probe(bsdf: mi.BSDF) -> Probed | None:
 def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> Any:
     """Return albedos as a value of a graph: a number, a colour, or a tabulated spectrum.
 
-    What is ``emitted`` is always tabulated in spectral variants, where a number means daylight.
+    ``emitted`` values are always tabulated in spectral variants, where a number means daylight.
     """
     albedo = np.asarray(albedo, float)
     tabulated = emitted and mi.is_spectral
@@ -135,7 +134,7 @@ def _at(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     sin_phi, cos_phi = dr.sincos(around)
     beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
     level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
-    dr.eval(bs, weight, up, straight, level)  # one kernel for all that is read below
+    dr.eval(bs, weight, up, straight, level)  # one kernel for all values read below
     reflected, passed, scattered, diffuse = (
         _means(value)
         for value in (
@@ -155,12 +154,12 @@ def _means(value: mi.Spectrum) -> np.ndarray:
 
 
 def _width(bs, weight, up, diffuse):
-    """Return the root mean square slope of the lobe beside the diffuse part, by its median."""
+    """Return the root mean square slope of the lobe without the diffuse part, by its median."""
     weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
     cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
     density = np.array(bs.pdf, float)
     delta = np.array(mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta))
-    # Of each sample's weight, f cos / pdf, the diffuse part is k_d cos / (pi pdf).
+    # The diffuse part of each sample's weight, f cos / pdf, is k_d cos / (pi pdf).
     share = np.where(delta, 0, np.mean(diffuse) * cosine / (np.pi * np.maximum(density, 1e-30)))
     weights = np.maximum(weights - share, 0)
     slope = np.where(delta, 0, (1 - cosine) / (1 + cosine))  # tan^2 of half the angle
@@ -171,8 +170,8 @@ def _width(bs, weight, up, diffuse):
 
 
 SMOOTH_ALPHA = 0.05
-"""In place of a smaller roughness: a mirror's lobe has no width, and the model's light no extent.
-Its albedo is kept, so that the highlight holds what the mirror image of a small light would."""
+"""Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
+albedo is kept, so the highlight holds as much as the mirror image of a small light."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +197,7 @@ def nearest(context: Context, index: int) -> Nearest:
     rule = "k_d, k_s and n measured at normal incidence, textures averaged"
     lost = "all but a diffuse part and a lobe"
     if context.plugin(index) == "hair":
-        # Light that a fibre lets through leaves it on the other side of the same strand.
+        # Light transmitted by a fibre leaves on the other side of the same strand.
         everything = operations.total(
             graph, operations.total(graph, found.reflected, found.passed), found.scattered
         )
@@ -216,9 +215,9 @@ def nearest(context: Context, index: int) -> Nearest:
 
 
 def with_values(context: Context, index: int, **values: Any) -> White | None:
-    """Probe a node's BSDF with some parameters changed; returns :class:`White`, None in vain.
+    """Probe a node's BSDF with some parameters changed; return :class:`White`, None if impossible.
 
-    Only parameters that are given are changed: what has its default keeps it.
+    Only parameters that are given are changed: others keep their defaults.
     """
     part = context.graph.part(index)
     props = part.props(0)
@@ -235,12 +234,12 @@ def with_values(context: Context, index: int, **values: Any) -> White | None:
 
 
 def measured(context: Context, index: int, **values: Any) -> White:
-    """Probe as :func:`with_values`, of a BSDF that can be sampled.
+    """Same as :func:`with_values`, for a BSDF that can be sampled.
 
     Raises
     ------
     InputError
-        Where it cannot be.
+        If it cannot be sampled.
     """
     found = with_values(context, index, **values)
     if found is None:
@@ -256,7 +255,7 @@ def lobe(context: Context, albedo: Any, alpha: Any) -> dict[str, Any]:
     """Return ``k_s``, ``n`` and ``normalised`` of a lobe of an albedo and a roughness.
 
     ``n`` is :func:`reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the albedo times
-    :func:`heuristic.terms.normalisation`; where ``alpha`` is a texture, the plugin normalises.
+    :func:`heuristic.terms.normalisation`; if ``alpha`` is a texture, the plugin normalises.
     """
     if operations.is_zero(albedo):
         return {}

@@ -1,7 +1,7 @@
-"""Rules for BSDFs that are not made of others: what only reflects, and what lets light through.
+"""Rules for BSDFs that are not made of others: opaque ones and transparent ones.
 
-The latter are seen through without refraction. What passes straight or refracted at normal
-incidence becomes the transmittance, what is reflected a lobe (`probe.lobe`). A closed body has two
+The latter are seen through without refraction. Light that passes at normal incidence, straight or
+refracted, becomes the transmittance, reflected light a lobe (`probe.lobe`). A closed body has two
 such surfaces on each path.
 """
 
@@ -40,7 +40,7 @@ def diffuse(context: Context, index: int) -> Nearest:
 
 @rule("roughplastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
 def roughplastic(context: Context, index: int) -> Nearest:
-    """``roughplastic``: after the convention (:class:`reference.pairing.factors.Convention`).
+    """``roughplastic``: by the convention (:class:`reference.pairing.factors.Convention`).
 
     A textured reflectance is matched at each point: the diffuse part's albedo is linear in ``rho``,
     with ``nonlinear`` it is ``c rho / (1 - f rho)`` (:func:`_of_base`); the lobe's is linear in
@@ -67,9 +67,9 @@ def roughplastic(context: Context, index: int) -> Nearest:
 
 @rule("plastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
 def plastic(context: Context, index: int) -> Nearest:
-    """``plastic``: as ``roughplastic`` when ``alpha`` goes to 0.
+    """``plastic``: ``roughplastic`` in the limit of ``alpha`` to 0.
 
-    The diffuse part is matched as there; the coat's mirror image becomes a narrow highlight of
+    The diffuse part is matched likewise; the coat's mirror image becomes a narrow highlight with
     Fresnel's reflectance at normal incidence.
     """
     graph = context.graph
@@ -97,8 +97,8 @@ def conductor(context: Context, index: int) -> Nearest:
     """``conductor``, ``roughconductor``: ``k_d = 0``, and a lobe of the albedo at normal incidence.
 
     The albedo is measured with a white ``specular_reflectance``, which then scales it point by
-    point; ``n`` is of the same width as ``alpha``, of the mean of ``alpha_u`` and ``alpha_v`` where
-    they differ. A constant environment is returned by the lobe: ``k_a`` is that albedo.
+    point; ``n`` gives the width of ``alpha``, or of the mean of ``alpha_u`` and ``alpha_v``. The
+    lobe reflects a constant environment: ``k_a`` is that albedo.
     """
     white = probe.measured(context, index, specular_reflectance=1.0)
     reflected = operations.product(
@@ -117,8 +117,7 @@ def principled(context: Context, index: int) -> Nearest:
     """``principled``: ``k_d = base_color (1 - metallic) (1 - spec_trans)``; the rest is a lobe.
 
     The lobe's albedo is measured, averaged over textures, less the diffuse part; its width is that
-    of ``alpha = roughness^2``. Light that ``spec_trans`` lets through is seen through without
-    refraction.
+    of ``alpha = roughness^2``. The share ``spec_trans`` is seen through without refraction.
     """
     graph = context.graph
     k_d = context.value(index, "base_color", 0.5)
@@ -138,11 +137,11 @@ def principled(context: Context, index: int) -> Nearest:
 def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
     """Return the albedo of a plastic's diffuse base at each point of a reflectance.
 
-    Light that the coat throws back is reflected by the base again, so that the albedo is ``c rho /
-    (1 - f rho)``, with ``f = 0`` where ``nonlinear`` is off; ``c`` and ``f`` follow from the
-    albedos at ``rho`` of 1 and 0.5: ``a(1) / a(0.5) = (2 - f) / (1 - f)``.
+    The base reflects again the light that the coat sends back, so the albedo is ``c rho / (1 - f
+    rho)``, with ``f = 0`` if ``nonlinear`` is off; ``c`` and ``f`` follow from the albedos at
+    ``rho`` of 1 and 0.5: ``a(1) / a(0.5) = (2 - f) / (1 - f)``.
     """
-    if min(whole, half) <= 0:  # no light reaches the base and leaves it again
+    if min(whole, half) <= 0:  # no light reaches the base and leaves again
         return operations.product(graph, rho, 0.0)
     ratio = whole / half
     returned = (ratio - 2) / (ratio - 1)
@@ -160,14 +159,14 @@ def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
 
 
 def prepare(graph: Graph, convention: Convention) -> None:
-    """Compute together what the rules need for each rough plastic of a graph."""
+    """Compute together what the rules need for the rough plastics of a graph."""
     if convention is Convention.MATCHED:
         found = (_rough(graph, index) for index in graph.nodes(BSDF))
         albedo.prepare(one for one in found if one is not None)
 
 
 def _rough(graph: Graph, index: int) -> RoughPlastic | None:
-    """Return a white roughplastic, None for what is none or is refused once it is paired."""
+    """Return a white roughplastic, None for other BSDFs and those that pairing will reject."""
     if graph.plugin(index) != "roughplastic":
         return None
     try:
@@ -179,7 +178,7 @@ def _rough(graph: Graph, index: int) -> RoughPlastic | None:
 def _roughplastic(
     graph: Graph, index: int, base: tuple | None = None, coat: tuple | None = None
 ) -> RoughPlastic:
-    """Read a roughplastic's parameters, with Mitsuba's defaults; reflectances where not given."""
+    """Read a roughplastic's parameters, with Mitsuba's defaults; reflectances can be given."""
     props = graph.props(index)
     return RoughPlastic(
         diffuse_reflectance=base or values.colour(graph, index, "diffuse_reflectance", 0.5),
@@ -208,13 +207,13 @@ def null(context: Context, index: int) -> Nearest:
 
 @rule("dielectric", "roughdielectric")
 def dielectric(context: Context, index: int) -> Nearest:
-    """``dielectric``, ``roughdielectric``: the interface is lit from outside alone."""
+    """``dielectric``, ``roughdielectric``: the interface is lit only from outside."""
     return _clear(context, index, "refraction", twosided=False)
 
 
 @rule("thindielectric")
 def sheet(context: Context, index: int) -> Nearest:
-    """``thindielectric``: both sides reflect, and nothing is refracted."""
+    """``thindielectric``: both sides reflect, without refraction."""
     return _clear(context, index, "mirror image", twosided=True)
 
 

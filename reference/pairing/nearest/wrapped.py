@@ -52,7 +52,7 @@ def mask(context: Context, index: int) -> Nearest:
 def blend(context: Context, index: int) -> Nearest:
     """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
 
-    Exact where only one of the two has a lobe, or where the weight is 0 or 1.
+    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
     """
     graph = context.graph
     inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
@@ -91,7 +91,7 @@ def normal_map(context: Context, index: int) -> Nearest:
 
 @rule("bumpmap", wraps=True)
 def bump_map(context: Context, index: int) -> Nearest:
-    """``bumpmap``: the nested material, with the displaced surface's normal (as there)."""
+    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
     scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
     _require(context, index, heights, "eval_1_grad", "slope")
@@ -99,9 +99,9 @@ def bump_map(context: Context, index: int) -> Nearest:
 
 
 def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
-    """Refuse a texture that lacks what its map evaluates, which shading would only find out.
+    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
 
-    Mitsuba has no such texture either, but in integrators that evaluate no material.
+    Mitsuba accepts such a texture only with integrators that do not evaluate materials.
     """
     graph = context.graph
     if not isinstance(texture, Reference):
@@ -115,8 +115,8 @@ def _require(context: Context, index: int, texture: Any, ability: str, what: str
         if f"{ability}()" in str(error):
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: a texture {graph.plugin(texture.index())}"
-                f" gives {context.plugin(index)} no {what} (Mitsuba"
-                f" cannot {ability} it). Give a bitmap of three channels."
+                f" gives {context.plugin(index)} no {what} (Mitsuba cannot {ability} it). Give a"
+                " bitmap of three channels."
             ) from error
 
 
@@ -128,6 +128,6 @@ def _tilted(context: Context, index: int, **values: Any) -> Nearest:
         lost += (("shadows that mapped bumps cast on each other", "none"),)
     values["flip"] = context.value(index, "flip_invalid_normals", True)
     if inner.tilt is not None:
-        lost += (("nested normal maps", "the outer one alone"),)
+        lost += (("nested normal maps", "only the outer one"),)
     tilt = operations.node(context.graph, "heuristic_tilt", **values)
     return replace(inner, tilt=tilt, lost=lost)
