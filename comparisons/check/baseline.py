@@ -6,17 +6,19 @@ Values keep 8 significant digits, far below what rounding can change, and errors
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 from msgspec import Meta, structs
+from numpy.typing import ArrayLike
 
 from comparisons import record, records
 from comparisons.case import Request
 from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
+from comparisons.departure.spaces import Array
 from comparisons.records import VERSION, Amount, Record, Versions, laid_out
 from heuristic import program
 from heuristic.errors import InputError
@@ -130,14 +132,14 @@ def parse(text: str, name: str) -> Baseline:
     return baseline
 
 
-def _require_scene(scene):
+def _require_scene(scene: str) -> None:
     if not scene or not scene.isprintable():
         raise ValueError(
             f"the scene is {scene!r}: a built-in name or the path of a file is allowed."
         )
 
 
-def _require_metrics(metrics):
+def _require_metrics(metrics: Iterable[str]) -> None:
     for name in metrics:
         if name not in {*METRICS, RATIO.name}:
             raise ValueError(f"{name!r} is not a metric.")
@@ -146,40 +148,40 @@ def _require_metrics(metrics):
             raise ValueError(f"the metric {name!r} is missing.")
 
 
-def _require_moderate(baseline):
+def _require_moderate(baseline: Baseline) -> None:
     for metric in baseline.metrics.values():
         _require_numbers(metric.value, metric.error, metric.noise_floor or 0.0)
     for colours in baseline.measured().colours.values():
         _require_numbers(*(values.ravel() for values in vars(colours).values()))
 
 
-def _require_numbers(*values):
+def _require_numbers(*values: ArrayLike) -> None:
     if not (np.abs(np.hstack(values)) <= LARGEST).all():
         raise ValueError(f"a number is not finite, or larger than {LARGEST:.2g}.")
 
 
-def _colours(half):
+def _colours(half: Half) -> Colours:
     blocks = np.array([[(b.mean, b.error) for b in row] for row in half.blocks], float)
     if blocks.ndim != 4:
         raise ValueError("there are no blocks.")
     return Colours(np.array(half.mean), np.array(half.error), blocks[:, :, 0], blocks[:, :, 1])
 
 
-def _half(colours):
+def _half(colours: Colours) -> Half:
     rows = zip(colours.blocks, colours.blocks_error, strict=True)
     blocks = (tuple(map(_block, *row)) for row in rows)
     return Half(**structs.asdict(_block(colours.whole, colours.whole_error)), blocks=tuple(blocks))
 
 
-def _block(mean, error):
+def _block(mean: Array, error: Array) -> Block:
     return Block(tuple(_rounded(x, 8) for x in mean), tuple(_rounded(x, 3) for x in error))
 
 
-def _rounded_metric(metric):
+def _rounded_metric(metric: Metric) -> Metric:
     floor = metric.noise_floor
     floor = None if floor is None else _rounded(floor, 3)
     return Metric(_rounded(metric.value, 8), _rounded(metric.error, 3), floor)
 
 
-def _rounded(value, digits):
+def _rounded(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")

@@ -1,19 +1,22 @@
 """Checking one scene against its baseline."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import mitsuba as mi
 import numpy as np
 
+from comparisons.case import Case
 from comparisons.check.carried import carried
 from comparisons.check.measurement import PASSES, Measurement, Pictures, block_edges, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import guarded
-from comparisons.departure.spaces import luminance
+from comparisons.departure.spaces import Array, luminance
+from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.rendering.gbuffer import Owners, gbuffer, image_size
+from reference.rendering.passes import Progress
 from reference.scene.preparation import film_size
+from reference.scene.source import Source
 
 LONGEST = 64
 """Pixels of the longer side that a scene is measured at, where nothing else is asked for."""
@@ -48,15 +51,15 @@ class Check:
     seen: Owners | None = None
 
     @property
-    def passed(self):
+    def passed(self) -> bool:
         """Whether nothing moved."""
         return not self.moved
 
-    def change(self, half):
+    def change(self, half: str) -> Array:
         """Return the change of a half's blocks, (rows, columns, 3) linear RGB."""
         return self.after.colours[half].blocks - self.before.colours[half].blocks
 
-    def objects(self, half, before=None):
+    def objects(self, half: str, before: Array | None = None) -> dict[str, float]:
         """Return the share that each object has of a half's change, the largest first.
 
         ``before`` is the half's picture when the baseline was made; without it, or in another
@@ -71,7 +74,7 @@ class Check:
             spread = luminance(np.abs(now - before))
         return carried(spread, self.seen)
 
-    def p_values(self, half):
+    def p_values(self, half: str) -> Array:
         """Return the least p-value of each block of a half, corrected for all that was tested."""
         values = np.ones(self.after.colours[half].blocks.shape[:2])
         for move in self.moves:
@@ -91,23 +94,21 @@ class Measured:
     scene: mi.Scene
 
 
-def measure_scene(source, options, passes=PASSES, progress: Callable | None = None):
+def measure_scene(
+    source: Source, options: Options, passes: int = PASSES, progress: Progress | None = None
+) -> Measured:
     """Measure a scene in the current variant.
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    options : comparisons.options.Options
+    options
         What is rendered; ``spp`` is over all passes, and the plan's if omitted.
     passes
         Independent passes.
     progress
         See :func:`comparisons.compare.compare`.
-
-    Returns
-    -------
-    Measured
     """
     ready = guarded(source, options)
     spp = options.spp or ready.reference.spp * ready.passes
@@ -117,7 +118,13 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     return Measured(found, pictures, spp, ready.scene)
 
 
-def check(source, options, before, level=LEVEL, progress=None):
+def check(
+    source: Source,
+    options: Options,
+    before: Measurement,
+    level: float = LEVEL,
+    progress: Progress | None = None,
+) -> Check:
     """Measure a scene as it was measured before, and say what moved.
 
     Parameters
@@ -125,14 +132,10 @@ def check(source, options, before, level=LEVEL, progress=None):
     source, options, progress
         See :func:`measure_scene`; ``options`` are the baseline's. With its seed, what did
         not change gives the same images on the same machine; with another one the test holds, too.
-    before : Measurement
+    before
         The baseline's; metrics that it does not know are not tested.
     level
         Chance of an alarm though nothing changed, over all quantities of this scene.
-
-    Returns
-    -------
-    Check
     """
     now = measure_scene(source, options, before.passes, progress)
     after = now.measurement.of(before.metrics)
@@ -148,7 +151,7 @@ def check(source, options, before, level=LEVEL, progress=None):
     return Check(before, now.measurement, moves, found, level, now.pictures, objects)
 
 
-def made_small(case):
+def made_small(case: Case) -> Case:
     """Return a case whose film is reduced to `LONGEST`, unless it asks for a resolution."""
     if case.request.resolution is not None:
         return case

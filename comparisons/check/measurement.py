@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from comparisons.compare import Prepared
 from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
 from comparisons.records import Amount, Record
-from reference.rendering.passes import passes
+from reference.rendering.passes import Progress, passes
 
 PASSES = 16
 """Enough for a t-test corrected for a hundred quantities to see five standard errors."""
@@ -119,12 +120,14 @@ class Pictures:
     reference: Array
 
 
-def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pictures]:
+def measure(
+    ready: Prepared, seed: int, count: int, viewing: Viewing, progress: Progress | None = None
+) -> tuple[Measurement, Pictures]:
     """Render both halves of a prepared scene, and measure.
 
     Parameters
     ----------
-    ready : comparisons.compare.Prepared
+    ready
         The scene; its renderers say how many samples a pass has.
     seed
         Of the run; each pass hashes its own from it (`pass_seed`).
@@ -153,7 +156,7 @@ def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     return Measurement(len(images), metrics, colours)
 
 
-def _metrics(images, counted, viewing):
+def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metric]:
     """Metrics over the counted pixels, each with the jackknife's error over passes."""
     if not counted.any():
         return {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
@@ -169,7 +172,9 @@ def _metrics(images, counted, viewing):
     }
 
 
-def _departure(test, reference, counted, viewing):
+def _departure(
+    test: Array, reference: Array, counted: Array, viewing: Viewing
+) -> tuple[float, ...]:
     """The means of all metrics, and last of the ratio."""
     means = [
         metric.mean(metric.against(reference, counted, viewing)(test))
@@ -178,7 +183,7 @@ def _departure(test, reference, counted, viewing):
     return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
 
 
-def _floors(images, counted, viewing):
+def _floors(images: Array, counted: Array, viewing: Viewing) -> dict[str, float]:
     signs = np.where(np.arange(len(images)) % 2, -1.0, 1.0)
     noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / len(images)
     reference = images[:, 1].mean(axis=0)
@@ -188,13 +193,13 @@ def _floors(images, counted, viewing):
     }
 
 
-def _colours(images):
+def _colours(images: Array) -> Colours:
     """Colours of the passes (n, H, W, 3) of one half."""
     whole, blocks = images.mean(axis=(1, 2)), block_means(images)
     return Colours(*_estimate(whole), *_estimate(blocks))
 
 
-def _estimate(passes):
+def _estimate(passes: Array) -> tuple[Array, Array]:
     return passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
 
 

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.check.measurement import Measurement
 from comparisons.records import Amount, Record, Share
@@ -105,7 +106,7 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     )
 
 
-def sidak(p, tests):
+def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
     """Return the chance of a p-value as small as `p` among so many independent tests."""
     with np.errstate(divide="ignore"):  # p = 1
         return -np.expm1(tests * np.log1p(-np.asarray(p, float)))
@@ -125,6 +126,6 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
     return sorted(found, key=_order)
 
 
-def _order(move):
+def _order(move: Move) -> tuple[int, float, float]:
     part = (move.half is not None) + (move.block is not None)
     return part, move.p, -abs(move.after - move.before)

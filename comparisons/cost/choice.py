@@ -1,8 +1,5 @@
 """The cheapest method whose error stays within a tolerance, out of those measured."""
 
-from collections.abc import Callable
-from typing import Any
-
 from comparisons.cost.climbing import climb
 from comparisons.cost.cost_record import LeftOut, Measured
 from comparisons.cost.effort import Effort
@@ -13,6 +10,7 @@ from comparisons.options import Options
 from comparisons.records import VERSION, Amount, Positive, Record, Resolution
 from heuristic.errors import unknown
 from reference.rendering.gbuffer import image_size
+from reference.rendering.passes import Progress
 from reference.scene.source import Source
 
 
@@ -71,7 +69,7 @@ def choose(
     options: Options | None = None,
     effort: Effort | None = None,
     metric: str = "dE2000",
-    progress: Callable[..., Any] | None = None,
+    progress: Progress | None = None,
 ) -> Choice:
     """Measure the ladder of a scene, in the current variant, and choose from it.
 

@@ -1,9 +1,8 @@
 """The ladder of one scene, timed and judged against a converged reference."""
 
 import gc
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +11,11 @@ from comparisons.cost.cost_record import Measured
 from comparisons.cost.effort import WIDTH, Effort, reduced
 from comparisons.cost.judging import Judge, converged
 from comparisons.cost.methods import Methods
-from comparisons.cost.timing import measure
+from comparisons.cost.timing import Key, measure
 from comparisons.departure.metric import Metric
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
+from reference.rendering.passes import Progress
 from reference.rendering.sums import Estimate
 from reference.scene.source import Source
 
@@ -48,14 +48,14 @@ class Climbed:
     groups: np.ndarray
     judge: Judge
     measured: tuple[Measured, ...]
-    images: Mapping[tuple[str, int], np.ndarray]
+    images: Mapping[Key, np.ndarray]
 
 
 def climb(
     source: Source,
     options: Options,
     effort: Effort,
-    progress: Callable[..., Any],
+    progress: Progress,
     metric: Metric = LEADING,
     at: tuple[int, int] | None = None,
 ) -> Climbed:
@@ -86,7 +86,9 @@ def climb(
     return Climbed(options, effort, ready, methods, reference, groups, judge, measured, images)
 
 
-def _measured(methods, effort, judge, seed, progress):
+def _measured(
+    methods: Methods, effort: Effort, judge: Judge, seed: int, progress: Progress
+) -> tuple[tuple[Measured, ...], dict[Key, np.ndarray]]:
     """Time and judge the rungs; their scenes are released, since they slow what follows."""
     renderers = {
         (rung.name, spp): methods.renderer(rung.method, spp)

@@ -1,19 +1,31 @@
 """What accuracy costs on one scene: the whole study."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.cost.climbing import climb
-from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Rung, Split
+from comparisons.cost.climbing import Climbed, climb
+from comparisons.cost.cost_record import (
+    Converged,
+    Cost,
+    LeftOut,
+    Measured,
+    Pictures,
+    Prediction,
+    Prices,
+    Rung,
+    Split,
+)
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.judging import judged
 from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
-from comparisons.cost.prediction.target import require
+from comparisons.cost.prediction.target import Size, require
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -21,6 +33,8 @@ from comparisons.effects.split import split
 from comparisons.options import Options
 from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import image_size
+from reference.rendering.passes import Progress
+from reference.scene.source import Source
 
 
 @dataclass(frozen=True)
@@ -52,10 +66,10 @@ class Study:
     """
 
     record: Cost
-    rungs: dict
-    parts: dict
+    rungs: dict[str, np.ndarray]
+    parts: dict[str, np.ndarray]
     difference: np.ndarray
-    effects: dict
+    effects: dict[str, np.ndarray]
     error: np.ndarray
     left: np.ndarray
     reference: np.ndarray
@@ -64,14 +78,14 @@ class Study:
 
 
 def cost(
-    source,
-    options=None,
-    effort=None,
-    progress=None,
-    command="",
-    at=None,
-    is_measured=False,
-):
+    source: Source,
+    options: Options | None = None,
+    effort: Effort | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+    at: Size | None = None,
+    is_measured: bool = False,
+) -> Study:
     """Study what accuracy costs on one scene, in the current variant.
 
     Parameters
@@ -79,16 +93,12 @@ def cost(
     source, options, progress, command
         As of :func:`comparisons.compare.compare`. What an omitted resolution and ``options.spp``
         mean is said in :func:`comparisons.cost.climbing.climb`.
-    effort : Effort, optional
+    effort
         How much is rendered.
-    at : tuple of int, optional
+    at
         Width and height to predict time and error for (:mod:`comparisons.cost.prediction`).
     is_measured
         Whether to measure there, too.
-
-    Returns
-    -------
-    Study
 
     Raises
     ------
@@ -161,7 +171,9 @@ def cost(
     )
 
 
-def _predicted(found, larger, at, is_measured, progress):
+def _predicted(
+    found: Climbed, larger: Prices, at: Size, is_measured: bool, progress: Progress
+) -> Prediction:
     """Predict what methods cost, and effects, at a size."""
     effort, options, methods = found.effort, found.options, found.methods
     studied = options.resolution
@@ -175,14 +187,19 @@ def _predicted(found, larger, at, is_measured, progress):
     return structs.replace(made, prices=at_size(smaller, larger, (half, studied), at))
 
 
-def quick(source, options=None, progress=None, command=""):
+def quick(
+    source: Source,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Study:
     """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
     options = options or Options()
     small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
     return cost(source, small, QUICK, progress, command)
 
 
-def _compared(measured):
+def _compared(measured: Sequence[Measured]) -> dict[str, Any]:
     """Return the points, with the front marked, and what they reach within times and errors."""
     front = pareto(measured)
     points = tuple(structs.replace(point, pareto=point in front) for point in measured)
@@ -193,7 +210,7 @@ def _compared(measured):
     }
 
 
-def _limits(parts, effects):
+def _limits(parts: Iterable[np.ndarray], effects: Iterable[np.ndarray]) -> Pictures:
     """Return half ranges that hold all pictures; rounding alone does not fill one."""
     limits = [abs(signed.mean(axis=2)).max() for signed in parts]
     removed = [abs(values).max() for values in effects]

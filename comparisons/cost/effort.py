@@ -6,8 +6,10 @@ from itertools import takewhile
 
 from comparisons.cost.rungs import DEPTHS
 from comparisons.effects import shapley
+from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size
+from reference.scene.source import Source
 
 DETERMINISTIC_SPP = (4, 16)
 """Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
@@ -55,12 +57,12 @@ class Effort:
     exact_effects: int = shapley.EXACT_PLAYERS
     orders: int = shapley.ORDERS
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.rounds < 2:
             raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
 
     @property
-    def counts(self):
+    def counts(self) -> tuple[int, ...]:
         """The sample counts of the Monte Carlo rungs."""
         powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
         return tuple(powers) or (self.largest,)
@@ -82,7 +84,7 @@ that renderings are few and samples are not spared."""
 QUICK_WIDTH = 48
 
 
-def reduced(source, options, width):
+def reduced(source: Source, options: Options, width: int) -> tuple[int, int]:
     """Return the resolution asked for, else the film's own, reduced to a width."""
     given = options.resolution or film_size(source.parse(), options.sensor)
     if given[0] <= width:

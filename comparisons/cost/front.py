@@ -72,7 +72,7 @@ def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> 
     return (*too_short, *better)
 
 
-def _best(points, limit):
+def _best(points: Iterable[Measured], limit: float) -> Measured | None:
     within = [point for point in points if point.seconds.median <= limit]
     return min(within, key=lambda p: (p.error, p.seconds.median), default=None)
 
@@ -89,7 +89,7 @@ def equal_error(
     )
 
 
-def _reached(method, points, error):
+def _reached(method: str, points: Iterable[Measured], error: float) -> Reached:
     """Return when a method reaches an error; sooner and later where its points may be off."""
     ordered = sorted(points, key=lambda point: point.seconds.median)
     found = reached([point.error for point in ordered], error)

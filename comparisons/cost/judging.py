@@ -2,14 +2,25 @@
 
 import numpy as np
 
+from comparisons.compare import Prepared
+from comparisons.cost.effort import Effort
+from comparisons.departure.metric import Metric
 from comparisons.departure.metrics import LEADING
+from comparisons.departure.spaces import Viewing
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.passes import Stream, passes
+from reference.rendering.passes import Progress, Stream, passes
 from reference.rendering.renderer import Renderer
-from reference.rendering.sums import Accumulator, Mean
+from reference.rendering.sums import Accumulator, Estimate, Mean
 
 
-def converged(ready, effort, seed, progress, size=None, groups=1):
+def converged(
+    ready: Prepared,
+    effort: Effort,
+    seed: int,
+    progress: Progress | None,
+    size: tuple[int, int] | None = None,
+    groups: int = 1,
+) -> tuple[Estimate, np.ndarray]:
     """Render the reference that errors are told against, with seeds that no rung has.
 
     Returns its :class:`~reference.rendering.sums.Estimate`, and the means (``groups``, H, W, 3) of
@@ -25,7 +36,15 @@ def converged(ready, effort, seed, progress, size=None, groups=1):
     return total.estimate(), np.stack([mean.mean() for mean in means])
 
 
-def judged(ready, viewing, effort, seed, progress, size, groups=1):
+def judged(
+    ready: Prepared,
+    viewing: Viewing,
+    effort: Effort,
+    seed: int,
+    progress: Progress | None,
+    size: tuple[int, int],
+    groups: int = 1,
+) -> tuple["Judge", np.ndarray]:
     """Return what tells errors at a size of its own, and the means of :func:`converged`."""
     reference, means = converged(ready, effort, seed, progress, size, groups)
     return Judge(reference, gbuffer(ready.scene, *size).hit, viewing), means
@@ -36,17 +55,23 @@ class Judge:
 
     Parameters
     ----------
-    reference : reference.rendering.sums.Estimate
+    reference
         The reference.
     counted
         (H, W): the pixels that count.
-    viewing : comparisons.departure.spaces.Viewing
+    viewing
         How linear values are looked at.
-    metric : comparisons.departure.metric.Metric
+    metric
         Whose mean is the error, ΔE2000 where it is not given.
     """
 
-    def __init__(self, reference, counted, viewing, metric=LEADING):
+    def __init__(
+        self,
+        reference: Estimate,
+        counted: np.ndarray,
+        viewing: Viewing,
+        metric: Metric = LEADING,
+    ) -> None:
         self.metric = metric
         self.viewing = viewing
         self.counted = counted
@@ -57,7 +82,7 @@ class Judge:
         self.floor = metric.mean(self._distances(reference.mean + reference.noise))
         """Error that the reference's noise alone gives."""
 
-    def errors(self, image):
+    def errors(self, image: np.ndarray) -> tuple[float, float]:
         """Return the metric's mean, and the linear MSE without the reference's share (may be < 0).
 
         ``image`` is (H, W, 3).
@@ -66,7 +91,7 @@ class Judge:
         mse = float(np.mean((image[self.counted] - self.reference) ** 2)) - self.variance
         return self.metric.mean(self._distances(image)), mse
 
-    def distance(self, pixels):
+    def distance(self, pixels: np.ndarray) -> float:
         """Return the metric's mean over the counted pixels (N, 3), as if the others were black."""
         image = np.zeros((*self.counted.shape, 3))
         image[self.counted] = pixels

@@ -153,7 +153,7 @@ def why_not(rung: Rung, scope: Scope, refusals: Mapping[str, str]) -> str:
     return f"the scene's own paths end at depth {scope.max_depth}"
 
 
-def _distinguished(method, scope):
+def _distinguished(method: Kernel | Physical, scope: Scope) -> Kernel | Physical:
     """Strike out of a method what the scene does not have."""
     if isinstance(method, Kernel):
         shadows = method.shadows and OCCLUSION in scope.effects
@@ -163,7 +163,7 @@ def _distinguished(method, scope):
     return Physical(without & scope.effects, method.max_depth if is_limited else None)
 
 
-def _is_random(method, scope):
+def _is_random(method: Kernel | Physical, scope: Scope) -> bool:
     if isinstance(method, Kernel):
         return False
     return scope.random or INTERREFLECTION in scope.effects - method.without

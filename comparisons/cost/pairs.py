@@ -4,7 +4,11 @@ from dataclasses import replace
 
 import mitsuba as mi
 
+from comparisons.compare import Prepared
+from comparisons.options import Options
 from heuristic.interpolation import Interpolation
+from reference.pairing.halves import Pair
+from reference.scene.source import Source
 
 
 class Pairs:
@@ -14,16 +18,16 @@ class Pairs:
     ----------
     source, options
         As of :func:`comparisons.compare.compare`.
-    ready : comparisons.compare.Prepared
+    ready
         Whose pair is the first.
     """
 
-    def __init__(self, source, options, ready):
+    def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
         self._source, self._options = source, options
         key = ready.reference.variant, options.interpolation, options.tessellation
         self._known = {key: ready.pair}
 
-    def interpolated(self, interpolation):
+    def interpolated(self, interpolation: Interpolation) -> Pair:
         """Return the pair with another interpolation, and meshes as fine as asked for.
 
         Raises
@@ -33,11 +37,11 @@ class Pairs:
         """
         return self._of(interpolation, self._options.tessellation)
 
-    def plain(self):
+    def plain(self) -> Pair:
         """Return the pair with the scene's own geometry."""
         return self._of(Interpolation.PHONG, None)
 
-    def _of(self, interpolation, tessellation):
+    def _of(self, interpolation: Interpolation, tessellation: int | None) -> Pair:
         key = mi.variant(), interpolation, tessellation
         if key not in self._known:
             changed = {"interpolation": interpolation, "tessellation": tessellation}

@@ -26,6 +26,7 @@ counts from :data:`WEDGE_LOST` on.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -33,6 +34,7 @@ import numpy as np
 
 from comparisons.departure.blocks import bands
 from comparisons.records import Count, Record
+from heuristic.arrays import Scene, Shape
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic, prepare
 
@@ -66,11 +68,11 @@ class Limits:
     fireflies: np.ndarray
 
     @property
-    def any(self):
+    def any(self) -> np.ndarray:
         """The pixels with one limit or more."""
         return self.clamped | self.terminator | self.energy_loss | self.fireflies
 
-    def counts(self):
+    def counts(self) -> LimitCounts:
         """Return the number of pixels by limit, and ``any``."""
         return LimitCounts(
             **{name: int(getattr(self, name).sum()) for name in LimitCounts.__struct_fields__}
@@ -106,12 +108,17 @@ class Surfaces:
     lights: Lights
 
 
-def find(surfaces, mean, standard_error, counted=None):
-    """Return the :class:`Limits` of a reference.
+def find(
+    surfaces: Surfaces,
+    mean: np.ndarray,
+    standard_error: np.ndarray,
+    counted: np.ndarray | None = None,
+) -> Limits:
+    """Return the limits of a reference.
 
     Parameters
     ----------
-    surfaces : Surfaces
+    surfaces
         As `of_scene` returns them.
     mean, standard_error
         (H, W, 3): the reference's estimate and its standard error from independent passes.
@@ -122,8 +129,10 @@ def find(surfaces, mean, standard_error, counted=None):
     return _masks(surfaces, fireflies(mean, standard_error), counted)
 
 
-def count(scene, mean, standard_error, counted):
-    """Return the :class:`LimitCounts` of a scene's reference, as `find` does, by bands of rows."""
+def count(
+    scene: Scene, mean: np.ndarray, standard_error: np.ndarray, counted: np.ndarray
+) -> LimitCounts:
+    """Count the pixels of a scene's reference that `find` would return, by bands of rows."""
     flies = fireflies(mean, standard_error)
     total = dict.fromkeys(LimitCounts.__struct_fields__, 0)
     for rows in bands(len(counted)):
@@ -133,7 +142,7 @@ def count(scene, mean, standard_error, counted):
     return LimitCounts(**total)
 
 
-def _masks(surfaces, flies, counted):
+def _masks(surfaces: Surfaces, flies: np.ndarray, counted: np.ndarray) -> Limits:
     return Limits(
         clamped=counted & (surfaces.alpha <= SMALLEST_ALPHA),
         terminator=counted & terminator(surfaces),
@@ -142,14 +151,14 @@ def _masks(surfaces, flies, counted):
     )
 
 
-def terminator(surfaces):
+def terminator(surfaces: Surfaces) -> np.ndarray:
     """Return where shading and geometric normal disagree about a light or the viewer."""
     mask = surfaces.hit & (surfaces.shading != surfaces.geometric).any(axis=-1)
     position, shading, geometric, view = (
         getattr(surfaces, name)[mask] for name in ("position", "shading", "geometric", "view")
     )
 
-    def disagree(direction):
+    def disagree(direction: np.ndarray) -> np.ndarray:
         sides = [np.einsum("...i,...i", n, direction) > 0 for n in (shading, geometric)]
         return sides[0] != sides[1]
 
@@ -165,7 +174,7 @@ def terminator(surfaces):
     return mask
 
 
-def fireflies(mean, standard_error):
+def fireflies(mean: np.ndarray, standard_error: np.ndarray) -> np.ndarray:
     """Return where a few samples carry the estimate.
 
     If all light of a pixel came in one of many passes, its standard error would equal its mean. So
@@ -183,7 +192,7 @@ def fireflies(mean, standard_error):
     return found
 
 
-def _lower_around(standard_error, rows):
+def _lower_around(standard_error: np.ndarray, rows: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return the errors (h, W) of some rows, and how many around are far lower; edges repeat."""
     reach = NEIGHBOURHOOD // 2
     height, width = standard_error.shape[:2]
@@ -196,8 +205,10 @@ def _lower_around(standard_error, rows):
     return own, lower
 
 
-def of_scene(scene, width, height, sensor=0, rows=slice(None)):
-    """Collect the :class:`Surfaces` that the centres of a scene's pixels see, in some rows."""
+def of_scene(
+    scene: Scene, width: int, height: int, sensor: int = 0, rows: slice = slice(None)
+) -> Surfaces:
+    """Collect what the centres of a scene's pixels see, in some rows."""
     heights = (np.arange(height)[rows] + 0.5) / height
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, heights)
     height = len(heights)
@@ -206,7 +217,7 @@ def of_scene(scene, width, height, sensor=0, rows=slice(None)):
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
 
-    def grid(vector):
+    def grid(vector: Any) -> np.ndarray:
         return np.array(dr.select(hit, mi.Vector3f(vector), 0), float).T.reshape(height, width, 3)
 
     index = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
@@ -222,7 +233,7 @@ def of_scene(scene, width, height, sensor=0, rows=slice(None)):
     return Surfaces(seen, alpha, albedo, grid(si.p), *normals, grid(-ray.d), lights_of(scene))
 
 
-def _roughplastic(bsdf):
+def _roughplastic(bsdf: Any) -> RoughPlastic | None:
     """Return the parameters of a ``roughplastic``, also within ``twosided``, or None."""
     if "RoughPlastic" not in str(bsdf):
         return None
@@ -230,18 +241,18 @@ def _roughplastic(bsdf):
     return RoughPlastic((1.0,) * 3, _first(params["alpha"]), _first(params["eta"]))
 
 
-def _first(value):
+def _first(value: Any) -> float:
     return float(np.ravel(value)[0])
 
 
 @lru_cache
-def _furnace(plastic):
+def _furnace(plastic: RoughPlastic) -> float:
     albedo = of_roughplastic(plastic)
     return float((albedo.diffuse + albedo.specular).mean())
 
 
-def lights_of(scene):
-    """Return the :class:`Lights` of a scene."""
+def lights_of(scene: Scene) -> Lights:
+    """Return the lights of a scene."""
     points, directions, surrounding = [], [], False
     shining = [shape for shape in scene.shapes() if shape.is_emitter()]
     for emitter in scene.emitters():
@@ -264,14 +275,14 @@ def lights_of(scene):
     return Lights(np.reshape(points, (-1, 3)), np.reshape(directions, (-1, 3)), surrounding)
 
 
-def _given(params, name, column):
+def _given(params: Any, name: str, column: int) -> np.ndarray:
     """Return a parameter of three numbers, or the column of ``to_world`` that stands for it."""
     value = params[name] if name in params else params["to_world"].matrix
     value = np.array(value, float)
     return value.ravel() if name in params else value[:3, column].ravel()
 
 
-def _points_on(shape):
+def _points_on(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     """Return points of a shape and its normals, (N, 3) each, by sampling a grid with its edges."""
     places = np.linspace(0, 1 - 2**-24, LIGHT_GRID)
     x, y = (axis.ravel() for axis in np.meshgrid(places, places))

@@ -61,7 +61,9 @@ def find(
     ), found
 
 
-def _carrier(name, error, mask, total, materials):
+def _carrier(
+    name: str, error: NDArray, mask: NDArray, total: float, materials: Owners | None
+) -> Carrier:
     own = np.unique(materials.places[mask]) if materials else ()
     held = error[mask].sum(dtype=np.float64)
     return Carrier(

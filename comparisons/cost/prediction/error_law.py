@@ -103,10 +103,10 @@ class ErrorLaw:
             value / error * float(np.std(rounds, ddof=1)) * sqrt(2 / len(rounds)),
         )
 
-    def _mean(self, place, spp):
+    def _mean(self, place: int, spp: int) -> float:
         return max(float(np.mean(self.errors[self.widths[place], spp])), TINY)
 
-    def _across(self, widths, spp, width):
+    def _across(self, widths: Sequence[float], spp: int, width: float) -> float:
         """Continue errors along a line in 1 / width; at most, all of the last is at edges."""
         errors = [self._mean(place, spp) for place in range(len(widths))]
         slope, end = np.polyfit(1 / np.asarray(widths, float), errors, 1, w=1 / np.array(errors))
@@ -117,7 +117,7 @@ TINY = 1e-9
 """An error of nothing, as a number that has a logarithm."""
 
 
-def _shrunk(own, shared, count):
+def _shrunk(own: tuple[float, float], shared: float, count: int) -> float:
     """Return a ratio of sums: a method's own, drawn towards that of all."""
     missed, whole = own
     return (missed / whole * count + SHARED * shared) / (count + SHARED) if whole else shared
@@ -132,7 +132,7 @@ def intervals(laws: Sequence[ErrorLaw], width: float) -> Callable[[ErrorLaw, flo
     by_size, by_count = (missed / max(whole, TINY) for missed, whole in (size, count))
     reach = stats.t.ppf((1 + LEVEL) / 2, SHARED + 2)
 
-    def interval(law, spp):
+    def interval(law: ErrorLaw, spp: float) -> NDArray:
         value, spread = law.at(width, spp), law.spread(width, spp, by_size, by_count)
         return np.clip([value, value - reach * spread, value + reach * spread], 0.0, None)
 

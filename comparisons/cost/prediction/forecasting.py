@@ -6,7 +6,7 @@ the size itself, too, in the same turns, with counts that were not fitted.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 from statistics import median
@@ -23,7 +23,7 @@ from comparisons.cost.cost_record import (
 )
 from comparisons.cost.effort import DETERMINISTIC_SPP, Effort
 from comparisons.cost.front import ERRORS, reached
-from comparisons.cost.judging import judged
+from comparisons.cost.judging import Judge, judged
 from comparisons.cost.ladder import Distinct
 from comparisons.cost.methods import Methods
 from comparisons.cost.prediction.error_curve import ErrorCurve
@@ -32,6 +32,7 @@ from comparisons.cost.prediction.target import SEEN_SPP, Size, sizes
 from comparisons.cost.prediction.time_curve import TimeCurve
 from comparisons.cost.timing import interval
 from reference.rendering.passes import Progress, passes
+from reference.rendering.renderer import Renderer
 
 FITTED_SPP = (4, 16, 64), (4, 8, 16, 64), (4, 16)
 """Counts at each size, from the smallest; errors are drawn from the images of the middle one."""
@@ -115,7 +116,7 @@ def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
     return min(found, key=lambda way: way.seconds.value, default=Cheapest(error))
 
 
-def _way(own, error):
+def _way(own: Sequence[Forecast], error: float) -> Cheapest:
     """Return how a method reaches an error."""
     place = reached([forecast.error.value for forecast in own], error)
     if place is None:
@@ -131,10 +132,10 @@ def _forecast_counts(rung: Distinct, is_measured: bool) -> Sequence[int]:
     return sorted({*(FORECAST_SPP if rung.monte_carlo else DETERMINISTIC_SPP), *seen})
 
 
-def _renderers(methods, fitted, seen):
+def _renderers(methods: Methods, fitted: Sequence[Size], seen: Size | None) -> dict[Key, Renderer]:
     """Return a renderer for each method, size and count; scenes are shared, and resized."""
     wanted = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
-    made = {}
+    made: dict[Key, Renderer] = {}
     for rung in methods.rungs:
         for size, (first, *others) in wanted:  # what a kernel prepares may have the film's size
             own = made[rung.name, size, first] = methods.renderer(rung.method, first, size)
@@ -142,9 +143,17 @@ def _renderers(methods, fitted, seen):
     return made
 
 
-def _measure(renderers, judges, kept_size, rounds, seed, progress):
+def _measure(
+    renderers: Mapping[Key, Renderer],
+    judges: Mapping[Size, Judge],
+    kept_size: Size,
+    rounds: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[dict[Key, list[float]], dict[Key, list[float]], dict[Key, np.ndarray]]:
     """Render in turns; return seconds and errors of each key, and the images at one size."""
-    errors, images = defaultdict(list), defaultdict(list)
+    errors: dict[Key, list[float]] = defaultdict(list)
+    images: dict[Key, list[np.ndarray]] = defaultdict(list)
     loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage="predicting")
     for one in loop:
         if one.number < 2:  # tracing, compilation and cold caches
@@ -158,7 +167,7 @@ def _measure(renderers, judges, kept_size, rounds, seed, progress):
     return seconds, errors, {key: np.stack(found) for key, found in images.items()}
 
 
-def _time_curve(name, seconds, target):
+def _time_curve(name: str, seconds: Mapping[Key, list[float]], target: Size) -> TimeCurve:
     """Fit the times of a method, but those at the asked size."""
     keys = [key for key in seconds if key[0] == name and key[1] != target]
     return TimeCurve.fit(
@@ -168,7 +177,13 @@ def _time_curve(name, seconds, target):
     )
 
 
-def _error_law(name, fitted, errors, images, judge):
+def _error_law(
+    name: str,
+    fitted: Sequence[Size],
+    errors: Mapping[Key, list[float]],
+    images: Mapping[Key, np.ndarray],
+    judge: Judge,
+) -> ErrorLaw:
     """Return the law of a method's errors, with its images at the middle size."""
     own = {
         (size[0], spp): found
@@ -180,7 +195,9 @@ def _error_law(name, fitted, errors, images, judge):
     return ErrorLaw(widths, own, ErrorCurve.measured(kept, judge.distance))
 
 
-def _seen(key, seconds, errors):
+def _seen(
+    key: Key, seconds: Mapping[Key, list[float]], errors: Mapping[Key, list[float]]
+) -> Seen | None:
     """Return what was measured at the asked size, None where nothing was."""
     if key not in seconds:
         return None

@@ -62,7 +62,7 @@ def require(name: str, target: Size, rendered: Size | None, is_measured: bool) -
         _require_room(name, *target)
 
 
-def _require_shape(rendered, target):
+def _require_shape(rendered: Size, target: Size) -> None:
     """Refuse two sizes that are not of one shape, to half a pixel of the smaller."""
     (width, height), (wide, high) = sorted([rendered, target])
     if abs(high * width / wide - height) > 1:
@@ -72,7 +72,7 @@ def _require_shape(rendered, target):
         )
 
 
-def _require_room(name, width, height):
+def _require_room(name: str, width: int, height: int) -> None:
     most = LARGEST_PASS // max(*SEEN_SPP, *DETERMINISTIC_SPP)
     if width * height > most:
         raise InputError(
