@@ -7,7 +7,7 @@ light from ``l`` the share ``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv`` i
 
 import numpy as np
 
-from comparisons.audit.audit_record import Checked, Curve
+from comparisons.audit.audit_record import Checked, Curve, Verdict
 from comparisons.audit.subject import Subject, told
 from comparisons.hard import furnace
 
@@ -120,7 +120,7 @@ def below(subject: Subject) -> Checked:
 
 def checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
     """Return a check that was asked."""
-    verdict = "holds" if holds else "does not hold"
+    verdict: Verdict = "holds" if holds else "does not hold"
     return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
 
 

@@ -83,7 +83,9 @@ def _explained(points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[
         for read, values in readings if not words else readings[:1]:
             if (fit := _fit(terms, values, counts)).left < ALIKE:
                 return words or read, fit
-    scaled = [_best(each, points, seen, counts) for each in MISTAKES if each.by is not None]
+    scaled = [
+        _best(each, each.by, points, seen, counts) for each in MISTAKES if each.by is not None
+    ]
     if alike := [found for found in scaled if found[1].left < ALIKE]:
         return min(alike, key=lambda found: len(list(_factors(found[1], 0))))
     for read, values in readings[1:]:
@@ -93,13 +95,15 @@ def _explained(points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[
     return None
 
 
-def _best(each: Mistake, points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[str, Fit]:
+def _best(
+    each: Mistake, by: tuple[float, float], points: Textbook, seen: np.ndarray, counts: np.ndarray
+) -> tuple[str, Fit]:
     """Return a mistake by the number that comes nearest."""
 
     def fit(log: float) -> Fit:
         return _fit(each.change(points, np.exp(log)).terms(), seen, counts)
 
-    low, high = np.log(each.by)
+    low, high = np.log(by)
     grid = np.linspace(low, high, 24)
     start = grid[np.argmin([fit(log).left for log in grid])]
     step = grid[1] - grid[0]

@@ -22,7 +22,7 @@ INCIDENT = (0.0, 45.0, 75.0)
 
 GRAZING = 1e-7
 
-WHITE = {
+WHITE: dict[str, dict[str, Any]] = {
     "diffuse": {"reflectance": 1.0},
     "roughplastic": {"diffuse_reflectance": 1.0},
     "principled": {"base_color": {"type": "rgb", "value": 1.0}},

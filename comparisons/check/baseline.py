@@ -174,7 +174,12 @@ def _half(colours: Colours) -> Half:
 
 
 def _block(mean: Array, error: Array) -> Block:
-    return Block(tuple(_rounded(x, 8) for x in mean), tuple(_rounded(x, 3) for x in error))
+    return Block(_rounded_colour(mean, 8), _rounded_colour(error, 3))
+
+
+def _rounded_colour(values: Array, digits: int) -> Colour:
+    red, green, blue = (_rounded(value, digits) for value in values)
+    return red, green, blue
 
 
 def _rounded_metric(metric: Metric) -> Metric:

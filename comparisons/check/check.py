@@ -65,6 +65,8 @@ class Check:
         ``before`` is the half's picture when the baseline was made; without it, or in another
         size, changes are known by blocks alone, and shared by what is seen in each.
         """
+        if self.seen is None:
+            return {}
         now = getattr(self.pictures, half)
         if before is None or before.shape != now.shape:
             change = luminance(np.abs(self.change(half)))

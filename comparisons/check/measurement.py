@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.compare import Prepared
 from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
@@ -161,9 +162,9 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
     if not counted.any():
         return {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
     count, total = len(images), images.sum(axis=0)
-    values = _departure(*(total / count), counted, viewing)
+    values = _departure(total / count, counted, viewing)
     errors = jackknife_error(
-        [_departure(*((total - one) / (count - 1)), counted, viewing) for one in images]
+        [_departure((total - one) / (count - 1), counted, viewing) for one in images]
     )
     floors = _floors(images, counted, viewing)
     return {
@@ -172,10 +173,9 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
     }
 
 
-def _departure(
-    test: Array, reference: Array, counted: Array, viewing: Viewing
-) -> tuple[float, ...]:
+def _departure(pair: Array, counted: Array, viewing: Viewing) -> tuple[float, ...]:
     """The means of all metrics, and last of the ratio."""
+    test, reference = pair
     means = [
         metric.mean(metric.against(reference, counted, viewing)(test))
         for metric in METRICS.values()
@@ -215,7 +215,7 @@ def block_means(images: Array) -> Array:
     return images
 
 
-def block_edges(side: int) -> Array:
+def block_edges(side: int) -> NDArray[np.int_]:
     """First pixel of each block along a side, and the side itself."""
     count = min(GRID, side)
     return np.arange(count + 1) * side // count

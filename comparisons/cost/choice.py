@@ -90,7 +90,7 @@ def choose(
         resolution=image_size(found.ready.scene),
         metric=metric,
         within=within,
-        chosen=chosen and _offer(chosen),
+        chosen=_offer(chosen) if chosen else None,
         best=_offer(min(found.measured, key=lambda point: (point.error, point.seconds.median))),
         full=_offer(cheapest(of_full, within) or max(of_full, key=lambda point: point.spp)),
         left_out=tuple(LeftOut(*pair) for pair in found.methods.left_out.items()),

@@ -123,7 +123,9 @@ def cost(
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
     # It changes the sizes of the scenes' films, and comes last.
-    prediction = _predicted(found, priced.prices, at, is_measured, progress) if at else None
+    prediction = (
+        _predicted(found, priced.prices, (width, height), at, is_measured, progress) if at else None
+    )
 
     made = Cost(
         scene=source.name,
@@ -172,16 +174,15 @@ def cost(
 
 
 def _predicted(
-    found: Climbed, larger: Prices, at: Size, is_measured: bool, progress: Progress
+    found: Climbed, larger: Prices, studied: Size, at: Size, is_measured: bool, progress: Progress
 ) -> Prediction:
     """Predict what methods cost, and effects, at a size."""
     effort, options, methods = found.effort, found.options, found.methods
-    studied = options.resolution
-    half = tuple(max(side // 2, 1) for side in studied)
+    half = max(studied[0] // 2, 1), max(studied[1] // 2, 1)
     given = found.ready, options.viewing, effort, options.seed, progress
     noiseless = Noiseless(*judged(*given, half, effort.replicates))
-    given = effort.replicates, effort.replicate_spp, options.seed, half
-    lattice = Lattice(options, methods, *given)
+    replicates, spp = effort.replicates, effort.replicate_spp
+    lattice = Lattice(options, methods, replicates, spp, options.seed, half)
     smaller = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders).prices
     made = predict(methods, at, effort, options.seed, is_measured, progress)
     return structs.replace(made, prices=at_size(smaller, larger, (half, studied), at))

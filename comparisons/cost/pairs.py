@@ -44,6 +44,6 @@ class Pairs:
     def _of(self, interpolation: Interpolation, tessellation: int | None) -> Pair:
         key = mi.variant(), interpolation, tessellation
         if key not in self._known:
-            changed = {"interpolation": interpolation, "tessellation": tessellation}
-            self._known[key] = replace(self._options, **changed).pair(self._source)
+            changed = replace(self._options, interpolation=interpolation, tessellation=tessellation)
+            self._known[key] = changed.pair(self._source)
         return self._known[key]

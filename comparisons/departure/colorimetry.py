@@ -51,8 +51,8 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
 
     From the primaries at full precision: white is exactly D65, so greys have no chroma.
     """
-    *colours, white = np.array([[x / y, 1.0, (1.0 - x - y) / y] for x, y in primaries])
-    colours = np.transpose(colours)
+    xyz = np.array([[x / y, 1.0, (1.0 - x - y) / y] for x, y in primaries])
+    colours, white = xyz[:-1].T, xyz[-1]
     return colours * np.linalg.solve(colours, white)
 
 

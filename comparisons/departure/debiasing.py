@@ -73,7 +73,7 @@ def exactly(mean: float, visible: dict[str, float]) -> Debiased:
     return Debiased(mean, mean, mean, {limit: (share, share) for limit, share in visible.items()})
 
 
-def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
+def roughly(metric: Metric, values: NDArray, noise: NDArray) -> Debiased:
     """From distances (N,) and those that noise alone would give, by the triangle inequality."""
     mean, floor = metric.mean(values), metric.mean(noise)
     visible = {
@@ -85,7 +85,7 @@ def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
 
 
 def debiased(
-    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: Array
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: NDArray
 ) -> Debiased | None:
     """Take the noise out of a metric; None where the groups of passes are too few.
 
@@ -136,7 +136,7 @@ def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]
     return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
 
 
-def _numbers(metric: Metric, distances: Array) -> Array:
+def _numbers(metric: Metric, distances: NDArray) -> Array:
     """The mean, of a linear metric the mean square; and the shares above thresholds, twice."""
     first = np.mean(distances**2) if metric.linear else distances.mean()
     shares = [(distances > limit).mean() for limit in metric.visible]

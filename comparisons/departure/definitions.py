@@ -7,6 +7,7 @@ used in their place; the tests compare the two, and so does ``fotismos doctor``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import colour
 import numpy as np
@@ -29,7 +30,7 @@ AGREEMENT = 1e-4
 
 def lab(rgb: Array, viewing: Viewing) -> Array:
     """CIE L*a*b* of linear RGB (..., 3) as displayed."""
-    return XYZ_to_Lab(_shown(rgb, viewing, 1.0))
+    return np.asarray(XYZ_to_Lab(_shown(rgb, viewing, 1.0)), float)
 
 
 def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
@@ -43,7 +44,8 @@ def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
         VIEWING_CONDITIONS_CAM16["Average"],
         compute_H=False,
     )
-    return JMh_CAM16_to_CAM16UCS(np.stack((found.J, found.M, found.h), axis=-1))
+    correlates = [np.asarray(each, float) for each in (found.J, found.M, found.h)]
+    return JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1))
 
 
 def itp(rgb: Array, viewing: Viewing) -> Array:
@@ -63,7 +65,7 @@ def _distance(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
 
 
-DEFINED: dict[str, tuple[Callable[..., Array], Callable[[Array, Array], Array]]] = {
+DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
     "dE2000": (lab, delta_E_CIE2000),
     "dE_ITP": (itp, _distance),
     "dE_CAM16UCS": (cam16ucs, _distance),

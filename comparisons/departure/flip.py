@@ -13,6 +13,7 @@ process where the reference is black, and takes 23 exposures where most of it is
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -38,8 +39,8 @@ def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Array:
     Exposed, then clipped to [0, 1]. Images that are alike are 0 apart, black and white 0.967, green
     and blue 1. It is symmetric. Raises nothing for finite images.
     """
-    shown = (np.clip(viewing.exposure * image, 0.0, 1.0) for image in (reference, test))
-    return _evaluated("LDR", *shown, viewing)
+    shown = [np.clip(viewing.exposure * image, 0.0, 1.0) for image in (reference, test)]
+    return _evaluated("LDR", shown, viewing)
 
 
 def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Array:
@@ -50,7 +51,7 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Array:
     """
     shown = [np.clip(viewing.exposure * image, 0.0, LARGEST) for image in (reference, test)]
     start, stop = exposures(shown[0])
-    return _evaluated("HDR", *shown, viewing, startExposure=start, stopExposure=stop)
+    return _evaluated("HDR", shown, viewing, startExposure=start, stopExposure=stop)
 
 
 def exposures(reference: Array) -> tuple[float, float]:
@@ -69,12 +70,12 @@ def exposures(reference: Array) -> tuple[float, float]:
     return start, min(stop, start + MOST_STOPS)
 
 
-def _evaluated(kind: str, reference: Array, test: Array, viewing: Viewing, **more: Any) -> Array:
+def _evaluated(kind: str, shown: Iterable[Array], viewing: Viewing, **more: Any) -> Array:
     # Threads that spin where they wait take most of a busy machine.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     from flip_evaluator import evaluate
 
-    images = (np.ascontiguousarray(image, np.float32) for image in (reference, test))
+    images = (np.ascontiguousarray(image, np.float32) for image in shown)
     found, *_ = evaluate(
         *images,
         kind,

@@ -135,8 +135,9 @@ def count(
     """Count the pixels of a scene's reference that `find` would return, by bands of rows."""
     flies = fireflies(mean, standard_error)
     total = dict.fromkeys(LimitCounts.__struct_fields__, 0)
-    for rows in bands(len(counted)):
-        surfaces = of_scene(scene, *counted.shape[::-1], rows=rows)
+    height, width = counted.shape
+    for rows in bands(height):
+        surfaces = of_scene(scene, width, height, rows=rows)
         found = _masks(surfaces, flies[rows], counted[rows]).counts()
         total = {name: total[name] + getattr(found, name) for name in total}
     return LimitCounts(**total)

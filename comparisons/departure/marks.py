@@ -117,7 +117,7 @@ def find(
 def _beyond_rounding(difference: Array, test: Array) -> NDArray[np.bool_]:
     size = np.maximum(np.abs(test), np.abs(test - difference))
     rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
-    return (np.abs(difference) > rounding).any(axis=-1)
+    return np.any(np.abs(difference) > rounding, axis=-1)
 
 
 def _discoveries(chances: Array, rate: float) -> float:
@@ -204,7 +204,7 @@ class _Around:
         freedom = np.maximum(neighbourhood(self.pixels) * self.own_freedom / 4.0, 1.0)
         chances = _chances(self.difference, self.variance * inflation, sizes, freedom)
         tested = self.pixels[..., 0] > 0
-        return tested & (chances <= level / max(np.count_nonzero(tested), 1))
+        return tested & (chances <= level / max(int(np.count_nonzero(tested)), 1))
 
 
 def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slice) -> list[Array]:
@@ -247,9 +247,9 @@ class _Pixels:
         mask = mask[rows]
         mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
-        pooled = around.pooled_freedom, around.quantile, around.pooled_variance
+        near = around.pooled_freedom, around.quantile, around.pooled_variance
         prior, quantile, pooled, *sizes = (
-            spread_out(values[blocks], mask.shape)[mask] for values in (*pooled, *around.sizes)
+            spread_out(values[blocks], mask.shape)[mask] for values in (*near, *around.sizes)
         )
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * own) / freedom

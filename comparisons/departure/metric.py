@@ -29,9 +29,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from heuristic.declared import Declared
@@ -109,7 +110,7 @@ class Metric:
         test, reference = checked_pair(test, reference)
         return self.against(reference, ..., viewing)(test)
 
-    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
         """Return a function of test images, for distances from the reference at some pixels.
 
         where
@@ -118,15 +119,20 @@ class Metric:
         The function is ``(test, within=None, factor=1.0)``: distances of ``factor · test`` at
         `where`, or at those of its pixels that the mask `within` holds (`where` is a mask then).
         """
+        if self.function is None:
+            raise InputError(
+                f"metric {self.name!r} has no function: give it one, or declare a Pixelwise metric."
+            )
+        function = self.function
 
         def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
             shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
-            values = self.function(factor * shown, truth, viewing)
+            values = function(factor * shown, truth, viewing)
             return values[where if within is None else within]
 
         return distances
 
-    def mean(self, values: Array) -> float:
+    def mean(self, values: NDArray) -> float:
         """The mean of distances as the metric takes it; 0 where there are none."""
         if not values.size:
             return 0.0
@@ -149,7 +155,7 @@ class Pixelwise(Metric):
     coordinates: Callable[[ArrayLike, Viewing], Array]
     difference: Callable[[Array, Array], Array]
 
-    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
         """Return a function as `Metric.against` does; images may be lists of pixels (N, 3)."""
         fixed = self.coordinates(reference[where], viewing)
 

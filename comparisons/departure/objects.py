@@ -64,13 +64,17 @@ def find(
 def _carrier(
     name: str, error: NDArray, mask: NDArray, total: float, materials: Owners | None
 ) -> Carrier:
-    own = np.unique(materials.places[mask]) if materials else ()
     held = error[mask].sum(dtype=np.float64)
     return Carrier(
         name=name,
-        material=materials.names[own[0]] if len(own) == 1 else "several" if len(own) else "",
+        material=_material(mask, materials) if materials else "",
         pixels=int(mask.sum()),
         share=float(held / total) if total > 0 else 0.0,
         mean_dE2000=float(held / mask.sum()),
         **bounds(mask),
     )
+
+
+def _material(mask: NDArray, materials: Owners) -> str:
+    own = np.unique(materials.places[mask])
+    return materials.names[own[0]] if len(own) == 1 else "several"

@@ -9,7 +9,7 @@ up to at most 1, and evenly spread error has none.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -53,7 +53,7 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         return ()
     cell = -(-max(error.shape) // CELLS)
     worth = _cells(error, cell) - CONTRAST * total / pixels * _cells(counted, cell)
-    found = []
+    found: list[Region] = []
     while len(found) < MOST:
         rows, columns, value = _best_box(worth)
         if not value > 0.0:
@@ -108,7 +108,7 @@ def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total
     )
 
 
-def bounds(mask: NDArray) -> dict[str, int]:
+def bounds(mask: NDArray) -> dict[str, Any]:
     """Return ``x, y, width, height`` of the box around a mask (H, W) of one pixel at least."""
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)

@@ -16,7 +16,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import debiasing
 from comparisons.departure.metric import Distances, Metric, Pixelwise, checked_pair
@@ -85,7 +85,7 @@ def summarise(
     viewing: Viewing = DEFAULT_VIEWING,
     noise: ArrayLike | None = None,
     grouped: Grouped | None = None,
-) -> tuple[Summary, Array]:
+) -> tuple[Summary, NDArray[np.float32]]:
     """The numbers of `metric` over `mask`, and its map over the whole image.
 
     test, reference
@@ -103,9 +103,10 @@ def summarise(
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
     factor = best_exposure(metric, test, reference, mask, viewing)
-    has_noise = noise is not None and np.any(noise)
+    grain = np.asarray(noise) if noise is not None and np.any(noise) else None
     # Single precision keeps seven digits of a distance, in half the memory.
-    distance, exposed, noisy = np.zeros(test.shape[:-1], np.float32), [], []
+    distance: NDArray[np.float32] = np.zeros(test.shape[:-1], np.float32)
+    exposed, noisy = [], []
     pixelwise = isinstance(metric, Pixelwise)
     for rows in _blocks(metric, test):
         shown, truth, here = test[rows], reference[rows], mask[rows]
@@ -115,8 +116,8 @@ def summarise(
         distance[rows][wanted] = distances(shown)
         if factor != 1.0:
             exposed.append(distances(shown, here, factor).astype(np.float32))
-        if has_noise:
-            noisy.append(distances(_noisy(truth, noise[rows]), here).astype(np.float32))
+        if grain is not None:
+            noisy.append(distances(_noisy(truth, grain[rows]), here).astype(np.float32))
     values = distance[mask]
     numbers = after = _numbers(metric, values)
     if factor != 1.0:
@@ -125,11 +126,11 @@ def summarise(
             factor, after = 1.0, numbers
     shares = (share(values > limit) for limit in metric.visible)
     visible = dict(zip(metric.thresholds, shares, strict=True))
-    noise_alone = np.concatenate(noisy) if has_noise else np.zeros(0)
+    noise_alone = np.concatenate(noisy) if noisy else np.zeros(0)
     clean = None
     if not noise_alone.any():
         clean = debiasing.exactly(numbers["mean"], visible)
-    elif pixelwise and grouped is not None:
+    elif isinstance(metric, Pixelwise) and grouped is not None:
         clean = debiasing.debiased(metric, test, grouped, viewing, values)
     clean = clean or debiasing.roughly(metric, values, noise_alone)
     summary = Summary(
@@ -147,10 +148,10 @@ def summarise(
 
 def summarise_log2_luminance(
     test: ArrayLike, reference: ArrayLike, mask: ArrayLike
-) -> tuple[RatioSummary, Array]:
+) -> tuple[RatioSummary, NDArray[np.float32]]:
     """Mean and percentiles of `log2_luminance_ratio` over `mask`, and the map (H, W) in stops."""
     test, reference = checked_pair(test, reference)
-    ratio = np.empty(test.shape[:-1], np.float32)
+    ratio: NDArray[np.float32] = np.empty(test.shape[:-1], np.float32)
     for rows in _rows(test):
         ratio[rows] = log2_luminance_ratio(test[rows], reference[rows])
     values = ratio[np.asarray(mask, bool)]
@@ -188,7 +189,7 @@ def _noisy(image: Array, noise: Array) -> Array:
     return np.add(image, noise, dtype=np.float64)
 
 
-def _numbers(metric: Metric, values: Array) -> dict[str, float]:
+def _numbers(metric: Metric, values: NDArray) -> dict[str, float]:
     if not values.size:
         return dict.fromkeys(("mean", "p50", "p95", "max"), 0.0)
     p50, p95 = map(float, np.percentile(values, (50, 95)))
@@ -246,8 +247,8 @@ def best_exposure(
     # A random draw, not every n-th pixel: a stride would fall in step with the columns.
     places = np.flatnonzero(mask)
     count = min(len(places), _SEARCH_PIXELS)
-    drawn = places[np.random.default_rng(0).choice(len(places), count, replace=False)]
-    drawn = np.unravel_index(drawn, mask.shape)
+    chosen = np.random.default_rng(0).choice(len(places), count, replace=False)
+    drawn = np.unravel_index(places[chosen], mask.shape)
     some = tuple(index[:_BRACKET_PIXELS] for index in drawn)
     distances, bracketing = (metric.against(reference, at, viewing) for at in (drawn, some))
 
@@ -268,8 +269,8 @@ def least_squares_factor(test: Array, reference: Array) -> float:
     energy = overlap = 0.0
     for rows in _rows(test):
         shown, truth = (np.asarray(image[rows], np.float64) for image in (test, reference))
-        energy, overlap = energy + float(np.vdot(shown, shown)), overlap + np.vdot(shown, truth)
-    overlap = float(overlap)
+        energy += float(np.vdot(shown, shown))
+        overlap += float(np.vdot(shown, truth))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
 
 

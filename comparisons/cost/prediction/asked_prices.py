@@ -47,7 +47,10 @@ def _reach(places: Sequence[float]) -> float:
 def _continued(
     before: Estimated, after: Estimated, reach: float, uncertainty: float = 0.0
 ) -> Estimated:
-    """Continue a line through two values, with their intervals; ``uncertainty`` is a share of what it adds."""
+    """Continue a line through two values and their intervals.
+
+    ``uncertainty`` is a share of the step beyond the second.
+    """
     moved = reach * (after.value - before.value)
     halves = [(one.high - one.low) / 2 for one in (before, after)]
     half = hypot(reach * halves[0], (1 + reach) * halves[1], uncertainty * moved)

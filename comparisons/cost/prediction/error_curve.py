@@ -59,7 +59,7 @@ class ErrorCurve:
 
     def noise(self, spp: float) -> float:
         """Return the mean absolute residual at a number of samples."""
-        known = {s: _size(residuals) for s, residuals in self.residuals.items()}
+        known: dict[float, float] = {s: _size(residuals) for s, residuals in self.residuals.items()}
         if spp in known:
             return known[spp]
         squares = {s: size for s, size in known.items() if _is_square(s)}
@@ -116,13 +116,13 @@ def _is_square(count: float) -> bool:
     return isqrt(int(count)) ** 2 == count
 
 
-def _power_law(known: dict[int, float], place: float) -> float:
+def _power_law(known: dict[float, float], place: float) -> float:
     """Interpolate between the two nearest of some values in logarithms, or extrapolate."""
     counts = sorted(known)
     if min(known.values()) <= 0 or len(counts) == 1:
         nearest = min(counts, key=lambda count: abs(log(count / place)))
         return known[nearest] * sqrt(nearest / place)
-    right = min(max(np.searchsorted(counts, place), 1), len(counts) - 1)
+    right = min(max(int(np.searchsorted(counts, place)), 1), len(counts) - 1)
     low, high = counts[right - 1], counts[right]
     power = log(known[high] / known[low]) / log(high / low)
     if not low <= place <= high:

@@ -31,7 +31,7 @@ SHARED = 4
 OWN_CHANCE = 1 / 3
 """Of what the line misses at the largest size: what the edges of the asked one add by chance."""
 
-Point = tuple[float, int]
+Point = tuple[int, int]
 """A width and a count."""
 
 
@@ -49,7 +49,7 @@ class ErrorLaw:
         The method's, at the middle width.
     """
 
-    widths: tuple[float, float, float]
+    widths: tuple[int, int, int]
     errors: Mapping[Point, Sequence[float]]
     curve: ErrorCurve
 

@@ -8,6 +8,7 @@ the size itself, too, in the same turns, with counts that were not fitted.
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import groupby
+from math import inf
 from operator import attrgetter
 from statistics import median
 
@@ -112,8 +113,12 @@ def predict(
 def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
     """Return the method that reaches an error in the least time, as far as is predicted."""
     by_method = groupby(forecasts, key=attrgetter("method"))
-    found = [way for way in (_way(list(own), error) for _, own in by_method) if way.seconds]
-    return min(found, key=lambda way: way.seconds.value, default=Cheapest(error))
+    found = (_way(list(own), error) for _, own in by_method)
+    return min(found, key=_seconds, default=Cheapest(error))
+
+
+def _seconds(way: Cheapest) -> float:
+    return way.seconds.value if way.seconds else inf
 
 
 def _way(own: Sequence[Forecast], error: float) -> Cheapest:
@@ -191,8 +196,8 @@ def _error_law(
         if method == name and size in fitted
     }
     kept = {spp: images[name, size, spp] for method, size, spp in images if method == name}
-    widths = tuple(width for width, _ in fitted)
-    return ErrorLaw(widths, own, ErrorCurve.measured(kept, judge.distance))
+    (first, _), (middle, _), (last, _) = fitted
+    return ErrorLaw((first, middle, last), own, ErrorCurve.measured(kept, judge.distance))
 
 
 def _seen(

@@ -27,13 +27,13 @@ def sizes(target: Size) -> tuple[Size, Size, Size]:
     area = target[0] * target[1]
     largest = min(LARGEST_FITTED, area / 4)
     scales = [sqrt(largest / area) * factor for factor in (1 / 4, 1 / 2, 1)]
-    found = tuple((round(target[0] * s), round(target[1] * s)) for s in scales)
-    if min(found[0]) < 4:
+    smallest, middle, last = ((round(target[0] * s), round(target[1] * s)) for s in scales)
+    if min(smallest) < 4:
         raise InputError(
             f"{target[0]}x{target[1]} is too small to predict anything for: measure it itself with"
             " --resolution."
         )
-    return found
+    return smallest, middle, last
 
 
 def require(name: str, target: Size, rendered: Size | None, is_measured: bool) -> None:
