@@ -1,7 +1,7 @@
-"""A baseline: what was measured of a scene once, as a small text that people can read and diff.
+"""A baseline: earlier measurements of a scene, as a small text that people can read and diff.
 
-It is JSON with a fixed order and a line for each number and its error, or for each block's colours.
-Values keep 8 significant digits, far below what rounding can change, and errors 3.
+It is JSON in a fixed order, with a line per number and its error, or per block's colours. Values
+keep 8 significant digits, far finer than rounding errors, and errors 3.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from heuristic import program
 from heuristic.errors import InputError
 
 MOST_PASSES = 1024
-"""Far more than a t-test needs; their images are in memory together."""
+"""Far more than a t-test needs; all their images are in memory at once."""
 
 LARGEST = float(np.finfo(np.float32).max)
-"""Of the numbers: images are in single precision, and squares of errors must not overflow."""
+"""Largest number: images are in single precision, and squares of errors must not overflow."""
 
 FORMAT_0_1 = '"format": "fotismos baseline 1"'
-"""The first line of a baseline of fotismos 0.1; the others are as they were."""
+"""The first line of a baseline of fotismos 0.1; its other lines are still valid."""
 
 Colour = tuple[float, float, float]
 Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
@@ -44,7 +44,7 @@ class Block(Record):
 
 
 class Half(Record):
-    """Mean linear RGB of a half, over the image and over its blocks, row after row."""
+    """Mean linear RGB of a half, over the image and over its blocks, row by row."""
 
     mean: Colour
     error: Errors
@@ -52,22 +52,21 @@ class Half(Record):
 
 
 class Baseline(Record, kw_only=True, omit_defaults=True):
-    """What was measured of one scene in independent passes of both halves.
+    """Measurements of one scene, from independent passes of both halves.
 
     Attributes
     ----------
     scene
-        A built-in name, or the path of a Mitsuba or a Python file, relative to the baseline's own
-        folder.
+        A built-in name, or the path of a Mitsuba or Python file, relative to the baseline's folder.
     options
-        Rendering options by the names of the command line's; those at rest are left out.
+        Rendering options, named as on the command line; defaults are left out.
     versions
-        What it was measured with.
+        Versions of the software that measured it.
     images
-        Name of an EXR file beside the baseline with both halves, for people to look at; None
-        without.
+        Name of an EXR file next to the baseline with both halves, for people to look at; None if
+        there is none.
     metrics, heuristic, reference
-        The numbers.
+        Departure metrics, and colours of both halves.
     """
 
     record_version: int
@@ -93,7 +92,7 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
 def of(
     scene: str, options: Mapping[str, Any], measured: Measurement, images: str | None = None
 ) -> Baseline:
-    """Return the baseline of a scene just measured, with the versions of this moment."""
+    """Return the baseline of a scene just measured, with the current versions."""
     return Baseline(
         record_version=VERSION,
         scene=scene,
@@ -107,12 +106,12 @@ def of(
 
 
 def parse(text: str, name: str) -> Baseline:
-    """Read a baseline from its file's content, one of fotismos 0.1 too.
+    """Read a baseline from its file's content, also one of fotismos 0.1.
 
     Raises
     ------
     InputError
-        Naming the file `name` and what is wrong in it.
+        With the name of the file and the fault in it.
     """
     text = text.replace(FORMAT_0_1, f'"record_version": {VERSION}', 1)
     try:
@@ -121,8 +120,8 @@ def parse(text: str, name: str) -> Baseline:
         msgspec.convert(baseline.options, Request)
         _require_metrics(baseline.metrics)
         _require_moderate(baseline)
-        baseline.text()  # what cannot be written, such as a NaN among the options, is none either
-    # Numbers too long for Python, and lists within lists without end, are not `ValueError` alone.
+        baseline.text()  # rejects what cannot be written, such as a NaN among the options
+    # Numbers too long for Python and lists nested too deeply raise other errors.
     except (InputError, ValueError, OverflowError, RecursionError) as error:
         where = "" if str(error).startswith(name) else f"{name}: "
         raise InputError(
