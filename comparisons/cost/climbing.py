@@ -27,17 +27,17 @@ class Climbed:
     Attributes
     ----------
     options, effort
-        As rendered.
+        Those used.
     ready
         The scene, paired, planned and guarded.
     methods
         The ladder.
     reference, groups
-        What errors are told against, and the means (R, H, W, 3) of its passes in groups.
+        The converged reference, and the means (R, H, W, 3) of groups of its passes.
     judge
-        What told the errors.
+        What measured the errors.
     measured, images
-        Of :func:`comparisons.cost.timing.measure`.
+        See :func:`comparisons.cost.timing.measure`.
     """
 
     options: Options
@@ -61,14 +61,14 @@ def climb(
 ) -> Climbed:
     """Time and judge every method of a scene's ladder, in the current variant.
 
-    Without a resolution, the film's own is reduced to :data:`comparisons.cost.effort.WIDTH`;
-    ``options.spp`` are the most samples of a Monte Carlo rung. ``metric`` tells errors; without a
-    resolution, the one rendered has the shape of ``at``.
+    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
+    :data:`comparisons.cost.effort.WIDTH`. ``options.spp`` is the largest sample count of a Monte
+    Carlo rung. Errors are means of ``metric``.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface.
+        When the scene cannot be read or paired, or none of its pixels sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -89,13 +89,13 @@ def climb(
 def _measured(
     methods: Methods, effort: Effort, judge: Judge, seed: int, progress: Progress
 ) -> tuple[tuple[Measured, ...], dict[Key, np.ndarray]]:
-    """Time and judge the rungs; their scenes are released, since they slow what follows."""
+    """Time and judge the rungs, then release their scenes, which would slow later work."""
     renderers = {
         (rung.name, spp): methods.renderer(rung.method, spp)
         for rung in methods.rungs
         for spp in (effort.counts if rung.monte_carlo else effort.deterministic)
     }
-    gc.collect()  # scenes that pairing left behind
+    gc.collect()  # release scenes that pairing left behind
     measured = measure(renderers, judge, effort.rounds, seed, progress)
     methods.forget()
     return measured

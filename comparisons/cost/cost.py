@@ -1,4 +1,4 @@
-"""What accuracy costs on one scene: the whole study."""
+"""Study what accuracy costs on one scene."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -39,14 +39,14 @@ from reference.scene.source import Source
 
 @dataclass(frozen=True)
 class Study:
-    """What a study returns: its record, ``cost.json``, and images by name.
+    """Results of a study: its record, ``cost.json``, and its images.
 
     Attributes
     ----------
     record
-        What the files, tables and charts tell.
+        The contents of files, tables and charts.
     rungs
-        ``{rung name: (H, W, 3)}``, of the most samples.
+        ``{rung name: (H, W, 3)}``, with the most samples.
     parts
         ``{part: (H, W, 3)}``, signed and linear.
     difference
@@ -54,15 +54,15 @@ class Study:
     effects
         ``{effect: (H, W)}``: the ΔE2000 that it removes.
     error
-        (H, W): the kernel's ΔE2000, which those of the effects and what is left add up to.
+        (H, W): the kernel's ΔE2000, the sum of ``effects`` and ``left``.
     left
-        (H, W): the ΔE2000 that is left where all effects are simulated.
+        (H, W): the ΔE2000 that remains when all effects are simulated.
     reference
         (H, W, 3).
     counted
         (H, W): the pixels that count.
     previews
-        ``{effects that are simulated: (f H, f W, 3)}``, of every corner of the lattice, linear.
+        ``{simulated effects: (f H, f W, 3)}`` for every corner of the lattice, linear.
     """
 
     record: Cost
@@ -91,20 +91,20 @@ def cost(
     Parameters
     ----------
     source, options, progress, command
-        As of :func:`comparisons.compare.compare`. What an omitted resolution and ``options.spp``
-        mean is said in :func:`comparisons.cost.climbing.climb`.
+        See :func:`comparisons.compare.compare`, and :func:`comparisons.cost.climbing.climb` for an
+        omitted resolution and ``options.spp``.
     effort
         How much is rendered.
     at
         Width and height to predict time and error for (:mod:`comparisons.cost.prediction`).
     is_measured
-        Whether to measure there, too.
+        Whether to measure at that size, too.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface; for a size ``at``
-        that is too small, of another shape than ``options.resolution``, or too large.
+        When the scene cannot be read or paired, or none of its pixels sees a surface; for a size
+        ``at`` that is too small, too large, or of another shape than ``options.resolution``.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -122,7 +122,7 @@ def cost(
     priced = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders)
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
-    # It changes the sizes of the scenes' films, and comes last.
+    # Last, since it changes the sizes of the scenes' films.
     prediction = (
         _predicted(found, priced.prices, (width, height), at, is_measured, progress) if at else None
     )
@@ -176,7 +176,7 @@ def cost(
 def _predicted(
     found: Climbed, larger: Prices, studied: Size, at: Size, is_measured: bool, progress: Progress
 ) -> Prediction:
-    """Predict what methods cost, and effects, at a size."""
+    """Predict the cost of methods and effects at a size."""
     effort, options, methods = found.effort, found.options, found.methods
     half = max(studied[0] // 2, 1), max(studied[1] // 2, 1)
     given = found.ready, options.viewing, effort, options.seed, progress
@@ -194,14 +194,14 @@ def quick(
     progress: Progress | None = None,
     command: str = "",
 ) -> Study:
-    """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
+    """Study a scene as :func:`cost` does, but quickly: for many scenes in one report."""
     options = options or Options()
     small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
     return cost(source, small, QUICK, progress, command)
 
 
 def _compared(measured: Sequence[Measured]) -> dict[str, Any]:
-    """Return the points, with the front marked, and what they reach within times and errors."""
+    """Return the points with the front marked, and the best for given times and errors."""
     front = pareto(measured)
     points = tuple(structs.replace(point, pareto=point in front) for point in measured)
     return {
@@ -212,7 +212,7 @@ def _compared(measured: Sequence[Measured]) -> dict[str, Any]:
 
 
 def _limits(parts: Iterable[np.ndarray], effects: Iterable[np.ndarray]) -> Pictures:
-    """Return half ranges that hold all pictures; rounding alone does not fill one."""
+    """Return half ranges that hold all pictures, with minima far above rounding."""
     limits = [abs(signed.mean(axis=2)).max() for signed in parts]
     removed = [abs(values).max() for values in effects]
     return Pictures(float(max(1e-3, *limits)), float(max(1.0, *removed, 0.0)))

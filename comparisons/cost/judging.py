@@ -1,4 +1,4 @@
-"""Judging the rungs: what errors are told against, and by what."""
+"""Judge the rungs against a converged reference."""
 
 import numpy as np
 
@@ -21,10 +21,10 @@ def converged(
     size: tuple[int, int] | None = None,
     groups: int = 1,
 ) -> tuple[Estimate, np.ndarray]:
-    """Render the reference that errors are told against, with seeds that no rung has.
+    """Render the reference, with seeds that no rung has.
 
-    Returns its :class:`~reference.rendering.sums.Estimate`, and the means (``groups``, H, W, 3) of
-    its passes in groups, whose number of passes is even.
+    Returns its estimate, and the means (``groups``, H, W, 3) of groups of its passes, with an even
+    number of passes each.
     """
     integrator = ready.reference.integrator
     renderer = Renderer(ready.scene, integrator, effort.reference_spp, "reference image", size)
@@ -45,7 +45,7 @@ def judged(
     size: tuple[int, int],
     groups: int = 1,
 ) -> tuple["Judge", np.ndarray]:
-    """Return what tells errors at a size of its own, and the means of :func:`converged`."""
+    """Return a judge at another size, and the means of :func:`converged`."""
     reference, means = converged(ready, effort, seed, progress, size, groups)
     return Judge(reference, gbuffer(ready.scene, *size).hit, viewing), means
 
@@ -60,9 +60,9 @@ class Judge:
     counted
         (H, W): the pixels that count.
     viewing
-        How linear values are looked at.
+        Viewing conditions.
     metric
-        Whose mean is the error, ΔE2000 where it is not given.
+        Its mean is the error; ΔE2000 if omitted.
     """
 
     def __init__(
@@ -78,12 +78,12 @@ class Judge:
         self.reference = reference.mean[counted]
         self._distances = metric.against(reference.mean, counted, viewing)
         self.variance = float(np.mean(reference.standard_error[counted] ** 2))
-        """Mean variance of the reference, which a mean squared error holds on top of its own."""
+        """Mean variance of the reference, which adds to each mean squared error."""
         self.floor = metric.mean(self._distances(reference.mean + reference.noise))
-        """Error that the reference's noise alone gives."""
+        """Error from the reference's noise alone."""
 
     def errors(self, image: np.ndarray) -> tuple[float, float]:
-        """Return the metric's mean, and the linear MSE without the reference's share (may be < 0).
+        """Return the metric's mean, and the linear MSE less the reference's variance (may be < 0).
 
         ``image`` is (H, W, 3).
         """

@@ -12,14 +12,14 @@ from reference.scene.source import Source
 
 
 class Pairs:
-    """Derives pairs as they are asked for, in the variant that is current then.
+    """Derives pairs on request, in the variant that is current then.
 
     Parameters
     ----------
     source, options
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
     ready
-        Whose pair is the first.
+        Its pair is the first.
     """
 
     def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
@@ -28,12 +28,12 @@ class Pairs:
         self._known = {key: ready.pair}
 
     def interpolated(self, interpolation: Interpolation) -> Pair:
-        """Return the pair with another interpolation, and meshes as fine as asked for.
+        """Return the pair with another interpolation, and the requested tessellation.
 
         Raises
         ------
         InputError
-            Where a shape makes no mesh, or flat and Gouraud shading have no viewpoint.
+            When a shape cannot be a mesh, or flat and Gouraud shading have no viewpoint.
         """
         return self._of(interpolation, self._options.tessellation)
 

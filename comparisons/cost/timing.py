@@ -1,8 +1,8 @@
-"""Timing the rungs: in turn, so that a drift of the machine hits all alike.
+"""Time the rungs in turn, so a drift of the machine affects all equally.
 
-What is timed is one rendering of the whole image, evaluated and synchronised. The first run of each
-rung traces and compiles, and stands apart; a second one warms caches; the rounds follow, each with
-a seed of its own, so that their errors are independent as well.
+Each time is of one rendering of the whole image, evaluated and synchronised. The first run of a
+rung traces and compiles, and is reported separately; the second warms caches; the rounds follow,
+each with its own seed, so their errors are independent.
 """
 
 from collections.abc import Mapping
@@ -50,11 +50,11 @@ def measure(
     renderers
         ``{(name, spp): renderer}``; see :class:`reference.rendering.renderer.Renderer`.
     judge
-        What tells errors.
+        Measures the errors.
     rounds
         Repeats, at least 2.
     seed
-        Of the study; each round hashes its own from it.
+        Seed of the study; each round hashes its own from it.
     progress
         ``progress(stage, done, total)``.
 

@@ -1,7 +1,7 @@
-"""The prices of effects at a size that is asked for, from those of the study and of half its size.
+"""Prices of effects at a requested size, from those at the study's size and at half of it.
 
-What an effect removes follows a straight line in ``1 / width``, as errors do, and what it adds to
-the time one in the number of pixels.
+The ΔE2000 that an effect removes is linear in ``1 / width``, as errors are; the time that it adds
+is linear in the number of pixels.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def at_size(
     smaller, larger
         Prices with the same samples per pixel at the two ``sizes``.
     target
-        The asked width and height.
+        The requested width and height.
     """
     edges, pixels = (
         _reach([1 / width for width, _ in (*sizes, target)]),
@@ -39,7 +39,7 @@ def at_size(
 
 
 def _reach(places: Sequence[float]) -> float:
-    """Return how far the last place is beyond the second, in steps from the first to that."""
+    """Return how far the last place is beyond the second, in steps from first to second."""
     first, second, last = places
     return (last - second) / (second - first)
 

@@ -1,8 +1,8 @@
-"""What methods cost at a size that is too large to try them all: predicted from smaller ones.
+"""Predict the cost of methods at a size too large to try them all, from smaller sizes.
 
-Each method is rendered at three smaller sizes of the same shape, in turns, and curves are fitted to
-its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). Where asked to, it is rendered at
-the size itself, too, in the same turns, with counts that were not fitted.
+Each method is rendered at three smaller sizes of the same shape, in turn, and curves are fitted to
+its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). On request, it is also rendered at
+the size itself, in the same turns, with counts that were not fitted.
 """
 
 from collections import defaultdict
@@ -56,15 +56,15 @@ def predict(
     Parameters
     ----------
     methods
-        The methods of a prepared comparison, whose film has the shape of the asked size.
+        The methods of a prepared comparison, whose film has the shape of the requested size.
     target
-        The asked width and height.
+        The requested width and height.
     effort
         Rounds, and samples of the reference.
     seed
-        Of the run.
+        Seed of the run.
     is_measured
-        Whether to render at the asked size, too.
+        Whether to render at the requested size, too.
     progress
         ``progress(stage, done, total)``.
 
@@ -111,7 +111,7 @@ def predict(
 
 
 def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
-    """Return the method that reaches an error in the least time, as far as is predicted."""
+    """Return the method predicted to reach an error in the shortest time."""
     by_method = groupby(forecasts, key=attrgetter("method"))
     found = (_way(list(own), error) for _, own in by_method)
     return min(found, key=_seconds, default=Cheapest(error))
@@ -122,7 +122,7 @@ def _seconds(way: Cheapest) -> float:
 
 
 def _way(own: Sequence[Forecast], error: float) -> Cheapest:
-    """Return how a method reaches an error."""
+    """Return when a method reaches an error."""
     place = reached([forecast.error.value for forecast in own], error)
     if place is None:
         return Cheapest(error)
@@ -132,17 +132,17 @@ def _way(own: Sequence[Forecast], error: float) -> Cheapest:
 
 
 def _forecast_counts(rung: Distinct, is_measured: bool) -> Sequence[int]:
-    """Return the counts of a method; one without random numbers has few, and those measured."""
+    """Return the counts of a method; one without random numbers needs few."""
     seen = SEEN_SPP if is_measured else ()
     return sorted({*(FORECAST_SPP if rung.monte_carlo else DETERMINISTIC_SPP), *seen})
 
 
 def _renderers(methods: Methods, fitted: Sequence[Size], seen: Size | None) -> dict[Key, Renderer]:
-    """Return a renderer for each method, size and count; scenes are shared, and resized."""
-    wanted = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
+    """Return a renderer for each method, size and count; scenes are shared and resized."""
+    jobs = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
     made: dict[Key, Renderer] = {}
     for rung in methods.rungs:
-        for size, (first, *others) in wanted:  # what a kernel prepares may have the film's size
+        for size, (first, *others) in jobs:  # what a kernel prepares may depend on the film's size
             own = made[rung.name, size, first] = methods.renderer(rung.method, first, size)
             made |= {(rung.name, size, spp): own.sampled(spp) for spp in others}
     return made
@@ -156,7 +156,7 @@ def _measure(
     seed: int,
     progress: Progress | None,
 ) -> tuple[dict[Key, list[float]], dict[Key, list[float]], dict[Key, np.ndarray]]:
-    """Render in turns; return seconds and errors of each key, and the images at one size."""
+    """Render in turn; return seconds and errors of each key, and the images at one size."""
     errors: dict[Key, list[float]] = defaultdict(list)
     images: dict[Key, list[np.ndarray]] = defaultdict(list)
     loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage="predicting")
@@ -173,7 +173,7 @@ def _measure(
 
 
 def _time_curve(name: str, seconds: Mapping[Key, list[float]], target: Size) -> TimeCurve:
-    """Fit the times of a method, but those at the asked size."""
+    """Fit the times of a method, except at the requested size."""
     keys = [key for key in seconds if key[0] == name and key[1] != target]
     return TimeCurve.fit(
         [width * height for _, (width, height), _ in keys],
@@ -203,7 +203,7 @@ def _error_law(
 def _seen(
     key: Key, seconds: Mapping[Key, list[float]], errors: Mapping[Key, list[float]]
 ) -> Seen | None:
-    """Return what was measured at the asked size, None where nothing was."""
+    """Return the measurements at the requested size, None if there are none."""
     if key not in seconds:
         return None
     found = errors[key]
