@@ -11,11 +11,11 @@ from comparisons.check.measurement import HALVES
 from comparisons.check.moved import Move
 from comparisons.departure.spaces import luminance
 
-#: Relative spread of the blocks' factors below which they count as one factor.
 ALIKE = 0.02
+"""Relative spread of the blocks' factors below which they count as one factor."""
 
-#: Luminance from which a block has a meaningful factor.
 LIT = 1e-3
+"""Luminance from which a block has a meaningful factor."""
 
 _SUSPECTS = {
     (): "The colours of neither half moved, only their difference: look at the noise, the samples,"

@@ -5,8 +5,8 @@ For later frames (the first also traces and compiles)::
     T(N, s) = t_0 + t_N N + t_s N s,    t_0, t_N, t_s >= 0
 
 fitted in logarithms, so each measurement counts by its relative error. The interval is Student's t
-for one more measurement. The scatter about the law comes from the misfit of each measurement to a fit
-without it: over all methods of a run, which take turns on the machine, with more weight on a
+for one more measurement. The scatter about the law comes from the misfit of each measurement to a
+fit without it: over all methods of a run, which take turns on the machine, with more weight on a
 method's own.
 """
 
@@ -42,8 +42,8 @@ class TimeCurve:
     covariance
         (3, 3): covariance of their logarithms, over the square of the scatter.
     missed
-        (n,): misfit of each measurement in ``log T`` to a fit without it, in standard deviations for
-        a scatter of 1.
+        (n,): misfit of each measurement in ``log T`` to a fit without it, in standard deviations
+        for a scatter of 1.
     """
 
     coefficients: tuple[float, float, float]
