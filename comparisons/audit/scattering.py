@@ -140,7 +140,7 @@ class Scattering(Subject):
 
     def _differentiable(self) -> Iterator[tuple[str, Any]]:
         parameters = mi.traverse(self.bsdf)
-        for key in parameters.keys():  # noqa: SIM118 no mapping
+        for key in parameters.keys():  # noqa: SIM118 not a mapping
             value = parameters[key]
             is_smooth = not (parameters.flags(key) & mi.ParamFlags.NonDifferentiable)
             if is_smooth and isinstance(value, (mi.Float, mi.Color3f)) and dr.width(value) == 1:
