@@ -211,7 +211,7 @@ def test_a_list_is_no_baseline():
 def test_other_blocks_are_refused(rgb):
     options = Options(resolution=(3, 3), spp=32)
     before = measured(SCENES["fig-8-9"].make, 0, options)
-    with pytest.raises(InputError, match="3 by 3 blocks, and the scene 4 by 4"):
+    with pytest.raises(InputError, match="3 by 3 blocks, but the scene 4 by 4"):
         check.check(SCENES["fig-8-9"].source(), replace(options, resolution=(8, 8)), before)
 
 

@@ -165,6 +165,11 @@ def test_a_name_that_is_taken_or_unfit_is_refused(name):
     assert list(METRICS) == list(BUILT_IN)
 
 
+def test_a_metric_without_a_function_says_so_when_it_is_used():
+    with pytest.raises(InputError, match="'blurred' has no function: give it one"):
+        replace(BLURRED, function=None)(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)))
+
+
 def test_metrics_of_installed_packages_are_declared(monkeypatch):
     class Point:
         def load(self):

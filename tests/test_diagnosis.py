@@ -107,4 +107,4 @@ def test_values_that_end_at_1_are_told(rgb, tmp_path):
     path = tmp_path / "cut.py"
     text = (SHADERS / "phong.py").read_text(encoding="utf-8")
     path.write_text(text.replace("return value", "return dr.minimum(value, 1)"), encoding="utf-8")
-    assert told(path) == ("Its values end at 1: what is brighter is cut off.",)
+    assert told(path) == ("Its values end at 1: brighter light is cut off.",)

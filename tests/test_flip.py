@@ -107,7 +107,7 @@ def test_exposure_is_that_of_the_viewing_conditions(name):
 
 @pytest.mark.parametrize("pixels", [0.0, 0.5, -67.0, 1001.0, np.nan, np.inf])
 def test_pixels_per_degree_have_bounds(pixels):
-    with pytest.raises(InputError, match="from 1 to 1000, such as 67"):
+    with pytest.raises(InputError, match="give 1 to 1000, such as 67"):
         Viewing(pixels_per_degree=pixels)
 
 

@@ -150,7 +150,7 @@ def test_a_light_that_three_js_does_not_have_is_refused(rgb):
 @three
 def test_an_audit_of_pixels_is_refused(run, tmp_path):
     code, _, said = run("audit", "--heuristic", "three:phong", "-o", tmp_path)
-    assert (code, "reads positions alone" in said) == (2, True)
+    assert (code, "reads only positions" in said) == (2, True)
 
 
 def test_what_is_missing_is_said(monkeypatch, tmp_path):

@@ -79,15 +79,15 @@ WRONG = (
     Wrong("fall-off twice", GLSL, "light.intensity *",
           "light.intensity / (light.distance * light.distance) *", "a second time"),
     Wrong("fall-off left out", PYTHON, "light.intensity *",
-          "light.intensity * dr.minimum(light.distance, 9) ** 2 *", "fall-off .* is taken out"),
+          "light.intensity * dr.minimum(light.distance, 9) ** 2 *", "fall-off .* is missing"),
     Wrong("N·L not clamped", GLSL, "if (cosine > 0.0) {", "if (true) {", "Clamp what can be"),
     Wrong("N·L without its sign", GLSL, "float cosine = dot(point.normal, light.toward);",
-          "float cosine = abs(dot(point.normal, light.toward));", "N.L is without its sign"),
+          "float cosine = abs(dot(point.normal, light.toward));", "N.L has lost its sign"),
     Wrong("ambient light twice", GLSL, "point.ambient *", "2.0 * point.ambient *",
           "ambient light is 2 times"),
     Wrong("ambient light for each light", PYTHON, "point.ambient *",
           "len(point.lights) * point.ambient *", "ambient light is 3 times .* for each light"),
     Wrong("the first light alone", GLSL, "i < point.lights.length()", "i < 1",
-          "the first light alone"),
+          "only the first light"),
 )  # fmt: skip
 """All of them, each with what is told of it, as a regular expression."""

@@ -1,1 +1,1 @@
-"""Whether one way to shade can be physical at all: furnace, reciprocity, horizon, gradients."""
+"""Whether a shading model can be physical: furnace, reciprocity, horizon, gradients."""

@@ -1,13 +1,14 @@
 """Checks over directions: white furnace, energy, reciprocity, and what happens at the horizon.
 
-With ``s(l, v) = pi f cos(theta_l)``, what a viewer sees of a light of intensity 1, light of
-radiance 1 from all directions shows ``1/pi int s(l, v) dl``, which is 1 for a white surface; and of
-light from ``l`` the share ``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv`` is returned.
+Let ``s(l, v) = pi f cos(theta_l)`` be the value that a viewer sees under a light of intensity 1.
+Under radiance 1 from all directions the viewer sees ``1/pi int s(l, v) dl``, which is 1 for a white
+surface. The share of light from ``l`` that is returned is
+``1/pi int s(l, v) cos(theta_v) / cos(theta_l) dv``.
 """
 
 import numpy as np
 
-from comparisons.audit.audit_record import Checked, Curve
+from comparisons.audit.audit_record import Checked, Curve, Verdict
 from comparisons.audit.subject import Subject, told
 from comparisons.hard import furnace
 
@@ -15,16 +16,16 @@ ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
 """Degrees from the normal."""
 
 TOLERANCE = 0.01
-"""Of an albedo: the quadrature keeps a tenth of it for lobes wider than a degree or two."""
+"""Of albedos; the quadrature errs by a tenth of it for lobes wider than a degree or two."""
 
 RECIPROCAL = 1e-3
 """Largest relative difference of ``f(i, o)`` and ``f(o, i)`` in single precision."""
 
 GRAZING = 1e-6
-"""Sine of the light's elevation at the horizon: what goes to 0 there, however steeply, has gone."""
+"""Sine of the light's elevation, so small that anything continuous has reached 0 there."""
 
 JUMP = 0.01
-"""Of display white."""
+"""In units of display white."""
 
 
 def curve(subject: Subject, material: str) -> Curve:
@@ -54,12 +55,12 @@ def _returned(subject: Subject, material: str, degrees: float) -> float:
 
 
 def _farthest(values: np.ndarray) -> float:
-    """Return the one of some numbers that is farthest from 1."""
+    """Return the number that is farthest from 1."""
     return float(values[np.abs(values - 1).argmax()])
 
 
 def white_furnace(curves: tuple[Curve, ...]) -> Checked:
-    """Check that a white surface is as bright as what surrounds it, at every angle."""
+    """Check that a white surface is as bright as its surroundings at every angle."""
     value, worst = max(
         ((value, f"{each.material}, viewer at {angle:g}°")
          for each in curves for angle, value in zip(ANGLES, each.seen, strict=True)),
@@ -69,7 +70,7 @@ def white_furnace(curves: tuple[Curve, ...]) -> Checked:
 
 
 def energy(curves: tuple[Curve, ...]) -> Checked:
-    """Check that no light is returned more than once, for the worst of the angles."""
+    """Check that no more light is returned than arrives, at the worst angle."""
     value, worst = max(
         (value, f"{each.material}, light at {angle:g}°")
         for each in curves for angle, value in zip(ANGLES, each.returned, strict=True)
@@ -78,7 +79,7 @@ def energy(curves: tuple[Curve, ...]) -> Checked:
 
 
 def reciprocity(subject: Subject) -> Checked:
-    """Check that ``f(i, o) = f(o, i)``, at random pairs of directions."""
+    """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
     a, b = furnace.random_pairs()
 
     def difference(material: str) -> np.ndarray:
@@ -93,7 +94,7 @@ def reciprocity(subject: Subject) -> Checked:
 
 
 def horizon(subject: Subject) -> Checked:
-    """Check that nothing jumps as a light sets."""
+    """Check that no value jumps as a light sets."""
     view = furnace.direction(*(_grid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))))
     above, below = (np.tile([[1.0], [0.0], [z]], view.shape[1]) for z in (GRAZING, -GRAZING))
     found = {
@@ -119,8 +120,8 @@ def below(subject: Subject) -> Checked:
 
 
 def checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
-    """Return a check that was asked."""
-    verdict = "holds" if holds else "does not hold"
+    """Return the record of a check that was made."""
+    verdict: Verdict = "holds" if holds else "does not hold"
     return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
 
 
@@ -132,7 +133,7 @@ def _grid(polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _largest(
     found: dict[str, np.ndarray], light: np.ndarray, view: np.ndarray
 ) -> tuple[float, str]:
-    """Return the largest of values (C, N) by material, and its case in words."""
+    """Return the largest value (C, N) of any material, and describe its case."""
     material = max(found, key=lambda name: found[name].max())
     values = found[material].max(axis=0)
     place = values.argmax()

@@ -1,4 +1,4 @@
-"""What holds of one heuristic or BSDF, from nothing but its answers."""
+"""Audit one heuristic or BSDF, from its values alone."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -16,21 +16,21 @@ Kind = Literal["heuristic", "bsdf"]
 
 
 def audit(kind: Kind, name: str, given: Mapping[str, Any], command: str = "") -> Audit:
-    """Ask every check of a heuristic, or a Mitsuba BSDF, in the current variant.
+    """Make every check of a heuristic, or of a Mitsuba BSDF, in the current variant.
 
     Parameters
     ----------
     kind, name
-        A heuristic as ``compare --heuristic`` takes it, or the type of a BSDF.
+        A heuristic as ``compare --heuristic`` accepts it, or the type of a BSDF.
     given
-        Its parameters, by name.
+        Its parameters by name.
     command
-        That asked, for the record.
+        The command that was run, for the record.
 
     Raises
     ------
     InputError
-        When there is no such thing, it does not take a parameter, or it cannot be audited.
+        When it does not exist, does not take a parameter, or cannot be audited.
     """
     opened = shaded.opened if kind == "heuristic" else scattering.Scattering
     subject = opened(name, given)
@@ -50,7 +50,7 @@ def audit(kind: Kind, name: str, given: Mapping[str, Any], command: str = "") ->
 
 
 def checks_of(subject: Subject, curves: tuple[Curve, ...]) -> tuple[Checked, ...]:
-    """Return all checks of a subject, with the curves of its materials."""
+    """Return all checks of a subject, given the curves of its materials."""
     return (
         angles.white_furnace(curves),
         angles.energy(curves),
@@ -59,7 +59,7 @@ def checks_of(subject: Subject, curves: tuple[Curve, ...]) -> tuple[Checked, ...
         angles.below(subject),
         gradients(subject),
         _sampling(subject),
-        values(subject),  # the last: it tells what the others met with
+        values(subject),  # last: it reports what the others met
     )
 
 

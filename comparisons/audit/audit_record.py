@@ -1,4 +1,4 @@
-"""The record of an audit, ``audit.json``: what holds of one way to shade, and where it fails."""
+"""The record of an audit, ``audit.json``: what holds for a shading model, and where it fails."""
 
 from typing import Annotated, Literal
 
@@ -15,15 +15,15 @@ class Checked(Record):
     Attributes
     ----------
     name
-        Of the check.
+        Name of the check.
     verdict
-        ``not asked`` where the check has no meaning for what is audited.
+        ``not asked`` if the check does not apply to the subject.
     value
-        What was found in the worst case; None where the check was not asked.
+        The value found in the worst case; None if the check was not made.
     expected
-        What the value has to be for the check to hold, in words.
+        The condition on the value for the check to hold, in words.
     worst
-        The worst case found, or why the check was not asked.
+        The worst case found, or why the check was not made.
     """
 
     name: str
@@ -39,11 +39,11 @@ class Curve(Record):
     Attributes
     ----------
     material
-        Its name.
+        Name of the material.
     seen
-        What the viewer sees at each angle under light of radiance 1 from all directions.
+        Radiance seen at each angle under radiance 1 from all directions.
     returned
-        The share of the light from each angle that the surface returns, to all viewers.
+        Share of the light from each angle that the surface returns in all directions.
     """
 
     material: str
@@ -52,12 +52,12 @@ class Curve(Record):
 
 
 class Audit(Record, kw_only=True):
-    """What holds of one heuristic or BSDF."""
+    """What holds for one heuristic or BSDF."""
 
     record_version: int = VERSION
     subject: str
     kind: Literal["heuristic", "bsdf"]
-    parameters: Annotated[dict[str, float | str], Meta(description="Those given by name.")]
+    parameters: Annotated[dict[str, float | str], Meta(description="Those given, by name.")]
     variant: str
     angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
     curves: tuple[Curve, ...]

@@ -1,9 +1,9 @@
-"""What is wrong with a shader, in words: it is asked at points, and compared with known mistakes.
+"""Describe a shader's mistakes: evaluate it at points, and compare it with known mistakes.
 
 The textbook's model is a sum of terms, each a coefficient times emission, ambient, diffuse or
-specular light. A shader that is such a sum, with right coefficients, is right. One that is such a
-sum of a *changed* model has made that mistake, whatever the coefficients; those that are not 1 are
-mistakes of their own. Of a shader that is neither nothing is said: it is another model.
+specular light. A shader that equals this sum, with coefficients of 1, is right. One that equals the
+sum of a *changed* model has made that mistake, whatever its coefficients; each coefficient that is
+not 1 is a further mistake. A shader that equals neither is another model, and nothing is reported.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ from heuristic.trial import DEFAULT_VARIANT
 POINTS = 384
 
 ALIKE = 1e-3
-"""Relative RMS difference up to which two models are the same."""
+"""Relative RMS difference up to which two models count as equal."""
 
 LAMPS = ((3.0, 1.0, 2.5), (-2.0, 2.5, 1.5), (1.0, -2.0, 3.0))
 
@@ -36,19 +36,19 @@ TERMS = ("emission", "ambient", "diffuse", "specular")
 
 @dataclass(frozen=True)
 class Fit:
-    """Coefficients (3, 4) of the terms by channel, and the relative RMS difference left."""
+    """Coefficients (3, 4) of the terms by channel, and the remaining relative RMS difference."""
 
     coefficients: np.ndarray
     left: float
 
 
 def told(name: str) -> tuple[str, ...]:
-    """Return what is wrong with a heuristic; nothing of our own, or of one that prepares a scene.
+    """Return the mistakes of a heuristic; none for a built-in one, or one that prepares a scene.
 
     Parameters
     ----------
     name
-        As ``compare --heuristic`` takes it.
+        As ``compare --heuristic`` accepts it.
     """
     heuristic = heuristics.named(name)
     if heuristic.is_own or heuristic.prepare is not None:
@@ -68,22 +68,24 @@ def _told(heuristic: Heuristic) -> Iterator[str]:
         return
     words, fit = found
     if is_cut:
-        yield "Its values end at 1: what is brighter is cut off."
+        yield "Its values end at 1: brighter light is cut off."
     if words:
         yield f"A likely mistake: {words}."
     yield from _factors(fit, len(points.lights))
 
 
 def _explained(points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[str, Fit] | None:
-    """Return the mistake with which the model is what is seen; no words where it is without."""
+    """Return the mistake that explains the values seen, and its fit; no words if there is none."""
     readings = [("", seen), *((f"its {each.told}", each.undo(seen)) for each in COLOURS)]
     fixed = [("", points.terms())]
     fixed += [(each.told, each.change(points).terms()) for each in MISTAKES if each.by is None]
-    for words, terms in fixed:  # a mistake in the model before two mistakes
+    for words, terms in fixed:  # one mistake before two
         for read, values in readings if not words else readings[:1]:
             if (fit := _fit(terms, values, counts)).left < ALIKE:
                 return words or read, fit
-    scaled = [_best(each, points, seen, counts) for each in MISTAKES if each.by is not None]
+    scaled = [
+        _best(each, each.by, points, seen, counts) for each in MISTAKES if each.by is not None
+    ]
     if alike := [found for found in scaled if found[1].left < ALIKE]:
         return min(alike, key=lambda found: len(list(_factors(found[1], 0))))
     for read, values in readings[1:]:
@@ -93,13 +95,15 @@ def _explained(points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[
     return None
 
 
-def _best(each: Mistake, points: Textbook, seen: np.ndarray, counts: np.ndarray) -> tuple[str, Fit]:
-    """Return a mistake by the number that comes nearest."""
+def _best(
+    each: Mistake, by: tuple[float, float], points: Textbook, seen: np.ndarray, counts: np.ndarray
+) -> tuple[str, Fit]:
+    """Return a mistake, described with the number that fits best."""
 
     def fit(log: float) -> Fit:
         return _fit(each.change(points, np.exp(log)).terms(), seen, counts)
 
-    low, high = np.log(each.by)
+    low, high = np.log(by)
     grid = np.linspace(low, high, 24)
     start = grid[np.argmin([fit(log).left for log in grid])]
     step = grid[1] - grid[0]
@@ -111,7 +115,7 @@ def _best(each: Mistake, points: Textbook, seen: np.ndarray, counts: np.ndarray)
 def _fit(terms: np.ndarray, values: np.ndarray, counts: np.ndarray) -> Fit:
     """Return the least-squares coefficients of terms (4, P, 3) by channel.
 
-    Rows are weighted by their size, so that no highlight decides alone.
+    Rows are weighted by the inverse of their size, or highlights alone would decide.
     """
     if not np.isfinite(values).all():
         return Fit(np.zeros((3, 4)), np.inf)
@@ -119,16 +123,16 @@ def _fit(terms: np.ndarray, values: np.ndarray, counts: np.ndarray) -> Fit:
     found, left = [], []
     for channel in range(3):
         weight = weights[:, channel]
-        matrix, wanted = (terms[:, :, channel] * weight).T, values[:, channel] * weight
+        matrix, target = (terms[:, :, channel] * weight).T, values[:, channel] * weight
         size = np.sqrt((matrix**2).mean(axis=0)) + 1e-12
-        solved = np.linalg.lstsq(matrix / size, wanted, rcond=1e-9)[0] / size
+        solved = np.linalg.lstsq(matrix / size, target, rcond=1e-9)[0] / size
         found.append(solved)
-        left.append(np.mean((matrix @ solved - wanted) ** 2))
+        left.append(np.mean((matrix @ solved - target) ** 2))
     return Fit(np.array(found), float(np.sqrt(np.mean(left))))
 
 
 def _factors(fit: Fit, lights: int) -> Iterator[str]:
-    """Tell coefficients that are neither 1 nor left out."""
+    """Describe the coefficients that are neither 1 nor 0."""
     means = fit.coefficients.mean(axis=0)
     if (np.ptp(fit.coefficients, axis=0) > 0.02 * np.abs(means) + 0.01).any():
         shown = ", ".join(f"{value:.3g}" for value in fit.coefficients[:, 2])
@@ -159,7 +163,7 @@ def _rounded(value: float) -> float:
 
 @cache
 def _points(along: Callable) -> Textbook:
-    """Return points with three lights, all of it random, in the shape of the textbook's model."""
+    """Return random points under three lights, as inputs of the textbook's model."""
     random = np.random.default_rng(21)
 
     def unit() -> np.ndarray:
@@ -196,7 +200,7 @@ def _intensity(number: int) -> float:
 
 
 def _asked(heuristic: Heuristic, points: Textbook) -> np.ndarray:
-    """Return what a heuristic gives at points, (P, 3)."""
+    """Return a heuristic's values (P, 3) at points."""
 
     def vector(values: np.ndarray) -> mi.Vector3f:
         return mi.Vector3f(np.ascontiguousarray(values.T, np.float32))

@@ -1,4 +1,4 @@
-"""Check of values: in hard cases, and wherever a check looked, finite and not negative."""
+"""Check that values are finite and not negative, in hard cases and wherever a check looked."""
 
 from comparisons.audit.angles import checked
 from comparisons.audit.audit_record import Checked
@@ -6,7 +6,7 @@ from comparisons.audit.subject import Subject
 
 
 def values(subject: Subject) -> Checked:
-    """Check that nothing found, here or by the checks before, is NaN, infinite or negative."""
+    """Check that no value, here or in the checks before, is NaN, infinite or negative."""
     for setting in subject.settings():
         subject.noted(setting.values(), setting.told)
     faults = subject.faults

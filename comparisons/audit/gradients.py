@@ -1,4 +1,4 @@
-"""Check of derivatives: Dr.Jit's against finite differences, which share no code with them."""
+"""Check Dr.Jit's derivatives against finite differences, which share no code with them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,10 +12,10 @@ from comparisons.audit.audit_record import Checked
 from comparisons.audit.subject import Subject, Tuned
 
 STEP = 0.02
-"""Of a finite difference, relative to the number."""
+"""Step of a finite difference, relative to the number."""
 
 QUANTILE = 0.9
-"""Of the points: the others may lie at a kink, where the two differ rightly."""
+"""Quantile over the points: the rest may lie at kinks, where the two rightly differ."""
 
 AGREES = 0.05
 """Largest relative difference at that quantile."""
@@ -25,20 +25,20 @@ FAINT = 1e-3
 
 
 NOTHING = 1e-5
-"""A derivative below it everywhere is rounding."""
+"""A derivative that is below this everywhere is rounding error."""
 
 OPPOSITE = 2.0
-"""The largest relative difference that numbers can have; a derivative that is not finite has it."""
+"""The largest possible relative difference; it also stands for derivatives that are not finite."""
 
 
 def gradients(subject: Subject) -> Checked:
-    """Check the derivative by every number that the subject depends on."""
+    """Check the derivative with respect to every number that the subject depends on."""
     found = {tuned.name: _disagreement(tuned) for tuned in subject.tuned()}
     expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
     if not found:
         return Checked(
             name="gradient", verdict="not asked", value=None, expected=expected,
-            worst="there is no number to take the derivative by",
+            worst="it depends on no number",
         )  # fmt: skip
     worst = max(found, key=lambda name: found[name])
     return checked("gradient", found[worst] <= AGREES, found[worst], expected, f"by {worst}")

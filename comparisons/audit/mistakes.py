@@ -1,7 +1,7 @@
-"""Mistakes that shaders are known for: each is one change of the textbook's model.
+"""Mistakes that shaders often make: each is one change of the textbook's model.
 
-They change what the model is computed from at some points, or one of its two functions. The model
-is written out here in NumPy, :meth:`Textbook.terms`, since a mistake takes it apart.
+A mistake changes the model's inputs at some points, or one of its functions. The model is written
+out here in NumPy, :meth:`Textbook.terms`, because a mistake may change any part of it.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,7 +34,7 @@ def halfway(normal: Array, toward: Array, view: Array) -> Array:
 
 
 def clamped(cosine: Array) -> Array:
-    """Return a cosine, 0 where it is negative."""
+    """Return a cosine, or 0 if it is negative."""
     return np.maximum(cosine, 0)
 
 
@@ -44,14 +44,14 @@ def _lobe(points: "Textbook", cosine: Array, incidence: Array) -> Array:
 
 @dataclass(frozen=True)
 class Textbook:
-    """The textbook's model at points: arrays (P, 3), and (P, 1) for numbers.
+    """The textbook's model at points: vectors and colours are (P, 3), numbers (P, 1).
 
     Attributes
     ----------
     lights
-        Direction, distance and intensity of each.
+        Direction, distance and intensity of each light.
     along, incident, lobe
-        The lobe's cosine, what the diffuse term makes of ``N.L``, and the lobe itself.
+        The lobe's cosine, the diffuse term's function of ``N.L``, and the lobe.
     """
 
     position: Array
@@ -79,13 +79,13 @@ class Textbook:
         return np.stack([self.k_i, self.ambient * self.k_d, *lit])
 
     def relit(self, change: Callable[..., tuple[Array, Array, Array]]) -> "Textbook":
-        """Return the same with each light's direction, distance and intensity changed."""
+        """Return the model with each light's direction, distance and intensity changed."""
         return replace(self, lights=tuple(change(*light) for light in self.lights))
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """A change of the model, and its words; one ``by`` a number has ``{}`` in them for it."""
+    """A change of the model, and its description, with ``{}`` for the number it changes ``by``."""
 
     told: str
     change: Callable[..., Textbook]
@@ -101,7 +101,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _spaces() -> Iterator[Mistake]:
-    """Yield the normals of all other spaces whose axes are those of the world."""
+    """Yield a mistake for each other space whose axes are the world's, swapped or reversed."""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         if (order, signs) != ((0, 1, 2), (1, 1, 1)):
             axes = ", ".join(
@@ -138,7 +138,7 @@ def _with_cosine(points: Textbook, cosine: Array, incidence: Array) -> Array:
     return _lobe(points, cosine, incidence) * clamped(incidence)
 
 
-BEHIND = "light from behind counts: N.L is without its sign"
+BEHIND = "light from behind counts: N.L has lost its sign"
 
 MISTAKES = (
     Mistake(
@@ -151,7 +151,7 @@ MISTAKES = (
         lambda points: replace(points, view=-points.view),
     ),
     Mistake(
-        "the lobe is about the half vector, with the exponent of a mirrored one: too wide",
+        "the lobe is about the half vector, with the exponent for the mirrored one: too wide",
         lambda points: replace(points, along=halfway),
     ),
     Mistake(
@@ -159,11 +159,11 @@ MISTAKES = (
         lambda points: points.relit(lambda to, away, light: (to, away, light / away**2)),
     ),
     Mistake(
-        "the fall-off with the square of the distance is taken out",
+        "the fall-off with the square of the distance is missing",
         lambda points: points.relit(lambda to, away, light: (to, away, light * away**2)),
     ),
     Mistake(
-        "the view vector is the position reversed, which it is in view space alone",
+        "the view vector is the position reversed, which is right only in view space",
         lambda points: replace(points, view=_unit(-points.position)),
     ),
     Mistake(
@@ -181,19 +181,19 @@ MISTAKES = (
     Mistake(BEHIND, lambda points: replace(points, incident=np.abs)),
     Mistake(BEHIND, lambda points: replace(points, incident=np.abs, along=_mirrored_behind,
                                            lobe=_without_gate)),
-    Mistake("highlights are seen of lights below the horizon",
+    Mistake("lights below the horizon cause highlights",
             lambda points: replace(points, lobe=_without_gate)),
-    Mistake("the lobe is multiplied by N.L, as a BRDF is and the textbook's is not",
+    Mistake("the lobe is multiplied by N.L, as in a BRDF; the textbook's is not",
             lambda points: replace(points, lobe=_with_cosine)),
-    Mistake("the first light alone is used",
+    Mistake("only the first light is used",
             lambda points: replace(points, lights=points.lights[:1])),
-    Mistake("the lobe is normalised by n + 2, which k_s as paired holds already",
+    Mistake("the lobe is normalised by n + 2, which the paired k_s already includes",
             _scaled_lobe(lambda n: n + 2)),
-    Mistake("the lobe is normalised by n + 8, which k_s as paired holds already",
+    Mistake("the lobe is normalised by n + 8, which the paired k_s already includes",
             _scaled_lobe(lambda n: n + 8)),
-    Mistake("the material's colours are decoded, and are linear already",
+    Mistake("the material's colours are decoded, but are already linear",
             _coloured(picture_files.decoded)),
-    Mistake("the material's colours are decoded by a power of 2.2, and are linear already",
+    Mistake("the material's colours are decoded by a power of 2.2, but are already linear",
             _coloured(lambda colour: colour**2.2)),
     Mistake("the material's colours are sRGB-encoded", _coloured(picture_files.encoded)),
     *_spaces(),
@@ -222,4 +222,4 @@ COLOURS = (
         lambda image: image / np.maximum(1 - image, 1e-6),
     ),
 )
-"""What can be wrong with a shader's values."""
+"""Mistakes in how a shader encodes its values."""

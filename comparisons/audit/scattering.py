@@ -1,4 +1,4 @@
-"""A BSDF of Mitsuba's under audit, by its ``eval``, ``sample`` and ``pdf``."""
+"""A Mitsuba BSDF under audit, by its ``eval``, ``sample`` and ``pdf``."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -15,38 +15,38 @@ from comparisons.hard import furnace
 from heuristic.errors import InputError
 
 LEVEL = 0.001
-"""Chance that densities which are right fail, over all angles together."""
+"""Chance that correct densities fail, over all angles together."""
 
 INCIDENT = (0.0, 45.0, 75.0)
 """Degrees at which samples are compared with the density."""
 
 GRAZING = 1e-7
 
-WHITE = {
+WHITE: dict[str, dict[str, Any]] = {
     "diffuse": {"reflectance": 1.0},
     "roughplastic": {"diffuse_reflectance": 1.0},
     "principled": {"base_color": {"type": "rgb", "value": 1.0}},
     "roughconductor": {"material": "none"},
     "phong": {"k_d": 1.0},
 }
-"""What makes BSDFs white; others are as Mitsuba has them."""
+"""Parameters that make BSDFs white; other types keep Mitsuba's defaults."""
 
 
 NARROWEST = {"alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1, "roughness": 0.32}
-"""Roughness below which quadrature and cells of χ² do not resolve the lobe at all angles."""
+"""Roughness below which neither quadrature nor the cells of χ² resolve the lobe."""
 
 SHARPEST = 50.0
-"""The same of Phong's exponent, from above."""
+"""Phong's exponent above which they do not."""
 
 
 class Scattering(Subject):
-    """A BSDF of some type, with its parameters; where they are not given, it is :data:`WHITE`.
+    """A BSDF of some type, with its parameters; those omitted are of :data:`WHITE`.
 
     Raises
     ------
     InputError
-        For a type or parameter that Mitsuba does not take, and for BSDFs that transmit light or
-        reflect it as a mirror does: their furnace has no integral over directions.
+        For a type or parameter that Mitsuba rejects, and for BSDFs that transmit light or reflect
+        it as a mirror does: no quadrature over directions covers them.
     """
 
     def __init__(self, plugin: str, given: Mapping[str, Any]) -> None:
@@ -57,8 +57,8 @@ class Scattering(Subject):
             self.bsdf.flags(), mi.BSDFFlags.Delta
         ):
             raise InputError(
-                f"BSDF {plugin!r} transmits light or reflects it as a mirror, and only reflection"
-                " with a density is audited: give one such as roughplastic or roughconductor."
+                f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
+                " reflection with a density: give roughplastic, roughconductor or the like."
             )
         super().__init__((plugin,), grid=(furnace.AZIMUTHS, furnace.HEIGHTS))
 
@@ -86,12 +86,12 @@ class Scattering(Subject):
         for key, value in self._differentiable():
             centre = float(np.array(value, float).ravel()[0])
             if centre:
-                # Room for differences: what must not exceed 1 is less.
+                # Leave room for differences: reflectances must not exceed 1.
                 centre = min(max(centre, 0.1), 0.9) if "reflectance" in key else centre
                 yield Tuned(key, centre, partial(self._tuned, key, type(value), light, view))
 
     def sampling(self) -> Checked:
-        """Check that samples are as dense as ``pdf`` says: χ² over directions (Mitsuba's test)."""
+        """Check the density of samples against ``pdf``: χ² over directions (Mitsuba's test)."""
         light, view = furnace.random_pairs(256)
         if not self.response(self.plugin, light, view).any():
             return Checked(
@@ -111,7 +111,7 @@ class Scattering(Subject):
         sample, density = mi.chi2.BSDFAdapter(self.plugin, parameters, wi=wi)
 
         def above(wo: Any) -> Any:
-            # Samples below the horizon weigh nothing, whatever roughplastic's density is there.
+            # Samples below the horizon weigh nothing: roughplastic's density there is irrelevant.
             return dr.select(wo.z > 0, density(wo), 0)
 
         test = mi.chi2.ChiSquareTest(
@@ -131,8 +131,8 @@ class Scattering(Subject):
         except RuntimeError as error:
             reason = " ".join(str(error).split())
             raise InputError(
-                f"BSDF {self.plugin!r} with {self.given} cannot be made: give a type of"
-                f" Mitsuba's, and parameters of it as -p name=value. Mitsuba says: {reason}"
+                f"BSDF {self.plugin!r} with {self.given} cannot be made: give a Mitsuba BSDF type,"
+                f" and its parameters as -p name=value. Mitsuba reports: {reason}"
             ) from error
 
     def _keys(self) -> set[str]:
@@ -140,7 +140,7 @@ class Scattering(Subject):
 
     def _differentiable(self) -> Iterator[tuple[str, Any]]:
         parameters = mi.traverse(self.bsdf)
-        for key in parameters.keys():  # noqa: SIM118 no mapping
+        for key in parameters.keys():  # noqa: SIM118 not a mapping
             value = parameters[key]
             is_smooth = not (parameters.flags(key) & mi.ParamFlags.NonDifferentiable)
             if is_smooth and isinstance(value, (mi.Float, mi.Color3f)) and dr.width(value) == 1:
@@ -165,18 +165,18 @@ class Scattering(Subject):
 
 
 def _require_resolved(plugin: str, given: Mapping[str, Any]) -> None:
-    """Refuse lobes that the quadrature would miss."""
+    """Reject lobes that the quadrature would miss."""
     for name, least in NARROWEST.items():
         value = given.get(name, least)
         if isinstance(value, float) and not value >= least:
             raise InputError(
-                f"BSDF {plugin!r}: {name} = {value:g} makes a lobe that is narrower than the audit"
-                f" resolves: give {least:g} or more."
+                f"BSDF {plugin!r}: {name} = {value:g} makes a lobe too narrow for the audit: give"
+                f" {least:g} or more."
             )
     if isinstance(given.get("n"), float) and not given["n"] <= SHARPEST:
         raise InputError(
-            f"BSDF {plugin!r}: n = {given['n']:g} makes a lobe that is narrower than the audit"
-            f" resolves: give {SHARPEST:g} or less."
+            f"BSDF {plugin!r}: n = {given['n']:g} makes a lobe too narrow for the audit: give"
+            f" {SHARPEST:g} or less."
         )
 
 

@@ -1,4 +1,4 @@
-"""A heuristic under audit: one white material, one light and one viewer at a time."""
+"""A heuristic under audit, with one white material, one light and one viewer at a time."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -19,14 +19,14 @@ from heuristic.points import Given
 from reference.pairing import albedo, factors
 
 ALPHA, IOR = 0.3, 1.5
-"""Of the glossy material and the metal: a lobe that the quadrature resolves from every angle."""
+"""Of the glossy material and the metal: the quadrature resolves their lobes at every angle."""
 
 UP = np.array([[0.0], [0.0], [1.0]])
 COLOURS = ("k_i", "k_a", "k_d", "k_s", "base_color")
 
 MIDDLE = {"k_i": 0, "k_a": 0.5, "k_d": 0.5, "k_s": 0.5, "n": 10, "base_color": 0.5, "alpha": 0.3,
           "ior": 1.5, "metallic": 0.5}  # fmt: skip
-"""Where derivatives are taken; those that are 0 are left out."""
+"""Where derivatives are taken, except with respect to values of 0."""
 
 EXTREMES = (
     ("n = 0", {"n": 0.0}), ("n = 1e-3", {"n": 1e-3}), ("n = 1e7", {"n": 1e7}),
@@ -39,9 +39,9 @@ DISTANCES = (0.0, 1e-30, 1e-6, 1e6, 1e15, 1e30)
 
 
 def white(form: str) -> dict[str, dict[str, float]]:
-    """Return the white materials by name: matte, glossy and metal, as the pair has them.
+    """Return the white materials matte, glossy and metal, as pairing makes them.
 
-    The glossy one is what white rough plastic is paired with; the metal's lobe returns all light at
+    The glossy one is the counterpart of white rough plastic. The metal's lobe returns all light at
     normal incidence.
     """
     n = factors.exponent_of(ALPHA, form)
@@ -57,21 +57,21 @@ def white(form: str) -> dict[str, dict[str, float]]:
 
 
 class Shaded(Subject):
-    """A heuristic, with values for some of its parameters by name.
+    """A heuristic, with values for some of its parameters.
 
     Raises
     ------
     InputError
-        For a parameter that it does not have, or a value outside its bounds; and where it cannot
-        prepare the scene, a white square under one light.
+        For a parameter that it does not have, a value outside its bounds, or if it cannot prepare
+        the scene, a white square under one light.
     """
 
     def __init__(self, heuristic: Heuristic, given: Mapping[str, float]) -> None:
         self.heuristic = heuristic
         if heuristic.needs == {"position"}:
             raise InputError(
-                f"heuristic {heuristic.name} reads positions alone, as a picture does, and cannot"
-                " be asked from all directions. Compare it on a scene."
+                f"heuristic {heuristic.name} reads only positions, as a picture does, and cannot be"
+                " audited over directions. Compare it on a scene."
             )
         known = {each.name: each for each in heuristic.parameters}
         for name in given:
@@ -108,7 +108,7 @@ class Shaded(Subject):
         yield self._setting("a viewer at the point itself", UP, nothing)
         dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
         yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, views))
-        if self.heuristic.prepare is None:  # what is prepared may be one thing a light
+        if self.heuristic.prepare is None:  # it may prepare one item per light
             yield Setting("no light at all", partial(self._array, MIDDLE, None, views))
 
     def tuned(self) -> Iterator[Tuned]:
@@ -172,13 +172,13 @@ class Shaded(Subject):
 
 
 def opened(name: str, given: Mapping[str, float]) -> Shaded:
-    """Return a heuristic by what `compare --heuristic` calls it, for the current variant."""
+    """Return a heuristic, as `compare --heuristic` accepts it, for the current variant."""
     return Shaded(heuristics.named(name), given)
 
 
 def _material(values: Mapping[str, Any], form: str) -> PairedMaterial:
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
-    # Opaque, as in a scene: of literals Dr.Jit drops what is multiplied by 0, NaN or not.
+    # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
     given = {
         name: value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
         for name, value in (known | dict(values)).items()
@@ -187,7 +187,7 @@ def _material(values: Mapping[str, Any], form: str) -> PairedMaterial:
 
 
 def _within(parameter: heuristics.Parameter, value: float) -> float | None:
-    """Return a value about which there is room for differences; None where there is none."""
+    """Return a value with room for differences on both sides; None if there is none."""
     low, high = max(parameter.low, -1e6), min(parameter.high, 1e6)
     inner = min(max(value, low + 0.1 * (high - low)), high - 0.1 * (high - low))
     centre = value if low < 0.9 * value and 1.1 * value < high else inner

@@ -1,4 +1,4 @@
-"""What can be audited: anything that says how much light it turns from one direction to another."""
+"""What can be audited: anything that returns how much light it reflects between two directions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class Fault:
-    """A value that no light can have: where it was found, and the value."""
+    """A value that light cannot have, and where it was found."""
 
     where: str
     value: float
@@ -21,9 +21,9 @@ class Fault:
 
 @dataclass(frozen=True)
 class Tuned:
-    """A number to take the derivative by.
+    """A number to differentiate with respect to.
 
-    ``shade`` maps a Dr.Jit float, a single number or one a point, to a float a point.
+    ``shade`` maps a Dr.Jit float, one for all points or one per point, to one per point.
     """
 
     name: str
@@ -33,14 +33,16 @@ class Tuned:
 
 @dataclass(frozen=True)
 class Setting:
-    """A hard case: its words, what gives its values (C, N), and directions (3, N) where they tell.
+    """A hard case.
 
     Attributes
     ----------
-    words, values
-        What is hard, and a function of nothing.
+    words
+        Description of the case.
+    values
+        Function without arguments that returns the values (C, N).
     pairs
-        Light and view.
+        Directions (3, N) to the light and to the viewer, if they identify the case.
     """
 
     words: str
@@ -48,7 +50,7 @@ class Setting:
     pairs: tuple[np.ndarray, np.ndarray] | None = None
 
     def told(self, place: int) -> str:
-        """Return one of the values' cases in words."""
+        """Describe the case of one value."""
         if self.pairs is None:
             return self.words
         light, view = (each[:, place % each.shape[1]] for each in self.pairs)
@@ -62,11 +64,11 @@ class Subject(ABC):
     Attributes
     ----------
     materials
-        Names of the white materials that it is asked with, which absorb nothing.
+        Names of the white materials that it is evaluated with, which absorb nothing.
     grid
         Azimuths and heights of the quadrature over a hemisphere.
     faults
-        What was found, while other things were asked, that no light can have.
+        Values that light cannot have, found during any check.
     """
 
     materials: tuple[str, ...]
@@ -75,7 +77,7 @@ class Subject(ABC):
 
     @abstractmethod
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """Return what :meth:`response` returns, as it comes."""
+        """Return what :meth:`response` returns, before it is checked."""
 
     @abstractmethod
     def settings(self) -> Iterator[Setting]:
@@ -88,8 +90,8 @@ class Subject(ABC):
     def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         """Return ``pi f cos(theta_l)``, (C, N), for unit vectors (3, N) to a light and a viewer.
 
-        It is what a viewer sees of a light of intensity 1: of a white diffuse surface, the cosine.
-        Values that are not finite, or negative, are noted and count as 0.
+        A viewer sees this value under a light of intensity 1; on a white diffuse surface it is the
+        cosine. Values that are not finite, or negative, are noted and count as 0.
         """
         count = max(light.shape[1], view.shape[1])
         light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
@@ -98,7 +100,7 @@ class Subject(ABC):
         return np.where(np.isfinite(found) & (found > 0), found, 0.0)
 
     def noted(self, values: np.ndarray, where: Callable[[int], str]) -> None:
-        """Note the first of some values (C, N) that is not finite, or negative."""
+        """Note the first value (C, N) that is not finite, or negative."""
         is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
         if is_wrong.any():
             channel, place = np.argwhere(is_wrong)[0]
@@ -106,7 +108,7 @@ class Subject(ABC):
 
 
 def told(light: np.ndarray, view: np.ndarray) -> str:
-    """Return a pair of directions in words: angles from the normal, and the azimuth between."""
+    """Describe a pair of directions: angles from the normal, and the azimuth between."""
     polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
     about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
     return (

@@ -1,1 +1,1 @@
-"""Regression checks: a scene measured again, and compared with what was measured once."""
+"""Regression checks: measure a scene again, and compare it with a baseline."""

@@ -1,4 +1,4 @@
-"""Which shape of a scene carries a change."""
+"""How a change is shared among the shapes of a scene."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from reference.rendering.gbuffer import Owners
 
 
 def carried(change: NDArray, owners: Owners) -> dict[str, float]:
-    """Return the share that each shape has of a change (H, W) ≥ 0, the largest first.
+    """Return each shape's share of a change (H, W) ≥ 0, the largest first.
 
-    What no shape is seen for is left out; a change of nothing has no shares.
+    Pixels that see no shape are left out. Without change there are no shares.
     """
     total = change.sum()
     if not total > 0.0:

@@ -1,22 +1,25 @@
-"""Checking one scene against its baseline."""
+"""Check one scene against its baseline."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import mitsuba as mi
 import numpy as np
 
+from comparisons.case import Case
 from comparisons.check.carried import carried
 from comparisons.check.measurement import PASSES, Measurement, Pictures, block_edges, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import guarded
-from comparisons.departure.spaces import luminance
+from comparisons.departure.spaces import Array, luminance
+from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.rendering.gbuffer import Owners, gbuffer, image_size
+from reference.rendering.passes import Progress
 from reference.scene.preparation import film_size
+from reference.scene.source import Source
 
 LONGEST = 64
-"""Pixels of the longer side that a scene is measured at, where nothing else is asked for."""
+"""Default number of pixels along the longer side of a measured scene."""
 
 
 @dataclass(frozen=True)
@@ -26,17 +29,17 @@ class Check:
     Attributes
     ----------
     before, after
-        What was measured then, and now with the same options.
+        Measurements of the baseline, and of now with the same options.
     moves
         Every quantity tested.
     moved
-        Those that moved by more than chance and rounding allow.
+        Those that moved by more than chance and rounding explain.
     level
-        Chance of an alarm though nothing changed.
+        Chance of a false alarm.
     pictures
-        Both halves as they are now.
+        Both halves now.
     seen
-        The objects of the scene, where something moved.
+        The objects of the scene, if something moved.
     """
 
     before: Measurement
@@ -48,20 +51,22 @@ class Check:
     seen: Owners | None = None
 
     @property
-    def passed(self):
+    def passed(self) -> bool:
         """Whether nothing moved."""
         return not self.moved
 
-    def change(self, half):
+    def change(self, half: str) -> Array:
         """Return the change of a half's blocks, (rows, columns, 3) linear RGB."""
         return self.after.colours[half].blocks - self.before.colours[half].blocks
 
-    def objects(self, half, before=None):
-        """Return the share that each object has of a half's change, the largest first.
+    def objects(self, half: str, before: Array | None = None) -> dict[str, float]:
+        """Return each object's share of a half's change, the largest first.
 
-        ``before`` is the half's picture when the baseline was made; without it, or in another
-        size, changes are known by blocks alone, and shared by what is seen in each.
+        ``before`` is the half's picture when the baseline was made. If it is omitted, or of another
+        size, each block's change is spread evenly over its pixels.
         """
+        if self.seen is None:
+            return {}
         now = getattr(self.pictures, half)
         if before is None or before.shape != now.shape:
             change = luminance(np.abs(self.change(half)))
@@ -71,8 +76,8 @@ class Check:
             spread = luminance(np.abs(now - before))
         return carried(spread, self.seen)
 
-    def p_values(self, half):
-        """Return the least p-value of each block of a half, corrected for all that was tested."""
+    def p_values(self, half: str) -> Array:
+        """Return the smallest corrected p-value of each block of a half."""
         values = np.ones(self.after.colours[half].blocks.shape[:2])
         for move in self.moves:
             if move.half == half and move.block:
@@ -83,7 +88,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Measured:
-    """A scene as it was just measured: with the samples taken, the pictures, and the scene."""
+    """A scene just measured: the measurement, pictures, samples per pixel, and the scene."""
 
     measurement: Measurement
     pictures: Pictures
@@ -91,23 +96,21 @@ class Measured:
     scene: mi.Scene
 
 
-def measure_scene(source, options, passes=PASSES, progress: Callable | None = None):
+def measure_scene(
+    source: Source, options: Options, passes: int = PASSES, progress: Progress | None = None
+) -> Measured:
     """Measure a scene in the current variant.
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    options : comparisons.options.Options
-        What is rendered; ``spp`` is over all passes, and the plan's if omitted.
+    options
+        What is rendered; ``spp`` counts all passes, and is the plan's if omitted.
     passes
         Independent passes.
     progress
         See :func:`comparisons.compare.compare`.
-
-    Returns
-    -------
-    Measured
     """
     ready = guarded(source, options)
     spp = options.spp or ready.reference.spp * ready.passes
@@ -117,29 +120,31 @@ def measure_scene(source, options, passes=PASSES, progress: Callable | None = No
     return Measured(found, pictures, spp, ready.scene)
 
 
-def check(source, options, before, level=LEVEL, progress=None):
-    """Measure a scene as it was measured before, and say what moved.
+def check(
+    source: Source,
+    options: Options,
+    before: Measurement,
+    level: float = LEVEL,
+    progress: Progress | None = None,
+) -> Check:
+    """Measure a scene as before, and return what moved.
 
     Parameters
     ----------
     source, options, progress
-        See :func:`measure_scene`; ``options`` are the baseline's. With its seed, what did
-        not change gives the same images on the same machine; with another one the test holds, too.
-    before : Measurement
-        The baseline's; metrics that it does not know are not tested.
+        See :func:`measure_scene`; ``options`` are the baseline's. With its seed, an unchanged scene
+        gives the same images on the same machine; the test also holds for other seeds.
+    before
+        The baseline's measurement; metrics that it lacks are not tested.
     level
-        Chance of an alarm though nothing changed, over all quantities of this scene.
-
-    Returns
-    -------
-    Check
+        Chance of a false alarm, over all quantities of this scene.
     """
     now = measure_scene(source, options, before.passes, progress)
     after = now.measurement.of(before.metrics)
     shapes = [m.colours["reference"].blocks.shape for m in (before, after)]
     if shapes[0] != shapes[1]:
         raise InputError(
-            f"{source.name}: the baseline has {shapes[0][0]} by {shapes[0][1]} blocks, and the"
+            f"{source.name}: the baseline has {shapes[0][0]} by {shapes[0][1]} blocks, but the"
             f" scene {shapes[1][0]} by {shapes[1][1]}. Write it again with --update."
         )
     moves = differences(before, after)
@@ -148,8 +153,8 @@ def check(source, options, before, level=LEVEL, progress=None):
     return Check(before, now.measurement, moves, found, level, now.pictures, objects)
 
 
-def made_small(case):
-    """Return a case whose film is reduced to `LONGEST`, unless it asks for a resolution."""
+def made_small(case: Case) -> Case:
+    """Return a case with its film reduced to `LONGEST`, unless it sets a resolution."""
     if case.request.resolution is not None:
         return case
     sides = film_size(case.source.parse(), case.options.sensor)

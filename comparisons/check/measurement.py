@@ -1,7 +1,7 @@
-"""What a check measures of a scene: the departure and regional colours, each with its uncertainty.
+"""Measure the departure and the regional colours of a scene, each with its uncertainty.
 
-Both halves are rendered in independent passes, as a comparison does. The spread of passes is the
-only source of the standard errors here, so that they hold whatever noise a scene has.
+Both halves are rendered in independent passes, as in a comparison. All standard errors come from
+the spread of the passes, so they hold for any kind of noise.
 """
 
 from __future__ import annotations
@@ -10,19 +10,21 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from comparisons.compare import Prepared
 from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
 from comparisons.records import Amount, Record
-from reference.rendering.passes import passes
+from reference.rendering.passes import Progress, passes
 
 PASSES = 16
-"""Enough for a t-test corrected for a hundred quantities to see five standard errors."""
+"""Enough for a t-test, corrected for a hundred quantities, to detect five standard errors."""
 
 GRID = 4
-"""Blocks along each side of the image: few enough to be read, small enough to tell places apart."""
+"""Blocks along each side of the image: few enough to read, small enough to locate a change."""
 
 HALVES = ("heuristic", "reference")
 
@@ -30,24 +32,24 @@ LINEAR_ROUNDING = 1e-6
 
 
 def rounding(metric: str) -> float:
-    """Return the difference of a metric that rounding can make; ``KeyError`` for no metric."""
+    """Return the difference that rounding can make in a metric; ``KeyError`` for other names."""
     return RATIO.rounding if metric == RATIO.name else METRICS[metric].rounding
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number that was measured.
+    """One measured number.
 
     Attributes
     ----------
     name
-        Of a metric, or ``heuristic R`` and the like; of a block with its row and column, from 1.
+        A metric's name, or ``heuristic R`` and the like; for a block with row and column, from 1.
     value, error
         The number, and its standard error.
     rounding
-        Difference that rounding can make.
+        The difference that rounding can make.
     half, block
-        Where a colour was measured: the half, and ``(row, column)`` from 0 if not all over it.
+        Where a colour was measured: the half, and the block's ``(row, column)`` from 0.
     """
 
     name: str
@@ -59,7 +61,7 @@ class Quantity:
 
 
 class Metric(Record, omit_defaults=True):
-    """A departure metric, its standard error, and what noise alone would give.
+    """A departure metric, its standard error, and its value from noise alone.
 
     ``noise_floor`` is None for the signed ratio of luminances, which noise does not raise.
     """
@@ -81,18 +83,18 @@ class Colours:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All that was measured of a scene in ``passes`` independent passes."""
+    """All measurements of a scene, from ``passes`` independent passes."""
 
     passes: int
     metrics: dict[str, Metric]
     colours: dict[str, Colours]
 
     def of(self, metrics: Iterable[str]) -> Measurement:
-        """Return the measurement with these metrics alone."""
+        """Return the measurement with only these metrics."""
         return replace(self, metrics={name: self.metrics[name] for name in metrics})
 
     def quantities(self) -> Iterator[Quantity]:
-        """All numbers, one by one: metrics, whole images, blocks."""
+        """Yield all numbers: metrics, then whole images, then blocks."""
         for name, metric in self.metrics.items():
             yield Quantity(name, metric.value, metric.error, rounding(name))
         for half, colours in self.colours.items():
@@ -119,19 +121,21 @@ class Pictures:
     reference: Array
 
 
-def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pictures]:
-    """Render both halves of a prepared scene, and measure.
+def measure(
+    ready: Prepared, seed: int, count: int, viewing: Viewing, progress: Progress | None = None
+) -> tuple[Measurement, Pictures]:
+    """Render both halves of a prepared scene, and measure them.
 
     Parameters
     ----------
-    ready : comparisons.compare.Prepared
-        The scene; its renderers say how many samples a pass has.
+    ready
+        The scene; its renderers hold the samples per pixel of a pass.
     seed
-        Of the run; each pass hashes its own from it (`pass_seed`).
+        Seed of the run; each pass hashes its own from it (`pass_seed`).
     count
         Independent passes, 2 or more.
     viewing
-        How linear values are looked at.
+        Viewing conditions.
     progress
         See :func:`comparisons.compare.compare`.
     """
@@ -144,23 +148,23 @@ def measure(ready, seed, count, viewing, progress=None) -> tuple[Measurement, Pi
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     """Measure passes (n, 2, H, W, 3) of the heuristic half and the reference.
 
-    Metrics are those of the mean images over the pixels of ``counted`` (H, W), with the jackknife's
-    standard error: they are not linear, and the mean of ``n`` passes has less noise in it than each
-    of them, so that only as many passes of as many samples compare with each other.
+    Metrics compare the mean images over the pixels of ``counted`` (H, W); their standard errors are
+    the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with
+    equal numbers of passes and samples.
     """
     metrics = _metrics(images, counted, viewing)
     colours = {half: _colours(images[:, index]) for index, half in enumerate(HALVES)}
     return Measurement(len(images), metrics, colours)
 
 
-def _metrics(images, counted, viewing):
-    """Metrics over the counted pixels, each with the jackknife's error over passes."""
+def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metric]:
+    """Return metrics over the counted pixels, with the jackknife's error over passes."""
     if not counted.any():
         return {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
     count, total = len(images), images.sum(axis=0)
-    values = _departure(*(total / count), counted, viewing)
+    values = _departure(total / count, counted, viewing)
     errors = jackknife_error(
-        [_departure(*((total - one) / (count - 1)), counted, viewing) for one in images]
+        [_departure((total - one) / (count - 1), counted, viewing) for one in images]
     )
     floors = _floors(images, counted, viewing)
     return {
@@ -169,8 +173,9 @@ def _metrics(images, counted, viewing):
     }
 
 
-def _departure(test, reference, counted, viewing):
-    """The means of all metrics, and last of the ratio."""
+def _departure(pair: Array, counted: Array, viewing: Viewing) -> tuple[float, ...]:
+    """Return the means of all metrics, and last of the ratio."""
+    test, reference = pair
     means = [
         metric.mean(metric.against(reference, counted, viewing)(test))
         for metric in METRICS.values()
@@ -178,7 +183,7 @@ def _departure(test, reference, counted, viewing):
     return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
 
 
-def _floors(images, counted, viewing):
+def _floors(images: Array, counted: Array, viewing: Viewing) -> dict[str, float]:
     signs = np.where(np.arange(len(images)) % 2, -1.0, 1.0)
     noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / len(images)
     reference = images[:, 1].mean(axis=0)
@@ -188,20 +193,20 @@ def _floors(images, counted, viewing):
     }
 
 
-def _colours(images):
-    """Colours of the passes (n, H, W, 3) of one half."""
+def _colours(images: Array) -> Colours:
+    """Return the colours of the passes (n, H, W, 3) of one half."""
     whole, blocks = images.mean(axis=(1, 2)), block_means(images)
     return Colours(*_estimate(whole), *_estimate(blocks))
 
 
-def _estimate(passes):
+def _estimate(passes: Array) -> tuple[Array, Array]:
     return passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
 
 
 def block_means(images: Array) -> Array:
-    """Means over `GRID` by `GRID` blocks, (..., rows, columns, 3), of images (..., H, W, 3).
+    """Return means over `GRID` by `GRID` blocks, (..., rows, columns, 3), of images (..., H, W, 3).
 
-    Sizes that do not divide give blocks that differ by a pixel; a smaller image has fewer blocks.
+    Blocks may differ by a pixel in size; a smaller image has fewer blocks.
     """
     for axis in (-3, -2):
         edges = block_edges(images.shape[axis])
@@ -210,7 +215,7 @@ def block_means(images: Array) -> Array:
     return images
 
 
-def block_edges(side: int) -> Array:
-    """First pixel of each block along a side, and the side itself."""
+def block_edges(side: int) -> NDArray[np.int_]:
+    """Return the first pixel of each block along a side, and the side itself."""
     count = min(GRID, side)
     return np.arange(count + 1) * side // count

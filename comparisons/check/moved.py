@@ -1,7 +1,7 @@
-"""Which numbers moved by more than both sides' uncertainty: Welch's t-test, many at a time.
+"""Find the numbers that moved by more than both sides' uncertainty: Welch's t-test, many at once.
 
-Before and after are independent measurements, or share random numbers where they have one seed;
-the second only makes the difference of unchanged things smaller than the test allows for.
+Before and after are independent measurements. If they share a seed, unchanged numbers differ by
+even less than the test allows for.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.check.measurement import Measurement
 from comparisons.records import Amount, Record, Share
 
 LEVEL = 0.01
-"""Chance of an alarm though nothing changed, over all that one check tests."""
+"""Chance of a false alarm, over all quantities that one check tests."""
 
 RELATIVE_ROUNDING = 1e-5
 """Share of a value that rounding can change: other machines order float32 sums otherwise."""
@@ -30,13 +31,13 @@ class Move(Record):
     quantity, half, block
         See :class:`comparisons.check.measurement.Quantity`; row and column count from 1.
     before, after
-        What was measured then and now.
+        The values then and now.
     error
-        Standard error of the difference, of both sides.
+        Standard error of the difference.
     standard_errors
-        The difference over that error, signed; None where neither side has any spread.
+        The signed difference over that error; None if neither side has any spread.
     p
-        Chance of a difference as large as this one, or larger, though nothing changed.
+        Chance of a difference at least this large if nothing changed.
     p_corrected
         Chance of one such among all quantities tested (Šidák).
     """
@@ -60,22 +61,21 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
         t = (x₂ − x₁) / √(e₁² + e₂²)
         ν = (n − 1) (e₁² + e₂²)² / (e₁⁴ + e₂⁴)
 
-    with standard errors e over n passes on either side (Welch 1947; Satterthwaite 1946). A
-    difference within rounding has p = 1; a larger one where neither side has any spread, p = 0.
-    Šidák's correction takes the quantities as independent: they are not quite, which makes alarms
-    rarer.
+    with standard errors e over n passes on each side (Welch 1947; Satterthwaite 1946). A difference
+    within rounding has p = 1. A larger one has p = 0 if neither side has any spread. Šidák's
+    correction treats the quantities as independent; they nearly are, and alarms get rarer.
 
     Raises
     ------
     ValueError
-        For measurements of other quantities, or of more passes on one side: Welch's test is then
-        not right in the far tails, which a correction for many tests needs.
+        For measurements of different quantities, or with different numbers of passes: Welch's test
+        is then wrong in the far tails, which a correction for many tests needs.
     """
     from scipy.stats import ttest_ind_from_stats
 
     pairs = list(zip(before.quantities(), after.quantities(), strict=True))
     if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
-        raise ValueError("measurements of other passes or quantities cannot be compared")
+        raise ValueError("measurements with different passes or quantities cannot be compared")
     count = before.passes
     x = np.array([[old.value, new.value] for old, new in pairs])
     errors = np.array([[old.error, new.error] for old, new in pairs])
@@ -105,26 +105,26 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     )
 
 
-def sidak(p, tests):
-    """Return the chance of a p-value as small as `p` among so many independent tests."""
+def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
+    """Return the chance of a p-value as small as `p` among this many independent tests."""
     with np.errstate(divide="ignore"):  # p = 1
         return -np.expm1(tests * np.log1p(-np.asarray(p, float)))
 
 
 def level_of_each(level: float, checks: int) -> float:
-    """The significance of each of several checks that gives all of them together `level`."""
+    """Return the level of each of several checks, so that together they have `level`."""
     return float(-np.expm1(np.log1p(-level) / checks))
 
 
 def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
-    """Return those that moved: metrics first, then whole images, then blocks, surest first.
+    """Return those that moved: metrics, then whole images, then blocks, smallest p first.
 
-    Where neither side has any spread, the largest difference comes first.
+    Equal ones are in order of their difference, the largest first.
     """
     found = [move for move in moves if not move.p_corrected >= level]  # a NaN does not pass
     return sorted(found, key=_order)
 
 
-def _order(move):
+def _order(move: Move) -> tuple[int, float, float]:
     part = (move.half is not None) + (move.block is not None)
     return part, move.p, -abs(move.after - move.before)

@@ -1,7 +1,4 @@
-"""The cheapest method whose error stays within a tolerance, out of those measured."""
-
-from collections.abc import Callable
-from typing import Any
+"""Choose the cheapest measured method whose error stays within a tolerance."""
 
 from comparisons.cost.climbing import climb
 from comparisons.cost.cost_record import LeftOut, Measured
@@ -13,18 +10,19 @@ from comparisons.options import Options
 from comparisons.records import VERSION, Amount, Positive, Record, Resolution
 from heuristic.errors import unknown
 from reference.rendering.gbuffer import image_size
+from reference.rendering.passes import Progress
 from reference.scene.source import Source
 
 
 class Offer(Record):
-    """A method at one sample count, what it takes and what it leaves.
+    """A method at one sample count, with its time and error.
 
     Attributes
     ----------
     method, spp
         Name of the rung, and samples per pixel.
     seconds, prepare_s
-        Median for one image, and what the heuristic took once to prepare the scene.
+        Median for one image, and what preparing the scene took once.
     error, error_stderr
         The metric's mean, and its standard error over the rounds.
     """
@@ -43,13 +41,13 @@ class Choice(Record, kw_only=True):
     Attributes
     ----------
     metric, within
-        Name of the metric, and the most that its mean may be.
+        Name of the metric, and the largest allowed mean.
     chosen
-        The cheapest that stays within; None where none does.
+        The cheapest within the tolerance; None if there is none.
     best
-        The one of the least error.
+        The one with the smallest error.
     full
-        The full plan with the fewest samples that stay within, or else with the most.
+        The full plan with the fewest samples within the tolerance, else with the most samples.
     left_out
         Methods that the scene cannot have.
     """
@@ -71,14 +69,14 @@ def choose(
     options: Options | None = None,
     effort: Effort | None = None,
     metric: str = "dE2000",
-    progress: Callable[..., Any] | None = None,
+    progress: Progress | None = None,
 ) -> Choice:
     """Measure the ladder of a scene, in the current variant, and choose from it.
 
     Raises
     ------
     InputError
-        For a metric that is not known, and as :func:`comparisons.cost.climbing.climb`.
+        For an unknown metric, and as :func:`comparisons.cost.climbing.climb` does.
     """
     if metric not in METRICS:
         raise unknown("metric", metric, METRICS)
@@ -92,7 +90,7 @@ def choose(
         resolution=image_size(found.ready.scene),
         metric=metric,
         within=within,
-        chosen=chosen and _offer(chosen),
+        chosen=_offer(chosen) if chosen else None,
         best=_offer(min(found.measured, key=lambda point: (point.error, point.seconds.median))),
         full=_offer(cheapest(of_full, within) or max(of_full, key=lambda point: point.spp)),
         left_out=tuple(LeftOut(*pair) for pair in found.methods.left_out.items()),

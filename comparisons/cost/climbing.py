@@ -1,9 +1,8 @@
 """The ladder of one scene, timed and judged against a converged reference."""
 
 import gc
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +11,11 @@ from comparisons.cost.cost_record import Measured
 from comparisons.cost.effort import WIDTH, Effort, reduced
 from comparisons.cost.judging import Judge, converged
 from comparisons.cost.methods import Methods
-from comparisons.cost.timing import measure
+from comparisons.cost.timing import Key, measure
 from comparisons.departure.metric import Metric
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
+from reference.rendering.passes import Progress
 from reference.rendering.sums import Estimate
 from reference.scene.source import Source
 
@@ -27,17 +27,17 @@ class Climbed:
     Attributes
     ----------
     options, effort
-        As rendered.
+        Those used.
     ready
         The scene, paired, planned and guarded.
     methods
         The ladder.
     reference, groups
-        What errors are told against, and the means (R, H, W, 3) of its passes in groups.
+        The converged reference, and the means (R, H, W, 3) of groups of its passes.
     judge
-        What told the errors.
+        What measured the errors.
     measured, images
-        Of :func:`comparisons.cost.timing.measure`.
+        See :func:`comparisons.cost.timing.measure`.
     """
 
     options: Options
@@ -48,27 +48,27 @@ class Climbed:
     groups: np.ndarray
     judge: Judge
     measured: tuple[Measured, ...]
-    images: Mapping[tuple[str, int], np.ndarray]
+    images: Mapping[Key, np.ndarray]
 
 
 def climb(
     source: Source,
     options: Options,
     effort: Effort,
-    progress: Callable[..., Any],
+    progress: Progress,
     metric: Metric = LEADING,
     at: tuple[int, int] | None = None,
 ) -> Climbed:
     """Time and judge every method of a scene's ladder, in the current variant.
 
-    Without a resolution, the film's own is reduced to :data:`comparisons.cost.effort.WIDTH`;
-    ``options.spp`` are the most samples of a Monte Carlo rung. ``metric`` tells errors; without a
-    resolution, the one rendered has the shape of ``at``.
+    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
+    :data:`comparisons.cost.effort.WIDTH`. ``options.spp`` is the largest sample count of a Monte
+    Carlo rung. Errors are means of ``metric``.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface.
+        When the scene cannot be read or paired, or none of its pixels sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -86,14 +86,16 @@ def climb(
     return Climbed(options, effort, ready, methods, reference, groups, judge, measured, images)
 
 
-def _measured(methods, effort, judge, seed, progress):
-    """Time and judge the rungs; their scenes are released, since they slow what follows."""
+def _measured(
+    methods: Methods, effort: Effort, judge: Judge, seed: int, progress: Progress
+) -> tuple[tuple[Measured, ...], dict[Key, np.ndarray]]:
+    """Time and judge the rungs, then release their scenes, which would slow later work."""
     renderers = {
         (rung.name, spp): methods.renderer(rung.method, spp)
         for rung in methods.rungs
         for spp in (effort.counts if rung.monte_carlo else effort.deterministic)
     }
-    gc.collect()  # scenes that pairing left behind
+    gc.collect()  # release scenes that pairing left behind
     measured = measure(renderers, judge, effort.rounds, seed, progress)
     methods.forget()
     return measured

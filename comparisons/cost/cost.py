@@ -1,19 +1,31 @@
-"""What accuracy costs on one scene: the whole study."""
+"""Study what accuracy costs on one scene."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from msgspec import structs
 
 from comparisons import record
-from comparisons.cost.climbing import climb
-from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures, Rung, Split
+from comparisons.cost.climbing import Climbed, climb
+from comparisons.cost.cost_record import (
+    Converged,
+    Cost,
+    LeftOut,
+    Measured,
+    Pictures,
+    Prediction,
+    Prices,
+    Rung,
+    Split,
+)
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.judging import judged
 from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
-from comparisons.cost.prediction.target import require
+from comparisons.cost.prediction.target import Size, require
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -21,18 +33,20 @@ from comparisons.effects.split import split
 from comparisons.options import Options
 from comparisons.records import Machine, Pixels
 from reference.rendering.gbuffer import image_size
+from reference.rendering.passes import Progress
+from reference.scene.source import Source
 
 
 @dataclass(frozen=True)
 class Study:
-    """What a study returns: its record, ``cost.json``, and images by name.
+    """Results of a study: its record, ``cost.json``, and its images.
 
     Attributes
     ----------
     record
-        What the files, tables and charts tell.
+        The contents of files, tables and charts.
     rungs
-        ``{rung name: (H, W, 3)}``, of the most samples.
+        ``{rung name: (H, W, 3)}``, with the most samples.
     parts
         ``{part: (H, W, 3)}``, signed and linear.
     difference
@@ -40,22 +54,22 @@ class Study:
     effects
         ``{effect: (H, W)}``: the ΔE2000 that it removes.
     error
-        (H, W): the kernel's ΔE2000, which those of the effects and what is left add up to.
+        (H, W): the kernel's ΔE2000, the sum of ``effects`` and ``left``.
     left
-        (H, W): the ΔE2000 that is left where all effects are simulated.
+        (H, W): the ΔE2000 that remains when all effects are simulated.
     reference
         (H, W, 3).
     counted
         (H, W): the pixels that count.
     previews
-        ``{effects that are simulated: (f H, f W, 3)}``, of every corner of the lattice, linear.
+        ``{simulated effects: (f H, f W, 3)}`` for every corner of the lattice, linear.
     """
 
     record: Cost
-    rungs: dict
-    parts: dict
+    rungs: dict[str, np.ndarray]
+    parts: dict[str, np.ndarray]
     difference: np.ndarray
-    effects: dict
+    effects: dict[str, np.ndarray]
     error: np.ndarray
     left: np.ndarray
     reference: np.ndarray
@@ -64,37 +78,33 @@ class Study:
 
 
 def cost(
-    source,
-    options=None,
-    effort=None,
-    progress=None,
-    command="",
-    at=None,
-    is_measured=False,
-):
+    source: Source,
+    options: Options | None = None,
+    effort: Effort | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+    at: Size | None = None,
+    is_measured: bool = False,
+) -> Study:
     """Study what accuracy costs on one scene, in the current variant.
 
     Parameters
     ----------
     source, options, progress, command
-        As of :func:`comparisons.compare.compare`. What an omitted resolution and ``options.spp``
-        mean is said in :func:`comparisons.cost.climbing.climb`.
-    effort : Effort, optional
+        See :func:`comparisons.compare.compare`, and :func:`comparisons.cost.climbing.climb` for an
+        omitted resolution and ``options.spp``.
+    effort
         How much is rendered.
-    at : tuple of int, optional
+    at
         Width and height to predict time and error for (:mod:`comparisons.cost.prediction`).
     is_measured
-        Whether to measure there, too.
-
-    Returns
-    -------
-    Study
+        Whether to measure at that size, too.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface; for a size ``at``
-        that is too small, of another shape than ``options.resolution``, or too large.
+        When the scene cannot be read or paired, or none of its pixels sees a surface; for a size
+        ``at`` that is too small, too large, or of another shape than ``options.resolution``.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -112,8 +122,10 @@ def cost(
     priced = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders)
     *parts, (whole, difference) = split(lattice, counted, options.viewing)
     progress("pricing effects", 1, 1)
-    # It changes the sizes of the scenes' films, and comes last.
-    prediction = _predicted(found, priced.prices, at, is_measured, progress) if at else None
+    # Last, since it changes the sizes of the scenes' films.
+    prediction = (
+        _predicted(found, priced.prices, (width, height), at, is_measured, progress) if at else None
+    )
 
     made = Cost(
         scene=source.name,
@@ -161,29 +173,35 @@ def cost(
     )
 
 
-def _predicted(found, larger, at, is_measured, progress):
-    """Predict what methods cost, and effects, at a size."""
+def _predicted(
+    found: Climbed, larger: Prices, studied: Size, at: Size, is_measured: bool, progress: Progress
+) -> Prediction:
+    """Predict the cost of methods and effects at a size."""
     effort, options, methods = found.effort, found.options, found.methods
-    studied = options.resolution
-    half = tuple(max(side // 2, 1) for side in studied)
+    half = max(studied[0] // 2, 1), max(studied[1] // 2, 1)
     given = found.ready, options.viewing, effort, options.seed, progress
     noiseless = Noiseless(*judged(*given, half, effort.replicates))
-    given = effort.replicates, effort.replicate_spp, options.seed, half
-    lattice = Lattice(options, methods, *given)
+    replicates, spp = effort.replicates, effort.replicate_spp
+    lattice = Lattice(options, methods, replicates, spp, options.seed, half)
     smaller = prices(lattice, noiseless, options.seed, effort.exact_effects, effort.orders).prices
     made = predict(methods, at, effort, options.seed, is_measured, progress)
     return structs.replace(made, prices=at_size(smaller, larger, (half, studied), at))
 
 
-def quick(source, options=None, progress=None, command=""):
-    """Study a scene as :func:`cost` does, in little time: for many scenes in one report."""
+def quick(
+    source: Source,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Study:
+    """Study a scene as :func:`cost` does, but quickly: for many scenes in one report."""
     options = options or Options()
     small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
     return cost(source, small, QUICK, progress, command)
 
 
-def _compared(measured):
-    """Return the points, with the front marked, and what they reach within times and errors."""
+def _compared(measured: Sequence[Measured]) -> dict[str, Any]:
+    """Return the points with the front marked, and the best for given times and errors."""
     front = pareto(measured)
     points = tuple(structs.replace(point, pareto=point in front) for point in measured)
     return {
@@ -193,8 +211,8 @@ def _compared(measured):
     }
 
 
-def _limits(parts, effects):
-    """Return half ranges that hold all pictures; rounding alone does not fill one."""
+def _limits(parts: Iterable[np.ndarray], effects: Iterable[np.ndarray]) -> Pictures:
+    """Return half ranges that hold all pictures, with minima far above rounding."""
     limits = [abs(signed.mean(axis=2)).max() for signed in parts]
     removed = [abs(values).max() for values in effects]
     return Pictures(float(max(1e-3, *limits)), float(max(1.0, *removed, 0.0)))

@@ -27,29 +27,29 @@ Family = Literal["kernel", "phong BSDF", "physical"]
 
 
 class Converged(Record):
-    """The reference that errors are told against."""
+    """The reference with which images are compared."""
 
     integrator: str
-    max_depth: Annotated[int, Meta(description="As Mitsuba counts; -1 is no limit.", ge=-1)]
+    max_depth: Annotated[int, Meta(description="As Mitsuba counts; -1 is unlimited.", ge=-1)]
     spp: Annotated[int, Meta(description="Samples per pixel in all.", ge=2)]
     passes: Annotated[int, Meta(ge=2)]
     noise_floor: Annotated[float, Meta(description="Mean ΔE2000 of its noise alone.", ge=0)]
     mean_variance: Annotated[
-        float, Meta(description="Subtracted from every mean squared error.", ge=0)
+        float, Meta(description="Subtracted from each mean squared error.", ge=0)
     ]
 
 
 class Rung(Record):
-    """A method that the scene tells apart from others."""
+    """A method that differs from all others in this scene."""
 
     name: str
-    names: Annotated[tuple[str, ...], Meta(description="All that it has in this scene.")]
+    names: Annotated[tuple[str, ...], Meta(description="All its names in this scene.")]
     monte_carlo: Annotated[bool, Meta(description="Random beyond the pixel filter.")]
     family: Family
 
 
 class LeftOut(Record):
-    """A method that the scene cannot have, and why not."""
+    """A method that the scene does not allow, and why."""
 
     name: str
     reason: str
@@ -59,8 +59,8 @@ class Interval(Record):
     """The median of repeats, their quartiles, and an interval for the median.
 
     ``low`` and ``high`` are order statistics; ``level`` is the chance that they hold the true
-    median, whatever the distribution. With fewer than six repeats not even the extremes reach 95 %,
-    and ``level`` says what they do reach.
+    median, for any distribution. With fewer than six repeats even the extremes do not reach 95 %;
+    ``level`` is the chance that they do reach.
     """
 
     median: Positive
@@ -80,15 +80,15 @@ class Measured(Record):
     rung, spp
         Name of the rung, and samples per pixel as rendered.
     first_s, compile_s
-        Time of the first run, and what LLVM took of it.
+        Time of the first run, and LLVM's part of it.
     prepare_s
-        Of the first run, what the heuristic took to prepare the scene; 0 where it prepares nothing.
+        The heuristic's part of the first run, for preparing the scene; 0 if it prepares nothing.
     seconds
-        Of the rounds.
+        Times of the rounds.
     error, error_stderr
-        Mean ΔE2000 of one rendering, mean over rounds, and its standard error.
+        Mean ΔE2000 of one rendering, averaged over the rounds, and its standard error.
     mse, mse_stderr
-        Linear mean squared error, the reference's variance subtracted.
+        Linear mean squared error less the reference's variance, and its standard error.
     pareto
         Whether it is on the front of time and error (:func:`comparisons.cost.front.pareto`).
     """
@@ -107,14 +107,14 @@ class Measured(Record):
 
 
 class Within(Record):
-    """The best point within a time, None where none is as fast."""
+    """The best point within a time; None if none is as fast."""
 
     seconds: Positive
     best: Measured | None
 
 
 class Range(Record):
-    """A value that was not measured itself, and the ends of its interval."""
+    """A derived value, and the ends of its interval."""
 
     value: Amount
     low: Amount
@@ -124,9 +124,9 @@ class Range(Record):
 class Reached(Record):
     """When a method reaches an error.
 
-    ``seconds`` is None where the error is not reached within the measured counts. It is a bound,
-    ``at_most``, where the fewest samples measured reach it already. Its interval, of about 95 %,
-    holds what times and errors vary by, and ends with the measured counts.
+    ``seconds`` is None if the error is not reached within the measured counts. It is an upper
+    bound, ``at_most``, if the smallest measured count already reaches the error. Its interval, of
+    about 95 %, covers the variation of times and errors, and ends with the measured counts.
     """
 
     method: str
@@ -136,20 +136,20 @@ class Reached(Record):
 
 
 class Price(Record):
-    """What one effect buys and costs.
+    """What simulating one effect buys and costs.
 
     Attributes
     ----------
     effect
         Its label.
     removes
-        Mean ΔE2000 that it removes; negative where it takes the image further away.
+        Mean ΔE2000 that it removes; negative if it increases the departure.
     alone, last
-        The same where it is the first effect to be added, and the last.
+        The same if it is the first effect added, and the last.
     adds_s
         Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
     sampling_error
-        Standard error of ``removes`` from drawing orders, 0 where all subsets were rendered.
+        Standard error of ``removes`` from drawing orders; 0 if all subsets were rendered.
     """
 
     effect: str
@@ -161,9 +161,9 @@ class Price(Record):
 
 
 class Closure(Record):
-    """Mean ΔE2000 that is left where all effects are simulated, without noise, and its interval.
+    """Mean ΔE2000 that remains when all effects are simulated, without noise, and its interval.
 
-    Nothing but a fault can leave anything.
+    Only a fault can leave any.
     """
 
     mean: float
@@ -179,16 +179,17 @@ class Prices(Record):
     effects
         One :class:`Price` each.
     departure
-        Mean ΔE2000 of the heuristic half without noise, which prices and closure add up to.
+        Mean ΔE2000 of the heuristic half without noise: the sum of prices and closure.
     floor
-        Mean ΔE2000 of the reference rendered with as many samples: of noise alone. It is taken out
-        of prices and closure.
+        Mean ΔE2000 of noise alone: of the reference rendered with as many samples. It is removed
+        from prices and closure.
     kernel_s, reference_s
-        Seconds that none of the effects and all of them take.
+        Seconds without any effect, and with all of them.
     spp, replicates, orders
-        Samples per pixel of each replicate, their number, and orders drawn (0: every subset).
+        Samples per pixel of each replicate, number of replicates, and orders drawn (0: every
+        subset).
     corners
-        Every set of effects that was rendered.
+        All sets of effects that were rendered.
     """
 
     effects: tuple[Price, ...]
@@ -203,7 +204,7 @@ class Prices(Record):
 
 
 class Seen(Record):
-    """What was measured where something was predicted: mean ΔE2000, and its spread over rounds."""
+    """Measurements to check a forecast: time, mean ΔE2000, and its spread over rounds."""
 
     seconds: Interval
     error: Amount
@@ -211,7 +212,7 @@ class Seen(Record):
 
 
 class Forecast(Record):
-    """Time of a later frame, and mean ΔE2000, that are predicted of a method and sample count."""
+    """Predicted time of a later frame, and mean ΔE2000, of a method and sample count."""
 
     method: str
     spp: Size
@@ -223,7 +224,7 @@ class Forecast(Record):
 class TimeLaw(Record):
     """A method's time, ``setup_s + pixel_s N + sample_s N s`` for ``N`` pixels of ``s`` samples.
 
-    ``scatter`` is the relative spread of what was measured about it.
+    ``scatter`` is the relative spread of the measurements about it.
     """
 
     method: str
@@ -234,7 +235,7 @@ class TimeLaw(Record):
 
 
 class Cheapest(Record):
-    """The method that is predicted to reach an error first; none where no one does."""
+    """The method predicted to reach an error first; none if no method does."""
 
     error: Positive
     method: str | None = None
@@ -243,7 +244,7 @@ class Cheapest(Record):
 
 
 class AskedPrice(Record):
-    """What an effect is predicted to remove, in mean ΔE2000, and to add to the time."""
+    """The mean ΔE2000 that an effect is predicted to remove, and the time that it adds."""
 
     effect: str
     removes: Estimated
@@ -251,22 +252,22 @@ class AskedPrice(Record):
 
 
 class Prediction(Record):
-    """What methods cost at a size, predicted from smaller ones.
+    """Costs of methods at a size, predicted from smaller sizes.
 
     Attributes
     ----------
     resolution
-        The size that was asked for.
+        The requested size.
     level
-        Chance of each interval to hold what is measured later.
+        Chance that an interval holds a later measurement.
     fitted
-        The sizes that were measured for it.
+        The sizes measured for it.
     rounds
         Timed repeats of each method, size and sample count.
     laws, forecasts, cheapest
-        One law of time per method, forecasts over the sample counts, and the cheapest ways.
+        One law of time per method, forecasts over the sample counts, and the cheapest methods.
     prices
-        Of the effects, with the samples of the study's own prices.
+        Prices of the effects, with the sample counts of the study's own prices.
     """
 
     resolution: Resolution
@@ -285,13 +286,13 @@ class Part(Record):
     Attributes
     ----------
     name
-        As in the table.
+        Its name in tables.
     mean, mean_stderr
         Signed mean over the counted pixels and channels, linear, and its standard error.
     rms
         Root mean square.
     dE2000
-        Mean ΔE2000 between the two images; those of the parts do not add up.
+        Mean ΔE2000 between the two images; the values of parts do not add up.
     """
 
     name: str
@@ -302,7 +303,7 @@ class Part(Record):
 
 
 class Split(Record):
-    """The departure by causes, which add up in every pixel."""
+    """The departure by causes, which add up at every pixel."""
 
     parts: Annotated[tuple[Part, ...], Meta(description="From the kernel to the reference.")]
     departure: Part
@@ -346,9 +347,9 @@ class Cost(Record, kw_only=True):
     left_out: tuple[LeftOut, ...] = ()
 
     def points_of(self, rung: str) -> tuple[Measured, ...]:
-        """Return the points of a rung, by its name."""
+        """Return the points of a rung."""
         return tuple(point for point in self.points if point.rung == rung)
 
     def reached_by(self, rung: str) -> tuple[Reached, ...]:
-        """Return when a rung reaches which error."""
+        """Return when a rung reaches each error."""
         return tuple(row for row in self.equal_error if row.method == rung)

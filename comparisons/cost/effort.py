@@ -6,14 +6,16 @@ from itertools import takewhile
 
 from comparisons.cost.rungs import DEPTHS
 from comparisons.effects import shapley
+from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.scene.preparation import film_size
+from reference.scene.source import Source
 
 DETERMINISTIC_SPP = (4, 16)
-"""Samples a pixel of rungs without random numbers, which the pixel filter alone needs."""
+"""Samples per pixel of rungs without random numbers; only the pixel filter needs them."""
 
 WIDTH = 128
-"""Pixels: the default width of an image; costs are in proportion to the pixels."""
+"""Default width of an image in pixels; costs are proportional to the number of pixels."""
 
 
 @dataclass(frozen=True)
@@ -25,18 +27,18 @@ class Effort:
     rounds
         Timed repeats of each rung, at least 2. From 6 on the median has a 95 % interval.
     largest
-        Most samples a pixel of the Monte Carlo rungs, which begin at 4 and take powers of 4: at
-        those the sampler stratifies best.
+        Most samples per pixel of the Monte Carlo rungs. Their counts are powers of 4, at which the
+        sampler stratifies best.
     deterministic
-        Samples a pixel of the other rungs.
+        Samples per pixel of the other rungs.
     depths
         Depths of ``path`` that are rungs.
     reference_spp
-        Samples a pixel of each pass of the reference that errors are told against.
+        Samples per pixel of each pass of the converged reference.
     replicates, replicate_spp
-        Replicates of each image for prices and parts, at least 3, and samples a pixel of each.
+        Replicates of each image for prices and parts, at least 3, and samples per pixel of each.
     exact_effects, orders
-        Effects up to which every subset is rendered, and orders drawn where there are more
+        Largest number of effects for which every subset is rendered, and orders drawn for more
         (:func:`comparisons.effects.shapley.shares`).
 
     Raises
@@ -55,12 +57,12 @@ class Effort:
     exact_effects: int = shapley.EXACT_PLAYERS
     orders: int = shapley.ORDERS
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.rounds < 2:
             raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
 
     @property
-    def counts(self):
+    def counts(self) -> tuple[int, ...]:
         """The sample counts of the Monte Carlo rungs."""
         powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
         return tuple(powers) or (self.largest,)
@@ -76,14 +78,14 @@ QUICK = Effort(
     exact_effects=4,
     orders=8,
 )
-"""For many scenes in one report, at :data:`QUICK_WIDTH`: there, tracing takes most of the time, so
-that renderings are few and samples are not spared."""
+"""For many scenes in one report, at :data:`QUICK_WIDTH`. There, tracing takes most of the time, so
+renderings are few, with many samples each."""
 
 QUICK_WIDTH = 48
 
 
-def reduced(source, options, width):
-    """Return the resolution asked for, else the film's own, reduced to a width."""
+def reduced(source: Source, options: Options, width: int) -> tuple[int, int]:
+    """Return the requested resolution, else that of the film, reduced to a width."""
     given = options.resolution or film_size(source.parse(), options.sensor)
     if given[0] <= width:
         return given

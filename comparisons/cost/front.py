@@ -1,9 +1,9 @@
-"""What a set of timed and judged methods says: Pareto front, cheapest, equal time, equal error.
+"""Compare timed and judged methods: Pareto front, cheapest, equal time, equal error.
 
-A point is a method at one sample count: a time in seconds and an error. Equal error is read off
-between two counts of one method only, along the straight line between them in logarithms: its slope
-is −1/2 where the error is noise alone, and flatter towards the method's own bias. Beyond the counts
-nothing is said.
+A point is a method at one sample count, with a time in seconds and an error. Equal error is
+interpolated between two counts of one method, along a straight line in logarithms: its slope is
+−1/2 if the error is noise alone, and flatter near the method's own bias. Nothing is extrapolated
+beyond the counts.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,19 +23,19 @@ SURE = NormalDist().inv_cdf(0.975)
 
 
 class Place(NamedTuple):
-    """Where a curve is: a share of the way, in logarithms, from one of its points to the next."""
+    """A place on a curve: a share of the way, in logarithms, from one point to the next."""
 
     number: int
     share: float
 
     def of(self, values: Sequence[float]) -> float:
-        """Return the value there of positive ones, which belong to the points."""
+        """Return the value there, given positive values at the points."""
         after = values[self.number + 1] if self.share else 1.0
         return values[self.number] ** (1 - self.share) * after**self.share
 
 
 def reached(errors: Sequence[float], error: float) -> Place | None:
-    """Return where errors of one method, its fastest point first, come down to an error."""
+    """Return where the errors of one method, its fastest point first, fall to an error."""
     if errors[0] <= error:
         return Place(0, 0.0)
     for number, (before, after) in enumerate(pairwise(errors)):
@@ -46,13 +46,13 @@ def reached(errors: Sequence[float], error: float) -> Place | None:
 
 
 def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
-    """Return the fastest of those whose error is not larger; of equal ones the most accurate."""
+    """Return the fastest point with at most this error; of equally fast ones the most accurate."""
     allowed = (point for point in points if point.error <= within)
     return min(allowed, key=lambda point: (point.seconds.median, point.error), default=None)
 
 
 def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
-    """Return the points that no other one beats: none is as fast and as good, and better in one."""
+    """Return the points that no other point beats in time or error while matching the other."""
     front, best = [], float("inf")
     for point in sorted(points, key=lambda p: (p.seconds.median, p.error)):
         if point.error < best:
@@ -62,9 +62,9 @@ def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
 
 
 def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> tuple[Within, ...]:
-    """Return the point of least error within each time, where a longer one gives a better one.
+    """Return the point of smallest error within each time, for times that improve it.
 
-    Of equal points it is the fastest; where none is as fast, the longest time says so.
+    Of equal points it is the fastest. Of times that no point meets, the longest is kept.
     """
     rows = [Within(limit, _best(points, limit)) for limit in times]
     too_short = [row for row in rows if row.best is None][-1:]
@@ -72,7 +72,7 @@ def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> 
     return (*too_short, *better)
 
 
-def _best(points, limit):
+def _best(points: Iterable[Measured], limit: float) -> Measured | None:
     within = [point for point in points if point.seconds.median <= limit]
     return min(within, key=lambda p: (p.error, p.seconds.median), default=None)
 
@@ -80,7 +80,7 @@ def _best(points, limit):
 def equal_error(
     points: Sequence[Measured], errors: Sequence[float] = ERRORS
 ) -> tuple[Reached, ...]:
-    """Return when each method reaches each error, methods in the order of the points."""
+    """Return when each method reaches each error, in the order of the points."""
     methods = list(dict.fromkeys(point.rung for point in points))
     return tuple(
         _reached(method, [point for point in points if point.rung == method], error)
@@ -89,8 +89,8 @@ def equal_error(
     )
 
 
-def _reached(method, points, error):
-    """Return when a method reaches an error; sooner and later where its points may be off."""
+def _reached(method: str, points: Iterable[Measured], error: float) -> Reached:
+    """Return when a method reaches an error, with an interval from its points' uncertainty."""
     ordered = sorted(points, key=lambda point: point.seconds.median)
     found = reached([point.error for point in ordered], error)
     if found is None:

@@ -1,7 +1,7 @@
 """The ladder of one scene, from flat shading to the full plan.
 
-What the plan leaves out is struck out of each rung's method first, so that methods
-which the scene cannot tell apart come out equal. They become one, which keeps their names.
+Each rung's method first loses what the plan leaves out. Methods that do not differ in this scene
+then become equal, and are merged; the result keeps all their names.
 """
 
 from collections.abc import Collection, Mapping
@@ -23,9 +23,9 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Distinct:
-    """A method that the scene tells apart, and the rungs that it is.
+    """A method that differs from all others in the scene, and its rungs.
 
-    ``monte_carlo`` tells whether its error falls with the samples by more than the pixel filter.
+    ``monte_carlo`` is whether its error falls with the samples beyond the pixel filter's part.
     """
 
     rungs: tuple[Rung, ...]
@@ -39,32 +39,32 @@ class Distinct:
 
     @property
     def name(self) -> str:
-        """The plainest of the names."""
+        """The plainest name."""
         return self._plainest.name
 
     @property
     def family(self) -> Family:
-        """The family of the rung that gives the name."""
+        """The family of the rung with that name."""
         return self._plainest.family
 
     @property
     def _plainest(self) -> Rung:
-        """Of kernels the first, else the last, such as full plan."""
+        """The first of kernels, else the last, such as full plan."""
         return self.rungs[0 if isinstance(self.method, Kernel) else -1]
 
 
 @dataclass(frozen=True)
 class Scope:
-    """What the scene has, as far as the plan tells.
+    """What the scene has, according to its plan.
 
     Attributes
     ----------
     effects
-        Those that make a difference where they are left out.
+        Effects that make a difference when left out.
     kernel_shadows
-        Whether the heuristic half has shadows of its own.
+        Whether the heuristic half has its own shadows.
     max_depth
-        The scene's own limit of path length; -1 is none.
+        The scene's own limit of path length; -1 is unlimited.
     random
         Whether direct light needs random numbers.
     background
@@ -79,15 +79,15 @@ class Scope:
 
     @property
     def indirect(self) -> frozenset[Effect]:
-        """The effects that a stand-in finds in the heuristic half."""
+        """The effects for which a stand-in has inputs in the heuristic half."""
         return self.effects - (frozenset() if self.background else {ENVIRONMENT})
 
 
 def scope(
     plan: Plan, differences: Collection[Effect], kernel_shadows: bool, background: bool
 ) -> Scope:
-    """Read the :class:`Scope` of a scene off its plan and its halves' differences."""
-    # Where both halves have shadows, a method without them differs from both.
+    """Return the scope of a scene, from its plan and its halves' differences."""
+    # If both halves have shadows, a method without them differs from both.
     shadows = {OCCLUSION} if plan.calls_for(OCCLUSION) else set()
     sampled = {effect for effect in EFFECTS if effect.sampled}
     if plan.tabulate_environment:
@@ -114,7 +114,7 @@ def ladder(
     scope
         What the scene has.
     refusals
-        Why it allows an interpolation or a heuristic not, by their names.
+        Why the scene does not allow an interpolation or heuristic, by name; empty if it does.
     depths
         Depths of ``path`` that are rungs.
     """
@@ -129,7 +129,7 @@ def ladder(
 
 
 def shaded_by(heuristic: Heuristic, distinct: Distinct) -> Distinct:
-    """Return a method; of the kernel, with a name that tells of a heuristic other than Phong."""
+    """Return a method; if a kernel, its name includes a heuristic other than Phong."""
     method = distinct.method
     if heuristic is PHONG or not isinstance(method, Kernel) or method.heuristic:
         return distinct
@@ -139,7 +139,7 @@ def shaded_by(heuristic: Heuristic, distinct: Distinct) -> Distinct:
 
 
 def why_not(rung: Rung, scope: Scope, refusals: Mapping[str, str]) -> str:
-    """Return why a scene cannot have a rung, in words; empty where it can."""
+    """Return why a scene cannot have a rung, in words; empty if it can."""
     if rung.stands_in_for and not rung.stands_in_for & scope.indirect:
         labels = " or ".join(e.label for e in EFFECTS if e in rung.stands_in_for)
         return f"it stands in for {labels}, which the scene does not have"
@@ -153,8 +153,8 @@ def why_not(rung: Rung, scope: Scope, refusals: Mapping[str, str]) -> str:
     return f"the scene's own paths end at depth {scope.max_depth}"
 
 
-def _distinguished(method, scope):
-    """Strike out of a method what the scene does not have."""
+def _distinguished(method: Kernel | Physical, scope: Scope) -> Kernel | Physical:
+    """Remove from a method what the scene does not have."""
     if isinstance(method, Kernel):
         shadows = method.shadows and OCCLUSION in scope.effects
         return replace(method, shadows=shadows or scope.kernel_shadows)
@@ -163,7 +163,7 @@ def _distinguished(method, scope):
     return Physical(without & scope.effects, method.max_depth if is_limited else None)
 
 
-def _is_random(method, scope):
+def _is_random(method: Kernel | Physical, scope: Scope) -> bool:
     if isinstance(method, Kernel):
         return False
     return scope.random or INTERREFLECTION in scope.effects - method.without

@@ -1,4 +1,4 @@
-"""From rungs to renderers: which scene and integrator each method takes."""
+"""Make renderers from rungs: the scene and integrator of each method."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ class Methods:
     Parameters
     ----------
     source, options
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
     ready
         The scene, paired and planned.
     depths
@@ -70,7 +70,7 @@ class Methods:
     def renderer(
         self, method: Kernel | Physical, spp: int, size: tuple[int, int] | None = None
     ) -> Renderer:
-        """Return a renderer of a method, with samples per pixel of a pass, and a size to render."""
+        """Return a renderer of a method, with samples per pixel of a pass, and an image size."""
         if isinstance(method, Kernel):
             with variant(self.heuristic_variant):
                 scene, integrator = self._kernel_scene(method.interpolation), self._kernel(method)
@@ -93,7 +93,7 @@ class Methods:
         return with_sampler(graph, self.ready.plan.sampler).instantiate()
 
     def _kernel(self, method: Kernel) -> mi.Integrator:
-        """Return the integrator alone: a scene of its own would slow all others."""
+        """Return only the integrator: another scene would slow all others."""
         graph = self.pairs.interpolated(method.interpolation).heuristic.copy()
         props = graph.props(graph.nodes(INTEGRATOR)[0])
         props["occlusion"] = method.shadows
@@ -102,7 +102,7 @@ class Methods:
         return graph.instantiate().integrator()
 
     def _refused_interpolations(self) -> dict[str, str]:
-        """Return why shapes or sensor do not allow interpolations: some make no meshes."""
+        """Return why shapes or sensor do not allow interpolations: some cannot be meshes."""
         refused = {}
         for interpolation in Interpolation:
             try:

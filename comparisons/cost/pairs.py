@@ -4,42 +4,46 @@ from dataclasses import replace
 
 import mitsuba as mi
 
+from comparisons.compare import Prepared
+from comparisons.options import Options
 from heuristic.interpolation import Interpolation
+from reference.pairing.halves import Pair
+from reference.scene.source import Source
 
 
 class Pairs:
-    """Derives pairs as they are asked for, in the variant that is current then.
+    """Derives pairs on request, in the variant that is current then.
 
     Parameters
     ----------
     source, options
-        As of :func:`comparisons.compare.compare`.
-    ready : comparisons.compare.Prepared
-        Whose pair is the first.
+        See :func:`comparisons.compare.compare`.
+    ready
+        Its pair is the first.
     """
 
-    def __init__(self, source, options, ready):
+    def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
         self._source, self._options = source, options
         key = ready.reference.variant, options.interpolation, options.tessellation
         self._known = {key: ready.pair}
 
-    def interpolated(self, interpolation):
-        """Return the pair with another interpolation, and meshes as fine as asked for.
+    def interpolated(self, interpolation: Interpolation) -> Pair:
+        """Return the pair with another interpolation, and the requested tessellation.
 
         Raises
         ------
         InputError
-            Where a shape makes no mesh, or flat and Gouraud shading have no viewpoint.
+            When a shape cannot be a mesh, or flat and Gouraud shading have no viewpoint.
         """
         return self._of(interpolation, self._options.tessellation)
 
-    def plain(self):
+    def plain(self) -> Pair:
         """Return the pair with the scene's own geometry."""
         return self._of(Interpolation.PHONG, None)
 
-    def _of(self, interpolation, tessellation):
+    def _of(self, interpolation: Interpolation, tessellation: int | None) -> Pair:
         key = mi.variant(), interpolation, tessellation
         if key not in self._known:
-            changed = {"interpolation": interpolation, "tessellation": tessellation}
-            self._known[key] = replace(self._options, **changed).pair(self._source)
+            changed = replace(self._options, interpolation=interpolation, tessellation=tessellation)
+            self._known[key] = changed.pair(self._source)
         return self._known[key]

@@ -1,14 +1,14 @@
 """The rungs of the ladder, each declared once: here, or from outside the package.
 
-A rung is a name and a method: the heuristic kernel with options, or the plan of a scene with some
-effects left out or paths of limited depth. One from outside stands before the full plan::
+A rung has a name and a method: the heuristic kernel with options, or a scene's plan with effects
+left out or paths of limited depth. Rungs from outside come before the full plan::
 
     from comparisons.cost.rungs import Physical, Rung, declare
     from reference.effects.obstacles import OCCLUSION
 
     declare(Rung("path 2 without shadows", "physical", Physical(frozenset({OCCLUSION}), 2)))
 
-or is named by an installed package as an entry point of the group ``fotismos.rungs``.
+or an installed package names one as an entry point of the group ``fotismos.rungs``.
 """
 
 from dataclasses import dataclass
@@ -26,23 +26,23 @@ DEPTHS = (3, 4, 5)
 """Depths of ``path`` that are rungs, as Mitsuba counts: 2 is direct light."""
 
 Family = Literal["kernel", "phong BSDF", "physical"]
-"""What shades: charts give each family a colour and a shape."""
+"""Kind of shading: charts give each family a colour and a shape."""
 
 BSDF_FORMS = frozenset(effect for effect in EFFECTS if effect.part == "BSDF form")
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """The heuristic kernel, without random numbers but the pixel filter's.
+    """The heuristic kernel; its only random numbers are the pixel filter's.
 
     Attributes
     ----------
     interpolation
-        Of its shading.
+        Interpolation of its shading.
     shadows
         Whether it traces shadow rays.
     heuristic
-        Name of the declaration that shades; empty for the one that the study is of.
+        Name of the declared heuristic that shades; empty for the one under study.
     """
 
     interpolation: Interpolation = Interpolation.PHONG
@@ -52,7 +52,7 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Physical:
-    """Mitsuba's integrators, as the scene's plan has them.
+    """Mitsuba's integrators, as the scene's plan uses them.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Physical:
     Raises
     ------
     InputError
-        When an effect cannot be left out: it takes the kernel, or another image beside this one.
+        When an effect cannot be left out: it needs the kernel, or a second image.
     """
 
     without: frozenset[Effect] = frozenset()
@@ -75,8 +75,7 @@ class Physical:
         for effect in self.without - allowed:
             labels = ", ".join(e.label for e in EFFECTS if e in allowed)
             raise InputError(
-                f"a rung without {effect.label} is not possible: those that can be left out are"
-                f" {labels}."
+                f"a rung without {effect.label} is not possible: leave out some of {labels}."
             )
 
 
@@ -87,14 +86,13 @@ class Rung:
     Attributes
     ----------
     name
-        As tables and charts call it.
+        Its name in tables and charts.
     family
-        What shades.
+        Kind of shading.
     method
         What is simulated.
     stands_in_for
-        Effects of which the scene must have one; others leave the rung out. Empty for a rung of
-        every scene.
+        Effects of which the scene must have at least one; empty for a rung of every scene.
     """
 
     name: str
@@ -122,17 +120,17 @@ STAND_INS = tuple(
         ("ambient occlusion, depth image", "screen-occlusion", frozenset({OCCLUSION})),
     )
 )
-"""What engines use in place of transport, each with shadows and a textbook's lights."""
+"""What engines use instead of transport, each with shadows and a textbook's lights."""
 
 PHONG_BSDF = Rung("phong BSDF, full transport", "phong BSDF", Physical(BSDF_FORMS))
 DIRECT = Rung("direct", "physical", Physical(frozenset({INTERREFLECTION})))
 FULL_PLAN = Rung("full plan", "physical", Physical())
 
 RUNGS: Declared[Rung] = Declared("rung", "fotismos.rungs")
-"""Those of the package, with paths of :data:`DEPTHS`, and those from outside."""
+"""Built-in rungs, with paths of :data:`DEPTHS`, and those from outside."""
 
 declare = RUNGS.declare
-"""Add a rung to the ladder of every scene, in place of one of its name from outside; return it."""
+"""Add a rung to every ladder and return it; it replaces one of the same name from outside."""
 
 
 def rungs(depths: tuple[int, ...] = DEPTHS) -> tuple[Rung, ...]:

@@ -1,19 +1,27 @@
-"""Timing the rungs: in turn, so that a drift of the machine hits all alike.
+"""Time the rungs in turn, so a drift of the machine affects all equally.
 
-What is timed is one rendering of the whole image, evaluated and synchronised. The first run of each
-rung traces and compiles, and stands apart; a second one warms caches; the rounds follow, each with
-a seed of its own, so that their errors are independent as well.
+Each time is of one rendering of the whole image, evaluated and synchronised. The first run of a
+rung traces and compiles, and is reported separately; the second warms caches; the rounds follow,
+each with its own seed, so their errors are independent.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from comparisons import intervals
 from comparisons.cost.cost_record import Interval, Measured
-from reference.rendering.passes import passes
+from comparisons.cost.judging import Judge
+from reference.rendering.passes import Progress, passes
+from reference.rendering.renderer import Renderer
+
+Key = tuple[str, int]
+"""Name of a rung, and samples per pixel."""
 
 
-def interval(values):
-    """Return the :class:`Interval` of at least two repeats."""
+def interval(values: ArrayLike) -> Interval:
+    """Return the interval of at least two repeats."""
     ordered = np.sort(np.asarray(values, float))
     low, high, level = intervals.median_ranks(len(ordered))
     p25, median, p75 = np.percentile(ordered, (25, 50, 75))
@@ -28,30 +36,35 @@ def interval(values):
     )
 
 
-def measure(renderers, judge, rounds, seed, progress):
+def measure(
+    renderers: Mapping[Key, Renderer],
+    judge: Judge,
+    rounds: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[tuple[Measured, ...], dict[Key, np.ndarray]]:
     """Time and judge renderers in turn.
 
     Parameters
     ----------
     renderers
         ``{(name, spp): renderer}``; see :class:`reference.rendering.renderer.Renderer`.
-    judge : comparisons.cost.judging.Judge
-        What tells errors.
+    judge
+        Measures the errors.
     rounds
         Repeats, at least 2.
     seed
-        Of the study; each round hashes its own from it.
-    progress : callable
+        Seed of the study; each round hashes its own from it.
+    progress
         ``progress(stage, done, total)``.
 
     Returns
     -------
-    measured : tuple of Measured
-    images : dict
-        The last round's image (H, W, 3) of each key.
+    measured, images
+        One record per renderer, in order, and the last round's image (H, W, 3) of each key.
     """
-    errors = {key: [] for key in renderers}
-    images = {}
+    errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers}
+    images: dict[Key, np.ndarray] = {}
     loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage="timing")
     for one in loop:
         images = dict(zip(renderers, map(np.array, one.images), strict=True))
@@ -62,7 +75,7 @@ def measure(renderers, judge, rounds, seed, progress):
     return tuple(measured), images
 
 
-def _summarise(key, renderer, errors):
+def _summarise(key: Key, renderer: Renderer, errors: list[tuple[float, float]]) -> Measured:
     means = np.mean(errors, axis=0)
     stderrs = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors))
     return Measured(

@@ -1,4 +1,4 @@
-"""Images by blocks of pixels: sums, neighbourhoods, and values spread over the pixels again."""
+"""Blocks of pixels: sums, neighbourhoods, and values spread over the pixels again."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from reference.rendering.moments import BLOCK
 
 Array = NDArray[np.float64]
 
-#: Rows of pixels worked on at a time, whole blocks, so that temporaries stay small.
+# Rows processed at a time, in whole blocks, to keep temporaries small.
 _ROWS = 32 * BLOCK
 
 
 def bands(height: int) -> Iterator[slice]:
-    """Slices of rows, each of whole blocks but the last."""
+    """Yield slices of rows, all but the last of whole blocks."""
     return (slice(start, min(start + _ROWS, height)) for start in range(0, height, _ROWS))
 
 
 def block_sums(image: Array) -> Array:
-    """Sums (h, w, ...) over the blocks of an image (H, W, ...); the last ones may be smaller."""
+    """Return block sums (h, w, ...) of an image (H, W, ...); edge blocks may be smaller."""
     for axis in (0, 1):
         image = np.add.reduceat(image, np.arange(0, image.shape[axis], BLOCK), axis=axis)
     return image
 
 
 def neighbourhood(values: Array, first: int = 0) -> Array:
-    """Sums of blocks (h, w, ...) and the eight around each; `first` is the axis of the rows."""
+    """Return sums of each block (h, w, ...) and its eight neighbours; `first` is the row axis."""
     around = [(0, 0)] * values.ndim
     around[first] = around[first + 1] = (1, 1)
     padded = np.pad(values, around)
@@ -37,11 +37,11 @@ def neighbourhood(values: Array, first: int = 0) -> Array:
 
 
 def spread_out(values: NDArray, shape: tuple[int, ...]) -> NDArray:
-    """Give each pixel of an image of this shape (H, W, ...) the value (h, w, ...) of its block."""
+    """Return an image of this shape (H, W, ...) with each block's value (h, w, ...)."""
     return values.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[: shape[0], : shape[1]]
 
 
 def ratio(above: Array, below: Array) -> Array:
-    """``above / below``, 0 where ``below`` is not positive."""
+    """Return ``above / below``, 0 where ``below`` is not positive."""
     above, below = np.broadcast_arrays(above, below)
     return np.divide(above, below, out=np.zeros(above.shape), where=below > 0.0)

@@ -1,32 +1,33 @@
-"""What a metric would be without noise: its mean and its visible shares, each with an interval.
+"""Estimate a metric without noise: its mean and its visible shares, each with an interval.
 
-A distance is never negative, so that noise raises it: near zero by as much as the root of the
-noise's variance, far from it by as much as the variance itself. Both follow from one rule, by
-adding the noise once more. Over a block of pixels let ``f0`` be the mean distance as measured and
-``f1`` that after noise of the same distribution is added to the reference; then ::
+A distance is never negative, so noise raises it: near zero in proportion to the root of the noise's
+variance, far from zero to the variance itself. One rule covers both: add the noise once more. Over
+a block of pixels, let ``f0`` be the mean distance as measured, and ``f1`` the mean after noise of
+the same distribution is added to the reference. Then ::
 
     f² (debiased) = f0² − (f1² − f0²)
 
-where the distance is the noise alone ``f1 = √2 f0`` and nothing is left; where it is far larger the
-squares grow in proportion to the variance. It is the simulation and extrapolation of Cook and
-Stefanski (J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. Where noise moves
-colours along one line, to and fro through the truth, this takes off too much. The same formula with
-the means of squared distances is right there, where the pixels of a block depart alike, and takes
-off too little where they do not; so does taking off nothing. The estimate is the middle of the two,
-and half of what lies between them is added to its interval; so is a part of the noise, `CURVATURE`,
-since colour spaces are curved. Where the standard error is more than a third of the values, skewed
-noise shifts the very mean of the colours, and the interval does not hold.
+If the distance is noise alone, ``f1 = √2 f0`` and nothing remains; if it is far larger, the squares
+grow in proportion to the variance. This is the simulation and extrapolation of Cook and Stefanski
+(J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. Where noise moves colours along
+one line, back and forth through the truth, it subtracts too much. The same formula with means of
+squared distances is right there if the pixels of a block depart alike; otherwise it subtracts too
+little, as does no correction. The estimate is the middle of the two. Half of their difference is
+added to its interval, and so is a part of the noise, `CURVATURE`, since colour spaces are curved.
+Where the standard error is more than a third of the values, skewed noise shifts even the mean of
+the colours, and the interval does not hold.
 
-Blocks, since their distances differ; a block's square may come out negative, and its root then
-counts as negative, so that little bias is left in the mean of many. The added noise is a contrast
-of the groups of passes: weights that add up to 0 and give it the variance of the mean.
+The rule applies to each block, since distances differ among blocks. A block's square may be
+negative, and its root then counts as negative, which leaves little bias in the mean of many. The
+added noise is a contrast of the groups of passes: weights that add up to 0 and give it the variance
+of the mean.
 
-The intervals are Student's, by the jackknife over the groups of passes. Where groups are too few,
-or the metric looks at neighbourhoods, the triangle inequality gives a wider one: a mean distance is
-off by no more than the distance of the reference from the truth, the noise floor.
+The intervals are Student's, by the jackknife over the groups of passes. With too few groups, or for
+a metric of neighbourhoods, the triangle inequality gives a wider one: the error of a mean distance
+is at most the distance of the reference from the truth, the noise floor.
 
-All of it is computed on the blocks that are sampled (`reference.rendering.moments.sample`), at most
-16,384 pixels, and carried over to the image as the bias found there.
+All of it is computed on sampled blocks (`reference.rendering.moments.sample`), at most 16,384
+pixels; the bias found there is applied to the whole image.
 """
 
 from __future__ import annotations
@@ -45,22 +46,22 @@ from reference.rendering.moments import Grouped
 
 Array = NDArray[np.float64]
 
-#: Noise is added in this many independent ways, and what comes of it is averaged.
 CONTRASTS = 3
+"""Noise is added in this many independent ways, and the results are averaged."""
 
-#: Of the square of the noise, for doubt: colour spaces are curved, and noise is not small in them.
 CURVATURE = 0.06
+"""Uncertainty, as a share of the squared noise, from the curvature of colour spaces."""
 
-#: By which a noise floor may be too small, which is itself an estimate.
 MARGIN = 1.25
+"""Factor by which a noise floor, itself an estimate, may be too small."""
 
-#: Groups of passes that a jackknife needs: without one of them two are left to make noise of.
 FEWEST = 3
+"""Fewest groups of passes for a jackknife: without one of them, two remain to make noise from."""
 
 
 @dataclass(frozen=True)
 class Debiased:
-    """A mean without the part of noise, 95 % intervals of it and of the share above thresholds."""
+    """A mean without noise, and 95 % intervals of it and of the shares above thresholds."""
 
     value: float
     low: float
@@ -69,12 +70,12 @@ class Debiased:
 
 
 def exactly(mean: float, visible: dict[str, float]) -> Debiased:
-    """What is measured without noise."""
+    """Return the result of a measurement without noise."""
     return Debiased(mean, mean, mean, {limit: (share, share) for limit, share in visible.items()})
 
 
-def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
-    """From distances (N,) and those that noise alone would give, by the triangle inequality."""
+def roughly(metric: Metric, values: NDArray, noise: NDArray) -> Debiased:
+    """Debias distances (N,), given those from noise alone, by the triangle inequality."""
     mean, floor = metric.mean(values), metric.mean(noise)
     visible = {
         name: (float((values - noise > limit).mean()), float((values + noise > limit).mean()))
@@ -85,10 +86,14 @@ def roughly(metric: Metric, values: Array, noise: Array) -> Debiased:
 
 
 def debiased(
-    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: Array
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: NDArray
 ) -> Debiased | None:
-    """Take the noise out of a metric; None where the groups of passes are too few.
+    """Remove the noise from a metric; None if there are too few groups of passes.
 
+    Parameters
+    ----------
+    metric, viewing
+        The metric and its viewing conditions.
     test
         The test image (H, W, 3), linear.
     grouped
@@ -111,7 +116,7 @@ def debiased(
         for out in range(count)
     ]
     error = np.hypot(jackknife_error(left_out), whole.sampling_error(grouped))
-    # What noise adds is found on the sample, what it is taken from on all pixels.
+    # The bias comes from the sample, the value that it is subtracted from is over all pixels.
     measured, added = _numbers(metric, raw), whole.raw - whole.clean
     half = np.array([student(0.0, float(each), count).high for each in error])
     middle = max(measured[0] - added[0], 0.0)
@@ -125,9 +130,9 @@ def debiased(
 
 
 def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]]:
-    """Join the intervals of two estimates of shares (2 n,): neither extrapolation is right for all.
+    """Join the intervals of two estimates of shares (2 n,), since neither is always right.
 
-    Half of what noise added to the first is taken for doubt of how it goes on below the noise.
+    Half of the noise's part in the first is added, as uncertainty of the extrapolation.
     """
     count = len(found) // 2
     half = half + np.concatenate([added[:count] / 2.0, np.zeros(count)])
@@ -136,8 +141,8 @@ def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]
     return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
 
 
-def _numbers(metric: Metric, distances: Array) -> Array:
-    """The mean, of a linear metric the mean square; and the shares above thresholds, twice."""
+def _numbers(metric: Metric, distances: NDArray) -> Array:
+    """Return the mean (of a linear metric the mean square), and shares above thresholds, twice."""
     first = np.mean(distances**2) if metric.linear else distances.mean()
     shares = [(distances > limit).mean() for limit in metric.visible]
     return np.array([first, *shares, *shares])
@@ -147,11 +152,11 @@ def _numbers(metric: Metric, distances: Array) -> Array:
 class _Extrapolated:
     """`_numbers` as measured and without noise, and what noise adds to the sum of each block.
 
-    ``gap`` is what lies between the two estimates of the mean, ``noise`` the root of what noise
+    ``gap`` is the difference of the two estimates of the mean, ``noise`` the root of what noise
     adds to the mean square of blocks.
 
-    The share above a threshold is extrapolated in two ways: linearly, by what the noise adds when
-    added once more, and with the distances of a block scaled to its mean without noise.
+    The share above a threshold is extrapolated in two ways: linearly, from the change when noise is
+    added once more, and from a block's distances, scaled to its mean without noise.
     """
 
     raw: Array
@@ -198,7 +203,7 @@ class _Extrapolated:
         return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
 
     def sampling_error(self, grouped: Grouped) -> Array:
-        """Standard error of what noise adds, from the blocks that were left out of the sample."""
+        """Return the standard error of what noise adds, due to sampling blocks."""
         pixels = grouped.by_block(np.ones(len(grouped.places)))
         left = self.added - np.outer(pixels, self.added.sum(axis=0) / pixels.sum())
         share = 1.0 - grouped.sampled / grouped.total
@@ -207,15 +212,15 @@ class _Extrapolated:
 
 
 def signed_root(squares: Array) -> Array:
-    """The roots of numbers, negative of negative ones: noise around 0 leaves no bias in a mean."""
+    """Return roots with the sign of their numbers, so noise around 0 leaves no bias in a mean."""
     return np.sign(squares) * np.sqrt(np.abs(squares))
 
 
 def contrasts(sizes: Array) -> Array:
-    """Weights (m, K) of groups of passes that make noise of their means, as large as their mean's.
+    """Return weights (m, K) of groups that make noise from their means, as large as the mean's.
 
-    They are orthogonal to each other, add up to 0, and their squares over the sizes to one over
-    all passes.
+    They are orthogonal to each other and add up to 0; their squares over the sizes add up to one
+    over the number of passes.
     """
     count = len(sizes)
     waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)

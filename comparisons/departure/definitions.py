@@ -1,12 +1,13 @@
-"""The colour differences by colour-science, which defines them.
+"""The colour differences as colour-science defines them.
 
-They take as long as rendering does. The compiled ones (`comparisons.departure.colorimetry`) are
-used in their place; the tests compare the two, and so does ``fotismos doctor``.
+They take as long as rendering does, so the compiled ones (`comparisons.departure.colorimetry`) are
+used instead; the tests and ``fotismos doctor`` compare the two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import colour
 import numpy as np
@@ -23,17 +24,17 @@ from colour.models import (
 from comparisons.departure.metrics import METRICS
 from comparisons.departure.spaces import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
 
-#: Of a colour difference: what the compiled formulas may be away from colour-science's.
 AGREEMENT = 1e-4
+"""Largest allowed deviation of the compiled colour differences from colour-science's."""
 
 
 def lab(rgb: Array, viewing: Viewing) -> Array:
-    """CIE L*a*b* of linear RGB (..., 3) as displayed."""
-    return XYZ_to_Lab(_shown(rgb, viewing, 1.0))
+    """Return CIE L*a*b* of linear RGB (..., 3) as displayed."""
+    return np.asarray(XYZ_to_Lab(_shown(rgb, viewing, 1.0)), float)
 
 
 def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
-    """CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed, up to `white`."""
+    """Return CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed, up to `white`."""
     adapted = 100.0 * RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.sum(axis=1)
     found = XYZ_to_CAM16(
         100.0 * _shown(rgb, viewing, white),
@@ -43,11 +44,12 @@ def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
         VIEWING_CONDITIONS_CAM16["Average"],
         compute_H=False,
     )
-    return JMh_CAM16_to_CAM16UCS(np.stack((found.J, found.M, found.h), axis=-1))
+    correlates = [np.asarray(each, float) for each in (found.J, found.M, found.h)]
+    return JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1))
 
 
 def itp(rgb: Array, viewing: Viewing) -> Array:
-    """720 · (I, T, P) of linear RGB (..., 3)."""
+    """Return 720 · (I, T, P) of linear RGB (..., 3)."""
     matrix = RGB_COLOURSPACE_BT2020.matrix_XYZ_to_RGB @ RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ
     level = viewing.exposure * viewing.white_luminance
     absolute = np.clip(rgb @ (level * matrix).T, 0.0, PQ_PEAK)
@@ -63,7 +65,7 @@ def _distance(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
 
 
-DEFINED: dict[str, tuple[Callable[..., Array], Callable[[Array, Array], Array]]] = {
+DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
     "dE2000": (lab, delta_E_CIE2000),
     "dE_ITP": (itp, _distance),
     "dE_CAM16UCS": (cam16ucs, _distance),
@@ -72,7 +74,7 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[[Array, Array], Array]]]
 
 
 def farthest(count: int = 4096) -> float:
-    """Return how far the compiled differences of random colours are from the defined ones."""
+    """Return the largest deviation of the compiled differences, over random colours."""
     test, reference = np.random.default_rng(0).random((2, count, 3))
     apart = 0.0
     with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):

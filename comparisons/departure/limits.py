@@ -1,31 +1,31 @@
-"""Pixels where the reference itself is at fault, so that they are not booked on the heuristic.
+"""Find pixels where the reference itself is at fault, so the heuristic is not blamed for them.
 
 ================  ===========================================================================
 Limit             Where
 ================  ===========================================================================
-``clamped``       the surface is smoother than Mitsuba computes: ``roughplastic`` takes every
-                  alpha below :data:`SMALLEST_ALPHA` for that
-``terminator``    the shading normal and the geometric one disagree on which side a light or
-                  the viewer is; one of the two renders black what the other lights
+``clamped``       the surface is smoother than Mitsuba allows: ``roughplastic`` raises every
+                  smaller alpha to :data:`SMALLEST_ALPHA`
+``terminator``    shading normal and geometric normal disagree on which side a light or the
+                  viewer is: one half renders black what the other lights
 ``energy_loss``   the surface loses more than :data:`LOST` of the light that it should reflect:
-                  ``roughplastic`` follows light through one reflection alone
-``fireflies``     a few samples carry the estimate: its standard error is more than
-                  :data:`FIREFLY_SHARE` of it, and far above that of the pixels around it
+                  ``roughplastic`` follows light through only one reflection
+``fireflies``     a few samples dominate the estimate: its standard error exceeds
+                  :data:`FIREFLY_SHARE` of it, and far exceeds that of nearby pixels
 ================  ===========================================================================
 
 Masks may overlap. `find` is a function of plain arrays; `of_scene` collects them.
 
-Of which lights the normals may disagree is geometry alone. Points, spots and directional lights
-have one direction. An area light is taken for :data:`LIGHT_GRID` squared points of each of its
-shapes, edges and corners among them, and one is enough; what may fall between them is so near the
-shading normal's horizon that it is dark. Under an environment, which has all
-directions, the normals' hemispheres always differ by a wedge, as soon as the normals do: of light
-from all sides alike it is the share ``(1 - N.N_g) / 2`` of the irradiance, which is lost, and
-counts from :data:`WEDGE_LOST` on.
+For which lights the normals disagree depends on geometry alone. Points, spots and directional
+lights have one direction. An area light is sampled at :data:`LIGHT_GRID` squared points of each of
+its shapes, with edges and corners; one point is enough. Light that falls between them is so near
+the shading normal's horizon that it is dark. Under an environment, the hemispheres of unequal
+normals always differ by a wedge. Under uniform light, it loses the share ``(1 - N.N_g) / 2`` of the
+irradiance, and counts from :data:`WEDGE_LOST` on.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -33,13 +33,14 @@ import numpy as np
 
 from comparisons.departure.blocks import bands
 from comparisons.records import Count, Record
+from heuristic.arrays import Scene, Shape
 from heuristic.plugins.mapped import SMALLEST_ALPHA
 from reference.pairing.albedo import RoughPlastic, of_roughplastic, prepare
 
 LOST = 0.05
 """Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
 WEDGE_LOST = 0.01
-"""That of normals 11.5 degrees apart."""
+"""The share lost by normals 11.5 degrees apart."""
 LIGHT_GRID = 5
 FIREFLY_SHARE = 0.5
 FIREFLY_CONTRAST = 8.0
@@ -47,7 +48,7 @@ NEIGHBOURHOOD = 5
 
 
 class LimitCounts(Record):
-    """Counted pixels where the reference itself is at fault, by limit; they may overlap."""
+    """Counted pixels where the reference itself is at fault, by limit; limits may overlap."""
 
     clamped: Count
     terminator: Count
@@ -66,11 +67,11 @@ class Limits:
     fireflies: np.ndarray
 
     @property
-    def any(self):
-        """The pixels with one limit or more."""
+    def any(self) -> np.ndarray:
+        """The pixels with at least one limit."""
         return self.clamped | self.terminator | self.energy_loss | self.fireflies
 
-    def counts(self):
+    def counts(self) -> LimitCounts:
         """Return the number of pixels by limit, and ``any``."""
         return LimitCounts(
             **{name: int(getattr(self, name).sum()) for name in LimitCounts.__struct_fields__}
@@ -79,7 +80,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Lights:
-    """Where light comes from: points (N, 3), directions towards it (M, 3), and from all sides."""
+    """Origins of light: points (N, 3), directions towards it (M, 3), and whether from all sides."""
 
     points: np.ndarray
     directions: np.ndarray
@@ -88,12 +89,12 @@ class Lights:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """What limits depend on, at the first surface on a grid of camera rays.
+    """Inputs of limits at the first surfaces on a grid of camera rays.
 
-    ``alpha`` (H, W) is infinite and ``albedo`` (H, W) 1 where there is no ``roughplastic``;
-    ``albedo`` is that of the same surface under the white furnace: at normal incidence with a
-    reflectance of 1. ``position`` is in world space, ``shading`` and ``geometric`` are normals,
-    ``view`` the direction towards the viewer, (H, W, 3).
+    ``alpha`` (H, W) is infinite and ``albedo`` (H, W) is 1 where there is no ``roughplastic``.
+    ``albedo`` is of the same surface in a white furnace: at normal incidence, with a reflectance of
+    1. ``position`` is in world space, ``shading`` and ``geometric`` are normals, ``view`` is the
+    direction towards the viewer, (H, W, 3).
     """
 
     hit: np.ndarray
@@ -106,34 +107,42 @@ class Surfaces:
     lights: Lights
 
 
-def find(surfaces, mean, standard_error, counted=None):
-    """Return the :class:`Limits` of a reference.
+def find(
+    surfaces: Surfaces,
+    mean: np.ndarray,
+    standard_error: np.ndarray,
+    counted: np.ndarray | None = None,
+) -> Limits:
+    """Return the limits of a reference.
 
     Parameters
     ----------
-    surfaces : Surfaces
-        As `of_scene` returns them.
+    surfaces
+        See `of_scene`.
     mean, standard_error
         (H, W, 3): the reference's estimate and its standard error from independent passes.
     counted
-        (H, W), the pixels that count; those that hit a surface where it is not given.
+        (H, W): the pixels that count; if omitted, those that see a surface.
     """
     counted = surfaces.hit if counted is None else np.asarray(counted, bool)
     return _masks(surfaces, fireflies(mean, standard_error), counted)
 
 
-def count(scene, mean, standard_error, counted):
-    """Return the :class:`LimitCounts` of a scene's reference, as `find` does, by bands of rows."""
+def count(
+    scene: Scene, mean: np.ndarray, standard_error: np.ndarray, counted: np.ndarray
+) -> LimitCounts:
+    """Count the pixels of a scene's reference that `find` would return, by bands of rows."""
     flies = fireflies(mean, standard_error)
     total = dict.fromkeys(LimitCounts.__struct_fields__, 0)
-    for rows in bands(len(counted)):
-        surfaces = of_scene(scene, *counted.shape[::-1], rows=rows)
+    height, width = counted.shape
+    for rows in bands(height):
+        surfaces = of_scene(scene, width, height, rows=rows)
         found = _masks(surfaces, flies[rows], counted[rows]).counts()
         total = {name: total[name] + getattr(found, name) for name in total}
     return LimitCounts(**total)
 
 
-def _masks(surfaces, flies, counted):
+def _masks(surfaces: Surfaces, flies: np.ndarray, counted: np.ndarray) -> Limits:
     return Limits(
         clamped=counted & (surfaces.alpha <= SMALLEST_ALPHA),
         terminator=counted & terminator(surfaces),
@@ -142,14 +151,14 @@ def _masks(surfaces, flies, counted):
     )
 
 
-def terminator(surfaces):
-    """Return where shading and geometric normal disagree about a light or the viewer."""
+def terminator(surfaces: Surfaces) -> np.ndarray:
+    """Return where shading and geometric normals disagree about a light or the viewer."""
     mask = surfaces.hit & (surfaces.shading != surfaces.geometric).any(axis=-1)
     position, shading, geometric, view = (
         getattr(surfaces, name)[mask] for name in ("position", "shading", "geometric", "view")
     )
 
-    def disagree(direction):
+    def disagree(direction: np.ndarray) -> np.ndarray:
         sides = [np.einsum("...i,...i", n, direction) > 0 for n in (shading, geometric)]
         return sides[0] != sides[1]
 
@@ -165,26 +174,25 @@ def terminator(surfaces):
     return mask
 
 
-def fireflies(mean, standard_error):
-    """Return where a few samples carry the estimate.
+def fireflies(mean: np.ndarray, standard_error: np.ndarray) -> np.ndarray:
+    """Return where a few samples dominate the estimate.
 
     If all light of a pixel came in one of many passes, its standard error would equal its mean. So
-    ``SE > FIREFLY_SHARE mean`` in the sum of the channels, and ``SE`` exceeds
-    :data:`FIREFLY_CONTRAST` times the median of the pixels around, where the image is not noisy
-    throughout.
+    the condition is ``SE > FIREFLY_SHARE mean`` in the sum of the channels. ``SE`` must also exceed
+    :data:`FIREFLY_CONTRAST` times the median nearby, since the whole image may be noisy.
     """
     mean, standard_error = np.asarray(mean), np.asarray(standard_error)
     found = np.zeros(mean.shape[:2], bool)
     for rows in bands(len(found)):
         total = np.abs(mean[rows]).sum(axis=-1, dtype=float)
         error, lower = _lower_around(standard_error, rows)
-        # The median is under a value if more than half of what it is taken of are.
+        # A median is below a value if more than half of its inputs are.
         found[rows] = (error > FIREFLY_SHARE * total) & (lower > NEIGHBOURHOOD**2 // 2)
     return found
 
 
-def _lower_around(standard_error, rows):
-    """Return the errors (h, W) of some rows, and how many around are far lower; edges repeat."""
+def _lower_around(standard_error: np.ndarray, rows: slice) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors (h, W) of some rows, and how many nearby are far lower; edges repeat."""
     reach = NEIGHBOURHOOD // 2
     height, width = standard_error.shape[:2]
     near = np.clip(np.arange(rows.start - reach, rows.stop + reach), 0, height - 1)
@@ -196,8 +204,10 @@ def _lower_around(standard_error, rows):
     return own, lower
 
 
-def of_scene(scene, width, height, sensor=0, rows=slice(None)):
-    """Collect the :class:`Surfaces` that the centres of a scene's pixels see, in some rows."""
+def of_scene(
+    scene: Scene, width: int, height: int, sensor: int = 0, rows: slice = slice(None)
+) -> Surfaces:
+    """Collect what the centres of a scene's pixels see, in some rows."""
     heights = (np.arange(height)[rows] + 0.5) / height
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, heights)
     height = len(heights)
@@ -206,7 +216,7 @@ def of_scene(scene, width, height, sensor=0, rows=slice(None)):
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
 
-    def grid(vector):
+    def grid(vector: Any) -> np.ndarray:
         return np.array(dr.select(hit, mi.Vector3f(vector), 0), float).T.reshape(height, width, 3)
 
     index = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
@@ -222,7 +232,7 @@ def of_scene(scene, width, height, sensor=0, rows=slice(None)):
     return Surfaces(seen, alpha, albedo, grid(si.p), *normals, grid(-ray.d), lights_of(scene))
 
 
-def _roughplastic(bsdf):
+def _roughplastic(bsdf: Any) -> RoughPlastic | None:
     """Return the parameters of a ``roughplastic``, also within ``twosided``, or None."""
     if "RoughPlastic" not in str(bsdf):
         return None
@@ -230,18 +240,18 @@ def _roughplastic(bsdf):
     return RoughPlastic((1.0,) * 3, _first(params["alpha"]), _first(params["eta"]))
 
 
-def _first(value):
+def _first(value: Any) -> float:
     return float(np.ravel(value)[0])
 
 
 @lru_cache
-def _furnace(plastic):
+def _furnace(plastic: RoughPlastic) -> float:
     albedo = of_roughplastic(plastic)
     return float((albedo.diffuse + albedo.specular).mean())
 
 
-def lights_of(scene):
-    """Return the :class:`Lights` of a scene."""
+def lights_of(scene: Scene) -> Lights:
+    """Return the lights of a scene."""
     points, directions, surrounding = [], [], False
     shining = [shape for shape in scene.shapes() if shape.is_emitter()]
     for emitter in scene.emitters():
@@ -264,15 +274,15 @@ def lights_of(scene):
     return Lights(np.reshape(points, (-1, 3)), np.reshape(directions, (-1, 3)), surrounding)
 
 
-def _given(params, name, column):
-    """Return a parameter of three numbers, or the column of ``to_world`` that stands for it."""
+def _given(params: Any, name: str, column: int) -> np.ndarray:
+    """Return a parameter of three numbers, or the column of ``to_world`` that replaces it."""
     value = params[name] if name in params else params["to_world"].matrix
     value = np.array(value, float)
     return value.ravel() if name in params else value[:3, column].ravel()
 
 
-def _points_on(shape):
-    """Return points of a shape and its normals, (N, 3) each, by sampling a grid with its edges."""
+def _points_on(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Return points and normals of a shape, (N, 3) each, on a grid that includes its edges."""
     places = np.linspace(0, 1 - 2**-24, LIGHT_GRID)
     x, y = (axis.ravel() for axis in np.meshgrid(places, places))
     found = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))

@@ -1,35 +1,35 @@
-"""Which pixels are shown to differ, which are not, and which are left open.
+"""Mark the pixels that are shown to differ, and those left undetermined.
 
-**The guarantee.** Of the marked pixels a share of at most `LEVEL` is expected to be marked wrongly.
-Where the two images do not differ at all, the chance of any mark is at most `LEVEL`.
+**The guarantee.** The expected share of wrong marks among all marks is at most `LEVEL`. If the two
+images do not differ at all, the chance of any mark is at most `LEVEL`.
 
-Two steps share it. First blocks of 8 x 8 pixels are tested, all together at a chance of
-`BLOCK_LEVEL` for any false alarm (Bonferroni). Their means are nearly normal, and they are few: no
-pixel needs a tail of 1e-6, which no number of passes bears out. Then the pixels of the blocks that
-differ are tested at a false discovery rate of ``LEVEL − BLOCK_LEVEL`` (Benjamini and Hochberg
-1995), which asks for tails of a hundredth or so.
+Two steps share this level. First, blocks of 8 x 8 pixels are tested, with a chance of `BLOCK_LEVEL`
+of any false alarm (Bonferroni). Their means are nearly normal, and they are few: no pixel needs a
+tail of 1e-6, which no number of passes supports. Then the pixels of differing blocks are tested at
+a false discovery rate of ``LEVEL − BLOCK_LEVEL`` (Benjamini and Hochberg 1995), which needs tails
+of about 0.01.
 
-**Skewed noise.** Path-traced noise is a sum of rare large contributions. A pixel that has had fewer
-than its share looks darker *and* surer than it is. So its doubt is that of the hypothesis tested,
-not that of the sample: if nothing differed, the missing light ``d`` would have come in
-contributions as large as those seen, and have brought their variance with it ::
+**Skewed noise.** Path-traced noise is a sum of rare large contributions. A pixel that got fewer
+than its share looks darker *and* more certain than it is. So the variance is that of the tested
+hypothesis, not of the sample: if nothing differed, the missing light ``d`` would come in
+contributions as large as those seen, with their variance ::
 
     V0 = V + c |d|,    c = |κ3| / κ2
 
-with V the variance of the mean and κ2, κ3 the second and third cumulants of its noise, pooled over
-the blocks around. For a Poisson number of equal contributions this is exactly the variance under
-the hypothesis; to first order it is Johnson's correction of Student's t for skewness (J. Am. Stat.
+with V the variance of the mean, and κ2, κ3 the second and third cumulants of its noise, pooled over
+nearby blocks. For a Poisson number of equal contributions this is exactly the variance under the
+hypothesis; to first order it is Johnson's correction of Student's t for skewness (J. Am. Stat.
 Assoc. 73, 1978). The term counts only on the side where light can be missing.
 
-**Few passes.** The variance of a pixel is pooled with those around it, as far as these are alike
-(Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004), and is never taken to be less than its own.
+**Few passes.** The variance of a pixel is pooled with nearby ones, as far as these are alike
+(Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004), and is never less than its own.
 
-**Open.** A pixel is undetermined that is not marked, but whose 95 % interval reaches a difference
-of `VISIBLE` in the metric; with fewer than `FEWEST` passes, every pixel. No rule can know of light
-of which no path anywhere in the image has brought a sample.
+**Undetermined.** An unmarked pixel is undetermined if its 95 % interval reaches a difference of
+`VISIBLE` in the metric; with fewer than `FEWEST` passes, every pixel is. No rule can detect light
+that no path in the image has sampled.
 
-Where only the places of camera rays are random, and both images share these, there is no noise at
-all: what differs by more than rounding differs.
+If only the positions of camera rays are random, and both images share them, there is no noise:
+pixels that differ by more than rounding differ.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ from reference.rendering.renderer import require_finite
 LEVEL, BLOCK_LEVEL = 0.05, 0.01
 VISIBLE = 2.0
 FEWEST = 4
-"""Passes: a third moment needs three, and one more tells how it scatters."""
+"""Passes: a third moment needs three, and one more shows its scatter."""
 
 MARKED, UNDETERMINED = 1.0, 0.5
 ABSOLUTE_ROUNDING, RELATIVE_ROUNDING = 1e-6, 1e-5
 
 _NORMAL = 1e6
-"""Degrees of freedom of what is as good as known."""
+"""Degrees of freedom of variances that are practically known."""
 
 Array = NDArray[np.float64]
 Distance = Callable[[Array, Array], Array]
@@ -69,22 +69,27 @@ def find(
     exact: bool = False,
     level: float = LEVEL,
 ) -> NDArray[np.float32]:
-    """The marks (H, W): 1 where a difference is shown, 0.5 where it is left open, 0 elsewhere.
+    """Return marks (H, W): 1 where a difference is shown, 0.5 if undetermined, 0 elsewhere.
 
+    Parameters
+    ----------
     difference
-        That of the test image and the reference, test less reference, pass by pass.
+        Test image less reference, pass by pass.
     test
         The test image (H, W, 3), linear.
     counted
-        Boolean (H, W): the pixels that are tested; all others are 0.
+        Boolean (H, W): the pixels to test; all others are 0.
     distance
-        ``(test, reference) -> (N,)`` of linear colours (N, 3), in units of which `VISIBLE` is one.
+        ``(test, reference) -> (N,)`` for linear colours (N, 3), in the unit of `VISIBLE`.
     exact
-        Whether nothing but the places of camera rays is random, and both images share them.
+        Whether only the positions of camera rays are random, and both images share them.
     level
-        In place of `LEVEL`; blocks take a fifth of it, as they do there.
+        Replaces `LEVEL`; blocks take the same share of it.
 
-    Raises `NonFiniteError`.
+    Raises
+    ------
+    NonFiniteError
+        When the difference, or its standard error, has a NaN or an infinity.
     """
     test, counted = np.asarray(test), np.asarray(counted, bool)
     require_finite(difference.mean, "mean difference")
@@ -117,38 +122,37 @@ def find(
 def _beyond_rounding(difference: Array, test: Array) -> NDArray[np.bool_]:
     size = np.maximum(np.abs(test), np.abs(test - difference))
     rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
-    return (np.abs(difference) > rounding).any(axis=-1)
+    return np.any(np.abs(difference) > rounding, axis=-1)
 
 
 def _discoveries(chances: Array, rate: float) -> float:
-    """The largest chance that Benjamini and Hochberg take for a discovery; −1 for none."""
+    """Return the largest chance that counts as a discovery (Benjamini and Hochberg); −1 if none."""
     ordered = np.sort(chances)
     passed = ordered <= rate * np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
     return float(ordered[passed][-1]) if passed.any() else -1.0
 
 
 def _chances(difference: Array, variance: Array, sizes: Array, freedom: Array) -> Array:
-    """Chances (...) of differences (..., 3) at least this large if there were none.
+    """Return the chances (...) of differences (..., 3) at least this large under the hypothesis.
 
-    ``sizes`` (2, ..., 3) are those of contributions that may be missing from the reference, and
-    from the test image. The chance is that of the three channels together; where there is no
-    variance at all nothing is shown.
+    ``sizes`` (2, ..., 3) are the sizes of contributions that may be missing from the reference, and
+    from the test image. The chance is over all three channels; without variance it is 1.
     """
     from scipy.special import stdtr
 
     size = np.where(difference > 0.0, *sizes)
-    doubted = variance + size * np.abs(difference)
-    deviations = np.zeros(doubted.shape)
-    np.divide(np.abs(difference), np.sqrt(doubted), out=deviations, where=doubted > 0.0)
+    supposed = variance + size * np.abs(difference)
+    deviations = np.zeros(supposed.shape)
+    np.divide(np.abs(difference), np.sqrt(supposed), out=deviations, where=supposed > 0.0)
     return np.minimum(3.0 * 2.0 * stdtr(freedom, -deviations).min(axis=-1), 1.0)
 
 
 @dataclass(frozen=True)
 class _Around:
-    """What is pooled, by block (h, w, 3), of the pixels' means.
+    """Pooled moments of the pixels' means, by block (h, w, 3).
 
-    ``sizes`` (2, h, w, 3) are those of contributions, as `_chances` takes them: κ3/κ2 of the noise
-    around; ``largest_sizes`` (2, 1, 1, 3) the largest of the image.
+    ``sizes`` (2, h, w, 3) are sizes of contributions for `_chances`: κ3/κ2 of nearby noise;
+    ``largest_sizes`` (2, 1, 1, 3) are the largest of the image.
     """
 
     pixels: Array
@@ -165,13 +169,13 @@ class _Around:
         parts = [_sums(difference, counted, rows) for rows in bands(len(counted))]
         pixels, mean, variance, squares, *skewed = map(np.concatenate, zip(*parts, strict=True))
         third, moved = np.array(skewed[:2]), np.array(skewed[2:])
-        # Where noise is large on both sides the cubes of the one would hide those of the other.
+        # If noise is large on both sides, the cubes of one would hide those of the other.
         one_sided = ratio(neighbourhood(third, 1), neighbourhood(moved, 1))
         largest = one_sided.max(axis=(1, 2))[:, None, None]
         around = neighbourhood(variance)
         both = ratio(neighbourhood(third[0] - third[1]), around)
         sizes = np.where(around > 0.0, np.maximum([both, -both], 0.0), largest)
-        # Variances differ from block to block: the own one counts as much as the eight around it.
+        # Variances differ among blocks: a block counts as much as its eight neighbours.
         near = [neighbourhood(sums) + 8.0 * sums for sums in (pixels, variance, squares)]
         pooled = ratio(near[1], near[0])
         scatter = ratio(ratio(near[2], near[0]), pooled**2) - 1.0
@@ -189,29 +193,29 @@ class _Around:
 
     @cached_property
     def quantile(self) -> Array:
-        """Student's quantile at 97.5 % for the pixels of each block: they share their freedom."""
+        """Student's quantile at 97.5 % for the pixels of each block, which share their freedom."""
         from scipy.special import stdtrit
 
         return stdtrit(self.pooled_freedom + self.own_freedom, 0.975)
 
     def differing(self, level: float, inflation: float) -> NDArray[np.bool_]:
-        """The blocks (h, w) that differ.
+        """Return which blocks (h, w) differ.
 
-        The largest contributions of the image count: what is rare may have been seen elsewhere.
+        The image's largest contributions count: rare ones may only have been seen elsewhere.
         """
         sizes = ratio(self.largest_sizes, self.pixels) * inflation
         # A quarter, since neighbours and their squares are not quite independent.
         freedom = np.maximum(neighbourhood(self.pixels) * self.own_freedom / 4.0, 1.0)
         chances = _chances(self.difference, self.variance * inflation, sizes, freedom)
         tested = self.pixels[..., 0] > 0
-        return tested & (chances <= level / max(np.count_nonzero(tested), 1))
+        return tested & (chances <= level / max(int(np.count_nonzero(tested)), 1))
 
 
 def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slice) -> list[Array]:
-    """Sums over the blocks of some rows.
+    """Return sums over the blocks of some rows.
 
-    Of pixels, differences, variances, their squares; of third cumulants below and above 0, without
-    sign; and of the variances of the pixels that have them.
+    The sums are of pixels, differences, variances, and squared variances; of third cumulants below
+    and above 0, without sign; and of the variances of the pixels that have them.
     """
     here = counted[rows, :, None]
     variance, third = _variance(difference, rows) * here, difference.third[rows] * here
@@ -222,15 +226,15 @@ def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slic
 
 
 def _variance(difference: DifferenceEstimate, rows: slice) -> Array:
-    # In doubles: squares leave the range of single precision.
+    # In double precision: squares leave the range of single precision.
     return difference.standard_error[rows].astype(np.float64) ** 2
 
 
 @dataclass(frozen=True)
 class _Pixels:
-    """Some pixels (N, 3), with what is pooled around them; ``sizes`` (2, N, 3).
+    """Some pixels (N, 3), with pooled moments; ``sizes`` are (2, N, 3).
 
-    ``quantile`` is Student's at 97.5 %, for ``freedom``.
+    ``quantile`` is Student's at 97.5 % for ``freedom``.
     """
 
     difference: Array
@@ -243,13 +247,13 @@ class _Pixels:
     def of(
         cls, difference: DifferenceEstimate, around: _Around, rows: slice, mask: NDArray[np.bool_]
     ) -> _Pixels:
-        """Those of some rows that are in a mask (H, W) of the whole image."""
+        """Return the pixels of some rows that are in a mask (H, W) of the whole image."""
         mask = mask[rows]
         mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
-        pooled = around.pooled_freedom, around.quantile, around.pooled_variance
+        near = around.pooled_freedom, around.quantile, around.pooled_variance
         prior, quantile, pooled, *sizes = (
-            spread_out(values[blocks], mask.shape)[mask] for values in (*pooled, *around.sizes)
+            spread_out(values[blocks], mask.shape)[mask] for values in (*near, *around.sizes)
         )
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * own) / freedom
@@ -259,11 +263,11 @@ class _Pixels:
         return _chances(self.difference, self.variance, self.sizes, self.freedom)
 
     def are_open(self, shown: Array, distance: Distance) -> NDArray[np.bool_]:
-        """Whether the 95 % interval of each pixel reaches a visible difference.
+        """Return whether the 95 % interval of each pixel reaches a visible difference.
 
         It ends at the largest ``u`` with ``u² <= t² (V + c u)``: light that is missing from the
-        reference makes the true difference smaller. Open is also where neither a pixel nor any
-        other has noise: nothing has come that could vary.
+        reference makes the true difference smaller. Pixels are also open if the whole image has no
+        noise: no light has arrived that could vary.
         """
         t = self.quantile
         half = t * t * self.sizes / 2.0
@@ -274,10 +278,10 @@ class _Pixels:
 
 
 def _prior_freedom(scatter: Array, freedom: int) -> Array:
-    """Degrees of freedom of pooled variances, from the relative variance of single ones.
+    """Return the degrees of freedom of pooled variances, from the relative variance of single ones.
 
-    If true variances follow a scaled inverse χ² of ``d0`` degrees of freedom, those measured with
-    ``d`` have a relative variance of ``2 (d + d0 − 2) / (d (d0 − 4))``; solved for ``d0``.
+    If true variances follow a scaled inverse χ² with ``d0`` degrees of freedom, variances measured
+    with ``d`` have a relative variance of ``2 (d + d0 − 2) / (d (d0 − 4))``, solved for ``d0``.
     """
     more = scatter * freedom - 2.0
     found = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
@@ -285,9 +289,9 @@ def _prior_freedom(scatter: Array, freedom: int) -> Array:
 
 
 def _inflation(difference: DifferenceEstimate) -> float:
-    """How many times the variance of a block's mean exceeds that of independent pixels; 1 or more.
+    """Return the variance of a block's mean over that of independent pixels; at least 1.
 
-    A wide reconstruction filter makes neighbours share their samples.
+    With a wide reconstruction filter, neighbours share samples.
     """
     grouped = difference.grouped
     own = difference.standard_error.reshape(-1, 3)[grouped.places].astype(np.float64) ** 2

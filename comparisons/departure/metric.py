@@ -1,12 +1,11 @@
-"""What a metric is, and where metrics are declared.
+"""Define and declare metrics.
 
-A metric is a function of two images and the viewing conditions, whose value is a map. One
-declaration is all that it takes: records, tables, the page and the checks list what is declared.
-:class:`Metric` takes any such function, so that one which looks at neighbourhoods fits;
-:class:`Pixelwise` splits it into a colour space and a distance, so that a reference is converted
-once and compared with many images.
+A metric is a function of two images and the viewing conditions that returns a map. One declaration
+is enough: records, tables, the page and checks list all declared metrics. :class:`Metric` takes any
+such function, also one of neighbourhoods. :class:`Pixelwise` splits it into a colour space and a
+distance; a reference is then converted once, and compared with many images.
 
-Metrics come from outside, too, by :func:`declare`, or by an entry point of the group
+Declare a metric from outside with :func:`declare`, or with an entry point of the group
 ``fotismos.metrics`` whose object is a :class:`Metric`::
 
     declare(
@@ -29,22 +28,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from reference.rendering.renderer import require_finite
 
-#: Names of the layers and columns that stand beside the metrics.
 RESERVED = frozenset(
     {
         "heuristic", "reference", "reference_stderr", "standard_error", "flags", "P", "N",
         "log2_luminance", "significant", "effects", "name", "shape", "noise", "marked",
     }
 )  # fmt: skip
+"""Names of layers and columns other than metrics."""
 
 Distances = Callable[..., Array]
 
@@ -53,26 +53,28 @@ Distances = Callable[..., Array]
 class Metric:
     """A distance between two images.
 
+    Attributes
+    ----------
     name
         An identifier: its key in records, its layer in EXR files, its column in tables.
     label, unit, definition, caution
-        As printed in reports; `caution` says where not to trust it.
+        As printed in reports; `caution` says when not to trust it.
     map_range
-        Fixed (low, high) of the colour bar, so that maps of different scenes compare.
+        Fixed (low, high) of the colour bar, so maps of different scenes compare.
     function
-        ``(test, reference, viewing) -> (H, W)``: a map of distances, ≥ 0 and finite, of linear
-        images (H, W, 3). `Pixelwise` needs none.
+        ``(test, reference, viewing) -> (H, W)``: distances, ≥ 0 and finite, of linear images
+        (H, W, 3). `Pixelwise` needs none.
     visible
-        Thresholds in the metric's unit; summaries say which share of the pixels is above each.
+        Thresholds in the metric's unit; summaries give the share of pixels above each.
     rounding
-        Difference that the rounding of float32 renderings can make in its mean.
+        The difference that rounding of float32 renderings can make in its mean.
     heading
-        In tables where its mean stands for it; `label`, and "mean", where it is not given.
+        Column heading of its mean; `label` and "mean" if omitted.
     drawn
-        Whether its map is shown and kept.
+        Whether its map is shown and saved.
     linear
-        Whether it is a difference of linear values: its mean is then the root of the mean square,
-        and its best exposure is that of least squares.
+        Whether it is a difference of linear values: its mean is then a root mean square, and its
+        best exposure minimises squares.
     """
 
     name: str
@@ -91,43 +93,52 @@ class Metric:
     def __post_init__(self) -> None:
         if not self.name.isidentifier() or self.name in RESERVED:
             raise InputError(
-                f"metric {self.name!r}: a name has letters, digits and _ alone, and is none of"
-                f" {', '.join(sorted(RESERVED))}. Give it another one."
+                f"metric {self.name!r}: use a name of letters, digits and _, other than"
+                f" {', '.join(sorted(RESERVED))}."
             )
         if not self.heading:
             object.__setattr__(self, "heading", f"{self.label}, mean")
 
     @property
     def thresholds(self) -> tuple[str, ...]:
-        """The thresholds of `visible` as records name them."""
+        """The thresholds of `visible`, as named in records."""
         return tuple(f"{limit:g}" for limit in self.visible)
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
     ) -> Array:
-        """The map (H, W) of distances between two linear images (H, W, 3)."""
+        """Return the map (H, W) of distances between two linear images (H, W, 3)."""
         test, reference = checked_pair(test, reference)
         return self.against(reference, ..., viewing)(test)
 
-    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
-        """Return a function of test images, for distances from the reference at some pixels.
-
-        where
-            Any index of pixels, such as a boolean mask (H, W).
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+        """Return a function that maps test images to distances from the reference at some pixels.
 
         The function is ``(test, within=None, factor=1.0)``: distances of ``factor · test`` at
-        `where`, or at those of its pixels that the mask `within` holds (`where` is a mask then).
+        `where`, or at those of its pixels in the mask `within` (`where` must then be a mask).
+
+        Parameters
+        ----------
+        reference, viewing
+            The reference (H, W, 3), and the viewing conditions.
+        where
+            Any index of pixels, such as a boolean mask (H, W).
         """
+        if self.function is None:
+            raise InputError(
+                f"metric {self.name!r} has no function: give it one, or declare a Pixelwise metric."
+            )
+        function = self.function
 
         def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
             shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
-            values = self.function(factor * shown, truth, viewing)
+            values = function(factor * shown, truth, viewing)
             return values[where if within is None else within]
 
         return distances
 
-    def mean(self, values: Array) -> float:
-        """The mean of distances as the metric takes it; 0 where there are none."""
+    def mean(self, values: NDArray) -> float:
+        """Return the metric's mean of distances; 0 if there are none."""
         if not values.size:
             return 0.0
         if self.linear:
@@ -137,20 +148,22 @@ class Metric:
 
 @dataclass(frozen=True, kw_only=True)
 class Pixelwise(Metric):
-    """A distance of two pixels, whatever stands around them.
+    """A distance between two pixels, independent of their neighbours.
 
+    Attributes
+    ----------
     coordinates
         ``(rgb, viewing) -> (..., 3)``: linear RGB to a colour space.
     difference
-        ``(coordinates, coordinates) -> (...)``: distance, ≥ 0. The first is the reference's where
-        it matters; none of the built-in metrics is asymmetric.
+        ``(coordinates, coordinates) -> (...)``: distance, ≥ 0. The first is the reference's; all
+        built-in metrics are symmetric.
     """
 
     coordinates: Callable[[ArrayLike, Viewing], Array]
     difference: Callable[[Array, Array], Array]
 
-    def against(self, reference: Array, where: object, viewing: Viewing) -> Distances:
-        """Return a function as `Metric.against` does; images may be lists of pixels (N, 3)."""
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+        """Return a function like `Metric.against`; images may be lists of pixels (N, 3)."""
         fixed = self.coordinates(reference[where], viewing)
 
         def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
@@ -161,22 +174,27 @@ class Pixelwise(Metric):
         return distances
 
 
-#: All metrics by name, in the order of reports: first that by which scenes are judged.
 METRICS: Declared[Metric] = Declared("metric", "fotismos.metrics")
+"""All metrics by name, in the order of reports; the first one judges scenes."""
 
-#: Declare a metric, so that everything lists it, and return it.
 declare = METRICS.declare
+"""Declare a metric and return it; everything then lists it."""
 
 
 def drawn() -> dict[str, Metric]:
-    """The metrics by name whose maps are shown."""
+    """Return the metrics whose maps are shown, by name."""
     return {name: metric for name, metric in METRICS.items() if metric.drawn}
 
 
 def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
-    """Both images as float64, or as float32 where they are, checked: same shape (..., 3), finite.
+    """Return both images as float64, or unchanged if float32, after checking them.
 
-    Raises `InputError` for the shapes, `NonFiniteError` for a NaN or an infinity.
+    Raises
+    ------
+    InputError
+        When they differ in shape, or their shape is not (..., 3).
+    NonFiniteError
+        When either has a NaN or an infinity.
     """
     test, reference = (
         image if image.dtype == np.float32 else image.astype(np.float64, copy=False)
@@ -184,8 +202,8 @@ def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
     )
     if test.shape != reference.shape or test.shape[-1:] != (3,):
         raise InputError(
-            f"images of shapes {test.shape} and {reference.shape} cannot be compared: "
-            "both must be (height, width, 3)"
+            f"images of shapes {test.shape} and {reference.shape} cannot be compared:"
+            " give both as (height, width, 3)."
         )
     require_finite(test, "test image")
     require_finite(reference, "reference image")

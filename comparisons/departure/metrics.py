@@ -9,8 +9,8 @@ ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three, flip-evaluator computes the last two. Beside them stands
-the signed ratio of luminances in stops, which is no distance. Statistics over an image are in
+colour-science defines the first three, flip-evaluator computes the last two. The signed ratio of
+luminances in stops comes with them, but is not a distance. Statistics over an image are in
 `comparisons.departure.statistics`.
 """
 
@@ -44,8 +44,8 @@ from comparisons.departure.spaces import (
 
 __all__ = ["METRICS", "declare", "drawn"]
 
-#: Added to both luminances of `log2_luminance_ratio`; 1.0 is display white.
 LOG2_EPSILON = 1e-4
+"""Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""
 
 
 def _linear(rgb: ArrayLike, viewing: Viewing) -> Array:
@@ -56,7 +56,6 @@ def _root_mean_square(a: Array, b: Array) -> Array:
     return np.sqrt(np.mean((b - a) ** 2, axis=-1))
 
 
-#: The metric by which scenes are judged: regions, targets of noise and prices are in it.
 LEADING = METRICS.own(
     Pixelwise(
         name="dE2000",
@@ -72,6 +71,7 @@ LEADING = METRICS.own(
         difference=ciede2000,
     )
 )
+"""The metric that judges scenes: regions, noise targets and prices use it."""
 METRICS.own(
     Pixelwise(
         name="dE_ITP",
@@ -79,8 +79,8 @@ METRICS.own(
         unit="1 is one just noticeable difference in the most critical adaptation",
         definition="ITU-R BT.2124: 720 √(ΔI² + ΔT² + ΔP²) of ICtCp with the PQ curve, at absolute "
         "luminance, clipped to 0–10,000 cd/m².",
-        caution="It takes the eye as adapted to each pixel, and so overrates differences in deep "
-        "shadow beside bright light. It depends on the luminance that white stands for.",
+        caution="It assumes an eye adapted to each pixel, and so overrates differences in deep "
+        "shadow next to bright light. It depends on the luminance of white.",
         map_range=(0.0, 60.0),
         visible=(1.0, 2.0, 5.0),
         coordinates=itp,
@@ -94,8 +94,8 @@ METRICS.own(
         unit="black to white is 100",
         definition="Euclidean distance in J'a'b' of CAM16-UCS (Li et al. 2017), of the images as a "
         "display shows them: exposed, then clipped to [0, 1].",
-        caution="It holds for one state of adaptation, that of the viewing conditions, all over "
-        "the image. Above white it sees nothing.",
+        caution="It assumes one adaptation over the whole image, from the viewing conditions. "
+        "Above white it sees nothing.",
         map_range=(0.0, 20.0),
         visible=(1.0, 2.0, 5.0),
         coordinates=cam16ucs,
@@ -123,9 +123,10 @@ METRICS.own(
     Metric(
         name="ldr_flip",
         label="LDR-FLIP",
-        unit="from 0 to 1, which green and blue are apart",
-        definition="FLIP (Andersson et al. 2020) of the images as a display shows them: what is "
-        "seen in flipping between them, edges and points apart, at the pixels per degree given.",
+        unit="from 0 to 1, the distance of green and blue",
+        definition="FLIP (Andersson et al. 2020) of the images as a display shows them: what a "
+        "viewer sees in flipping between them, also edges and points, at the given pixels per "
+        "degree.",
         caution="It holds for one distance from the screen. Above white it sees nothing.",
         map_range=(0.0, 1.0),
         rounding=1e-4,
@@ -136,10 +137,10 @@ METRICS.own(
     Metric(
         name="hdr_flip",
         label="HDR-FLIP",
-        unit="from 0 to 1, which green and blue are apart",
-        definition="The largest LDR-FLIP over the exposures from that which shows the brightest "
-        "light of the reference to that which shows its median (Andersson et al. 2021, ACES).",
-        caution="Nobody sees all these exposures at once: a pixel counts by its worst.",
+        unit="from 0 to 1, the distance of green and blue",
+        definition="The largest LDR-FLIP over exposures from one for the reference's brightest "
+        "light to one for its median (Andersson et al. 2021, ACES).",
+        caution="Nobody sees all these exposures at once: the worst one counts at each pixel.",
         map_range=(0.0, 1.0),
         rounding=1e-4,
         drawn=False,
@@ -147,13 +148,13 @@ METRICS.own(
     )
 )
 
-#: Names of the metrics above.
 BUILT_IN = METRICS.built_in
+"""Names of the built-in metrics."""
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """A signed map that is no distance; ``limit`` is the half range of its colour bar."""
+    """A signed map that is not a distance; ``limit`` is the half range of its colour bar."""
 
     name: str
     label: str
@@ -163,7 +164,6 @@ class Ratio:
     rounding: float
 
 
-#: That of `log2_luminance_ratio`.
 RATIO = Ratio(
     name="log2_luminance",
     label="Luminance ratio",
@@ -173,18 +173,19 @@ RATIO = Ratio(
     limit=3.0,
     rounding=1e-4,
 )
+"""The ratio of `log2_luminance_ratio`."""
 
 
 def delta_e_2000(
     test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
 ) -> Array:
-    """CIE DE2000 colour difference, display-referred; shape (H, W), range 0 to about 110.
+    """Return CIE DE2000, display-referred; shape (H, W), range 0 to about 110.
 
     Linear RGB × exposure, clipped to [0, 1] → XYZ → CIE L*a*b* (D65, 2° observer) → ΔE00 with
     k_L = k_C = k_H = 1. About 1 is just noticeable side by side; black to white is 100.
 
-    Clipping is what a display does: two colours brighter than white compare equal, and so do
-    two negative (out-of-gamut) ones. Differences above white are for `delta_e_itp`.
+    A display clips, too: two colours brighter than white compare equal, as do two negative
+    (out-of-gamut) ones. Use `delta_e_itp` for differences above white.
 
     Source: CIE 142-2001; Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005.
     Raises `NonFiniteError`, and `InputError` for different shapes.
@@ -198,7 +199,7 @@ def delta_e_2000(
 
 
 def delta_e_itp(test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING) -> Array:
-    """ΔE_ITP, for high dynamic range in absolute units; shape (H, W), range 0 to about 1,000.
+    """Return ΔE_ITP, for high dynamic range; shape (H, W), range 0 to about 1,000.
 
     Linear BT.709 × exposure → linear BT.2020 × `white_luminance` cd/m², clipped to
     [0, 10,000] → ICtCp with the PQ curve (BT.2100-2) → ``720 √(ΔI² + ΔT² + ΔP²)`` with
@@ -217,7 +218,7 @@ def delta_e_itp(test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAUL
 def delta_e_cam16ucs(
     test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
 ) -> Array:
-    """Distance in CAM16-UCS, display-referred; shape (H, W), range 0 to about 120.
+    """Return the distance in CAM16-UCS, display-referred; shape (H, W), range 0 to about 120.
 
     Linear RGB × exposure, clipped to [0, 1] → XYZ → CAM16 (viewing conditions of `Viewing`,
     D65 white) → J'a'b' → √(ΔJ'² + Δa'² + Δb'²). Black to white is 100.
@@ -231,7 +232,7 @@ def delta_e_cam16ucs(
 
 
 def rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """Root mean square of the linear RGB difference over the pixels of `mask` (H, W).
+    """Return the root mean square of the linear RGB difference over the pixels of `mask` (H, W).
 
     ``√(mean (test − reference)²)`` over pixels and channels, in units of display white, neither
     exposed nor clipped. 0 for an empty mask. Raises as `delta_e_2000`.
@@ -248,7 +249,7 @@ def rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike | None = None) -
 
 
 def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
-    """Signed ratio of luminances in stops; shape (H, W).
+    """Return the signed ratio of luminances in stops; shape (H, W).
 
     ``log2((max(Y_t, 0) + ε) / (max(Y_r, 0) + ε))`` with ε = 1e-4 of display white: positive
     where the test image is brighter, one stop is a factor of 2, and black against black is 0.

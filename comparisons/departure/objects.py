@@ -1,7 +1,7 @@
-"""Which shape, and which material, carries how much of the departure.
+"""Share the departure among shapes, and among materials.
 
-Every counted pixel belongs to the first surface that the ray through its centre meets, so the
-shares of all shapes add up to 1, and so do those of all materials.
+Every counted pixel belongs to the first surface that the ray through its centre hits, so the shares
+of all shapes add up to 1, as do the shares of all materials.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from comparisons.records import Size
 from reference.rendering.gbuffer import Owners
 
 MOST = 24
-"""Rows, the last of which holds all others where there are more."""
+"""Rows; if there are more carriers, the last row holds all others."""
 
 
 class Carrier(Region, kw_only=True):
-    """A shape or a material: the box of its pixels, and what is in them.
+    """A shape or a material: the box of its pixels, and its part of the departure.
 
     Attributes
     ----------
     name
         Its id in the scene.
     pixels
-        Counted pixels that see it.
+        Number of counted pixels that see it.
     material
         Id of a shape's material; empty for a material itself.
     """
@@ -38,10 +38,10 @@ class Carrier(Region, kw_only=True):
 def find(
     error: NDArray, counted: NDArray, owners: Owners, materials: Owners | None = None
 ) -> tuple[tuple[Carrier, ...], NDArray]:
-    """Return the carriers of a map of ΔE2000 (H, W), of greatest share first, and a map of them.
+    """Return the carriers of a map of ΔE2000 (H, W), largest share first, and a map of them.
 
-    The map (H, W) has the place of each pixel's carrier, and -1 where nothing is counted. With the
-    owners ``materials`` the carriers are shapes, and name theirs.
+    The map (H, W) holds the index of each pixel's carrier, or -1 if the pixel does not count. If
+    ``materials`` is given, the carriers are shapes with their materials.
     """
     places = np.where(counted, owners.places, -1)
     seen = np.unique(places[places >= 0])
@@ -61,14 +61,20 @@ def find(
     ), found
 
 
-def _carrier(name, error, mask, total, materials):
-    own = np.unique(materials.places[mask]) if materials else ()
+def _carrier(
+    name: str, error: NDArray, mask: NDArray, total: float, materials: Owners | None
+) -> Carrier:
     held = error[mask].sum(dtype=np.float64)
     return Carrier(
         name=name,
-        material=materials.names[own[0]] if len(own) == 1 else "several" if len(own) else "",
+        material=_material(mask, materials) if materials else "",
         pixels=int(mask.sum()),
         share=float(held / total) if total > 0 else 0.0,
         mean_dE2000=float(held / mask.sum()),
         **bounds(mask),
     )
+
+
+def _material(mask: NDArray, materials: Owners) -> str:
+    own = np.unique(materials.places[mask])
+    return materials.names[own[0]] if len(own) == 1 else "several"

@@ -1,15 +1,15 @@
-"""Where the departure is largest: the few boxes of an image that hold most of its error.
+"""Find where the departure is largest: the few boxes of an image with most of its error.
 
-A box is worth the error in it beyond what its counted pixels would hold if each had `CONTRAST`
-times the image's mean. The box of greatest worth is found exactly on a grid of cells (the
-maximum-sum subarray in two dimensions: Kadane's algorithm over the columns, for all pairs of rows);
-its cells are then taken out, and the next one is sought. So boxes never overlap, their shares add
-up to at most 1, and evenly spread error has none.
+The worth of a box is its error less `CONTRAST` times the image's mean for each of its counted
+pixels. The box of greatest worth is found exactly on a grid of cells (the maximum-sum subarray in
+two dimensions: Kadane's algorithm over the columns, for all pairs of rows). Its cells are then
+removed, and the search repeats. So boxes never overlap, their shares add up to at most 1, and
+evenly spread error has none.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from comparisons.records import Amount, Count, Record, Share, Size
 
-#: Cells along the longer side of the image.
 CELLS = 48
+"""Cells along the longer side of the image."""
 
-#: A region stands out where its error is more than this many times the image's mean.
 CONTRAST = 1.25
+"""A region's mean error must exceed this many times the image's."""
 
-#: At most so many regions, each with at least this share of the image's error.
 MOST, LEAST_SHARE = 4, 0.04
+"""Number of regions, at most, and the least share of the image's error in each."""
 
 
 class Region(Record):
@@ -37,14 +37,14 @@ class Region(Record):
     share: Annotated[Share, Meta(description="Of the sum of dE2000 over the counted pixels.")]
     mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
     effect: Annotated[
-        str | None, Meta(description="What dominates there, in words, where that is known.")
+        str | None, Meta(description="The dominant effect there, in words, if known.")
     ] = None
 
 
 def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
-    """The regions of a map of ΔE2000 (H, W) ≥ 0, of greatest worth first.
+    """Return the regions of a map of ΔE2000 (H, W) ≥ 0, of greatest worth first.
 
-    Only pixels of `counted` (H, W) matter. Without error there is no region.
+    Only pixels of `counted` (H, W) matter. Without error there are no regions.
     """
     counted = np.asarray(counted, bool)
     error = np.where(counted, np.asarray(error), 0.0)
@@ -53,7 +53,7 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         return ()
     cell = -(-max(error.shape) // CELLS)
     worth = _cells(error, cell) - CONTRAST * total / pixels * _cells(counted, cell)
-    found = []
+    found: list[Region] = []
     while len(found) < MOST:
         rows, columns, value = _best_box(worth)
         if not value > 0.0:
@@ -68,13 +68,13 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
 
 
 def _cells(image: NDArray, side: int) -> NDArray[np.float64]:
-    """Sums over square cells; those at the right and at the bottom may be smaller."""
+    """Return sums over square cells; those at the right and the bottom may be smaller."""
     rows = np.add.reduceat(image.astype(np.float64), np.arange(0, image.shape[0], side), axis=0)
     return np.add.reduceat(rows, np.arange(0, image.shape[1], side), axis=1)
 
 
 def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
-    """The box of cells with the greatest sum, the first of equal ones, and that sum."""
+    """Return the box of cells with the greatest sum, the first of equal ones, and the sum."""
     below = np.vstack([np.zeros(worth.shape[1]), worth.cumsum(axis=0)])
     top, bottom = np.triu_indices(len(below), 1)
     strips = below[bottom] - below[top]  # a row for each pair: the sums of its columns
@@ -99,7 +99,7 @@ def _pixels(cells: slice, side: int) -> slice:
 
 
 def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
-    """The region of a box, drawn in to the counted pixels that it holds."""
+    """Return the region of a box, shrunk to its counted pixels."""
     inside = np.zeros_like(counted)
     inside[rows, columns] = counted[rows, columns]
     held = error[rows, columns].sum(dtype=np.float64)
@@ -108,8 +108,8 @@ def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total
     )
 
 
-def bounds(mask: NDArray) -> dict[str, int]:
-    """Return ``x, y, width, height`` of the box around a mask (H, W) of one pixel at least."""
+def bounds(mask: NDArray) -> dict[str, Any]:
+    """Return ``x, y, width, height`` of the box around a mask (H, W) of at least one pixel."""
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
     return {"x": int(x[0]), "y": int(y[0]), "width": width, "height": height}

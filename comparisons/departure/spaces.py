@@ -1,8 +1,8 @@
-"""Colour spaces in which distances are nearly what an eye sees, and how an image is looked at.
+"""Nearly uniform colour spaces, and viewing conditions.
 
 Conversions from linear light with the sRGB primaries (ITU-R BT.709, D65; 1.0 is display white) to
-CIE L*a*b*, ICtCp and CAM16-UCS. colour-science defines them, and the tests hold them to it; they
-are computed by Dr.Jit (`comparisons.departure.colorimetry`), on all cores.
+CIE L*a*b*, ICtCp and CAM16-UCS. colour-science defines them, and tests compare them with it; Dr.Jit
+computes them on all cores (`comparisons.departure.colorimetry`).
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from heuristic.errors import InputError
 
 Array = NDArray[np.float64]
 
-#: ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m².
 PQ_PEAK = 10_000.0
+"""ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m²."""
 
-#: Of a viewing condition, pixels to a degree: filters grow with it, and no eye resolves so many.
 MOST_PIXELS = 1000.0
+"""Most pixels per degree: filters grow with it, and no eye resolves this many."""
 
-#: Pixels converted at a time: temporaries stay small whatever the image's size.
+# Pixels converted at a time, to keep temporaries small.
 _BLOCK = 2**17
 
 
 class Viewing(Record):
-    """How linear values are looked at; printed with every number that depends on it.
+    """Viewing conditions; printed with every number that depends on them.
 
     Raises `InputError` for a value that is not positive and finite.
     """
@@ -56,43 +56,43 @@ class Viewing(Record):
         Positive,
         Meta(description="Luminance of linear 1.0, cd/m²; 203 is BT.2408's HDR reference white."),
     ] = 203.0
-    # CAM16's conditions as in IEC 61966-2-1 (sRGB): 64 lx, from which the adapting luminance is
+    # CAM16's conditions from IEC 61966-2-1 (sRGB): 64 lx, so the adapting luminance is
     # 0.2 · E/π = 4.07 cd/m².
     ambient_illuminance: Annotated[Positive, Meta(description="CAM16: illuminance, lx.")] = 64.0
     background: Annotated[Positive, Meta(description="CAM16: Y_b; white is 100.")] = 20.0
     surround: Literal["average"] = "average"
-    # As the authors of FLIP state it: 0.7 m from a screen 0.7 m wide with 3840 pixels.
+    # The default of FLIP's authors: 0.7 m from a screen 0.7 m wide with 3840 pixels.
     pixels_per_degree: Annotated[
-        float, Meta(ge=1, le=MOST_PIXELS, description="FLIP: pixels to a degree of the eye's view.")
+        float, Meta(ge=1, le=MOST_PIXELS, description="FLIP: pixels per degree of view.")
     ] = 67.0
 
     def __post_init__(self) -> None:
         for name in ("exposure", "white_luminance", "ambient_illuminance", "background"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise InputError(f"viewing: {name} is {value}, but must be positive and finite")
+                raise InputError(f"viewing: {name} is {value}: give a positive, finite number.")
         if not 1.0 <= self.pixels_per_degree <= MOST_PIXELS:
             raise InputError(
-                f"pixels per degree: {self.pixels_per_degree} is not allowed: give a number from 1"
-                f" to {MOST_PIXELS:g}, such as 67."
+                f"pixels per degree: {self.pixels_per_degree} is not allowed: give 1 to"
+                f" {MOST_PIXELS:g}, such as 67."
             )
 
     def record(self) -> dict[str, float | str]:
-        """The values as written to ``comparison.json``."""
+        """Return the values as written to ``comparison.json``."""
         return plain(self)
 
 
-#: No exposure, 203 cd/m² white, sRGB's viewing conditions.
 DEFAULT_VIEWING = Viewing()
+"""No exposure, 203 cd/m² white, sRGB's viewing conditions."""
 
 
 def luminance(rgb: ArrayLike) -> Array:
-    """Relative luminance Y of linear BT.709 RGB (..., 3); 1 is display white."""
+    """Return the relative luminance Y of linear BT.709 RGB (..., 3); 1 is display white."""
     return np.asarray(rgb, np.float64) @ rgb_to_xyz(BT709)[1]
 
 
 def _by_blocks(function: Callable[..., Any], *arrays: ArrayLike, out: tuple[int, ...]) -> Array:
-    """Apply a function of Dr.Jit colours to blocks of (..., 3) arrays; the result is of `out`."""
+    """Apply a function of Dr.Jit colours to (..., 3) arrays in blocks; `out` is its shape."""
     flat = [np.asarray(array).reshape(-1, 3) for array in arrays]
     result = np.empty((len(flat[0]), *out[np.ndim(arrays[0]) - 1 :]))
     for start in range(0, len(flat[0]), _BLOCK):
@@ -107,23 +107,23 @@ def _colours(pixels: Array) -> Array3f64:
 
 
 def _displayed(viewing: Viewing, white: float = 1.0) -> Callable[[Array3f64], Array3f64]:
-    """A function from linear RGB to the XYZ that a display shows; Y of white is 1."""
+    """Return a function from linear RGB to the XYZ that a display shows; Y of white is 1."""
     exposure, largest = opaque(viewing.exposure), opaque(white)
     matrix = rgb_to_xyz(BT709)
     return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
 
 
 def lab(rgb: ArrayLike, viewing: Viewing) -> Array:
-    """CIE L*a*b* (D65, 2°) of linear RGB (..., 3) as displayed; L* from 0 to 100."""
+    """Return CIE L*a*b* (D65, 2°) of linear RGB (..., 3) as displayed; L* is 0 to 100."""
     shown, white = _displayed(viewing), rgb_to_xyz(BT709).sum(axis=1)
     return _by_blocks(lambda block: xyz_to_lab(shown(block), white), rgb, out=np.shape(rgb))
 
 
 def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
-    """CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed; J' from 0 to 100.
+    """Return CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed; J' is 0 to 100.
 
     `white` is the largest value that the display shows, in units of the white that CAM16 adapts to;
-    beyond 1, J' goes beyond 100.
+    above 1, J' exceeds 100.
     """
     shown = _displayed(viewing, white)
     adapted = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
@@ -134,7 +134,7 @@ def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
 
 
 def itp(rgb: ArrayLike, viewing: Viewing) -> Array:
-    """720 · (I, T, P) of linear RGB (..., 3), so that the Euclidean distance is ΔE_ITP."""
+    """Return 720 · (I, T, P) of linear RGB (..., 3), whose Euclidean distance is ΔE_ITP."""
     matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
     level = opaque(viewing.exposure * viewing.white_luminance)
     scale = Array3f64(720.0, 360.0, 720.0)
@@ -147,11 +147,11 @@ def itp(rgb: ArrayLike, viewing: Viewing) -> Array:
 
 
 def ciede2000(lab_a: Array, lab_b: Array) -> Array:
-    """ΔE00 between CIE L*a*b* colours (..., 3), with k_L = k_C = k_H = 1."""
+    """Return ΔE00 between CIE L*a*b* colours (..., 3), with k_L = k_C = k_H = 1."""
     return _by_blocks(delta_e_00, lab_a, lab_b, out=np.shape(lab_a)[:-1])
 
 
 def euclidean(a: Array, b: Array) -> Array:
-    """Distance between points (..., 3)."""
+    """Return the distance between points (..., 3)."""
     delta = a - b
     return np.sqrt(np.einsum("...i,...i->...", delta, delta))

@@ -1,12 +1,12 @@
 """Statistics over an image: summaries, the best exposure and the noise floor.
 
-"How far" has two readings, and both are reported: the distance as it is, and the distance after
-the one exposure factor on the test image that makes it smallest. The second is the *shape* of
-the departure; what lies between the two is *level*.
+"How far" has two meanings, and both are reported: the plain distance, and the smallest distance
+with an exposure factor on the test image. The second is the *shape* of the departure; the
+difference of the two is its *level*.
 
 A colour difference is never negative, so a noisy reference differs from the truth by ΔE > 0 even
-where the test image is exact; `noise_floor` says by how much, and `comparisons.departure.debiasing`
-takes it out of the mean. Which pixels are shown to differ `comparisons.departure.marks` tells.
+if the test image is exact. `noise_floor` returns by how much, `comparisons.departure.debiasing`
+removes it from the mean, and `comparisons.departure.marks` finds the pixels that differ.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import debiasing
 from comparisons.departure.metric import Distances, Metric, Pixelwise, checked_pair
@@ -25,14 +25,14 @@ from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from comparisons.records import Amount, Count, Positive, Record, Share
 from reference.rendering.moments import Grouped
 
-#: Pixels measured at a time: temporaries stay small whatever the image's size.
+# Pixels measured at a time, to keep temporaries small.
 _BLOCK_PIXELS = 2**18
 
 
 class Exposed(Record):
     """A metric after the factor `exposure` on the test image that makes its mean smallest."""
 
-    exposure: Annotated[Positive, Meta(description="Linear factor; 1 is none.")]
+    exposure: Annotated[Positive, Meta(description="Linear factor; 1 changes nothing.")]
     mean: Amount
     p50: Amount
     p95: Amount
@@ -49,7 +49,7 @@ class Between(Record):
 class Summary(Record):
     """A metric over the counted pixels, in the metric's own unit."""
 
-    mean: Annotated[Amount, Meta(description="Mean; of rmse, the root of the mean square.")]
+    mean: Annotated[Amount, Meta(description="Mean; for rmse, the root mean square.")]
     p50: Annotated[Amount, Meta(description="Median of the pixels.")]
     p95: Amount
     max: Amount
@@ -57,14 +57,12 @@ class Summary(Record):
         dict[str, Share], Meta(description="Share of the pixels above each threshold.")
     ]
     visible_between: Annotated[
-        dict[str, Between], Meta(description="Where these shares may lie without noise, at 95 %.")
+        dict[str, Between], Meta(description="95 % intervals of these shares without noise.")
     ]
-    debiased: Annotated[Amount, Meta(description="Mean without what the reference's noise adds.")]
-    low: Annotated[Amount, Meta(description="Of the mean without noise, at 95 %.")]
+    debiased: Annotated[Amount, Meta(description="Mean without the reference's noise.")]
+    low: Annotated[Amount, Meta(description="Lower end of the 95 % interval of `debiased`.")]
     high: Amount
-    noise_floor: Annotated[
-        Amount, Meta(description="Mean that the reference's own noise alone would give.")
-    ]
+    noise_floor: Annotated[Amount, Meta(description="Mean from the reference's noise alone.")]
     after_exposure: Exposed
 
 
@@ -85,38 +83,43 @@ def summarise(
     viewing: Viewing = DEFAULT_VIEWING,
     noise: ArrayLike | None = None,
     grouped: Grouped | None = None,
-) -> tuple[Summary, Array]:
-    """The numbers of `metric` over `mask`, and its map over the whole image.
-
-    test, reference
-        Linear images (H, W, 3).
-    mask
-        Boolean (H, W): the pixels that count. With none, every number is 0 and the factor 1.
-    noise
-        A noise image (H, W, 3) as for `noise_floor`; without it the floor is 0.
-    grouped
-        Groups of passes of the difference, for the interval; without it a wider one is given.
+) -> tuple[Summary, NDArray[np.float32]]:
+    """Return the numbers of `metric` over `mask`, and its map over the whole image.
 
     The best exposure is used only if it lowers the mean over all counted pixels, so
     ``after_exposure.mean <= mean`` always. Raises as `comparisons.departure.metrics.delta_e_2000`.
+
+    Parameters
+    ----------
+    metric, viewing
+        The metric and its viewing conditions.
+    test, reference
+        Linear images (H, W, 3).
+    mask
+        Boolean (H, W): the pixels that count. Without any, all numbers are 0 and the factor is 1.
+    noise
+        A noise image (H, W, 3) as for `noise_floor`; if omitted, the floor is 0.
+    grouped
+        Groups of passes of the difference, for the interval; if omitted, it is wider.
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
     factor = best_exposure(metric, test, reference, mask, viewing)
-    has_noise = noise is not None and np.any(noise)
+    grain = np.asarray(noise) if noise is not None and np.any(noise) else None
     # Single precision keeps seven digits of a distance, in half the memory.
-    distance, exposed, noisy = np.zeros(test.shape[:-1], np.float32), [], []
+    distance: NDArray[np.float32] = np.zeros(test.shape[:-1], np.float32)
+    exposed, noisy = [], []
     pixelwise = isinstance(metric, Pixelwise)
     for rows in _blocks(metric, test):
         shown, truth, here = test[rows], reference[rows], mask[rows]
-        # Equal pixels are 0 apart: what lies around the objects of a figure costs nothing.
-        wanted = here | (not pixelwise or (shown != truth).any(axis=-1))
-        distances = metric.against(truth, wanted, viewing)
-        distance[rows][wanted] = distances(shown)
+        # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
+        measured = here | (not pixelwise or (shown != truth).any(axis=-1))
+        distances = metric.against(truth, measured, viewing)
+        distance[rows][measured] = distances(shown)
         if factor != 1.0:
             exposed.append(distances(shown, here, factor).astype(np.float32))
-        if has_noise:
-            noisy.append(distances(_noisy(truth, noise[rows]), here).astype(np.float32))
+        if grain is not None:
+            noisy.append(distances(_noisy(truth, grain[rows]), here).astype(np.float32))
     values = distance[mask]
     numbers = after = _numbers(metric, values)
     if factor != 1.0:
@@ -125,11 +128,11 @@ def summarise(
             factor, after = 1.0, numbers
     shares = (share(values > limit) for limit in metric.visible)
     visible = dict(zip(metric.thresholds, shares, strict=True))
-    noise_alone = np.concatenate(noisy) if has_noise else np.zeros(0)
+    noise_alone = np.concatenate(noisy) if noisy else np.zeros(0)
     clean = None
     if not noise_alone.any():
         clean = debiasing.exactly(numbers["mean"], visible)
-    elif pixelwise and grouped is not None:
+    elif isinstance(metric, Pixelwise) and grouped is not None:
         clean = debiasing.debiased(metric, test, grouped, viewing, values)
     clean = clean or debiasing.roughly(metric, values, noise_alone)
     summary = Summary(
@@ -147,10 +150,10 @@ def summarise(
 
 def summarise_log2_luminance(
     test: ArrayLike, reference: ArrayLike, mask: ArrayLike
-) -> tuple[RatioSummary, Array]:
-    """Mean and percentiles of `log2_luminance_ratio` over `mask`, and the map (H, W) in stops."""
+) -> tuple[RatioSummary, NDArray[np.float32]]:
+    """Return a summary of `log2_luminance_ratio` over `mask`, and the map (H, W) in stops."""
     test, reference = checked_pair(test, reference)
-    ratio = np.empty(test.shape[:-1], np.float32)
+    ratio: NDArray[np.float32] = np.empty(test.shape[:-1], np.float32)
     for rows in _rows(test):
         ratio[rows] = log2_luminance_ratio(test[rows], reference[rows])
     values = ratio[np.asarray(mask, bool)]
@@ -167,11 +170,11 @@ def noise_floor(
     mask: ArrayLike,
     viewing: Viewing = DEFAULT_VIEWING,
 ) -> float:
-    """The mean of `metric` over `mask` between the reference and itself with noise added.
+    """Return the mean of `metric` over `mask` between the reference and itself with noise added.
 
-    ``mean difference(reference + noise, reference)``. `noise` (H, W, 3) is an image with the
-    distribution of the reference's standard error, such as the mean of its independent passes
-    taken with alternating signs. A result near this value cannot be told from none.
+    ``mean difference(reference + noise, reference)``. `noise` (H, W, 3) is distributed like the
+    error of the reference, such as the mean of its independent passes with alternating signs. A
+    result near this value is indistinguishable from 0.
     """
     reference, noise = checked_pair(reference, noise)
     mask = np.asarray(mask, bool)
@@ -188,7 +191,7 @@ def _noisy(image: Array, noise: Array) -> Array:
     return np.add(image, noise, dtype=np.float64)
 
 
-def _numbers(metric: Metric, values: Array) -> dict[str, float]:
+def _numbers(metric: Metric, values: NDArray) -> dict[str, float]:
     if not values.size:
         return dict.fromkeys(("mean", "p50", "p95", "max"), 0.0)
     p50, p95 = map(float, np.percentile(values, (50, 95)))
@@ -196,12 +199,12 @@ def _numbers(metric: Metric, values: Array) -> dict[str, float]:
 
 
 def share(marked: Array) -> float:
-    """The share of pixels that are marked; 0 of none."""
+    """Return the share of pixels that are marked; 0 if there are no pixels."""
     return float(marked.mean()) if marked.size else 0.0
 
 
 def _blocks(metric: Metric, image: Array) -> Iterator[slice]:
-    """Slices of rows that hold about `_BLOCK_PIXELS` pixels; all of them for a metric of wholes."""
+    """Yield slices of about `_BLOCK_PIXELS` pixels; all rows unless the metric is pixelwise."""
     return _rows(image) if isinstance(metric, Pixelwise) else iter([slice(0, len(image))])
 
 
@@ -210,10 +213,10 @@ def _rows(image: Array) -> Iterator[slice]:
     return (slice(start, start + step) for start in range(0, len(image), step))
 
 
-#: The best exposure is sought within this many stops on either side of none.
 EXPOSURE_STOPS = 6.0
+"""Largest exposure in stops, up or down, in the search for the best one."""
 
-#: Pixels on which the best exposure is sought, and those that bracket it first.
+# Pixels for the search of the best exposure, and for bracketing it.
 _SEARCH_PIXELS, _BRACKET_PIXELS = 16_384, 2_048
 
 
@@ -224,14 +227,13 @@ def best_exposure(
     mask: ArrayLike,
     viewing: Viewing = DEFAULT_VIEWING,
 ) -> float:
-    """The factor on `test`, within ±6 stops, that makes the mean of `metric` over `mask` smallest.
+    """Return the factor on `test`, within ±6 stops, of the smallest mean of `metric` over `mask`.
 
-    That of a linear metric is the factor of least squares, which is taken for a metric of
-    neighbourhoods, too: it would have to look at whole images. Of others, the mean is taken over at
-    most 16,384 counted pixels, drawn with a fixed seed. Whole stops bracket the minimum, a bounded
-    scalar search (Brent) finds it to 0.001 stop, and the factors 1 and least squares compete with
-    it, so an image that is a multiple of the reference gives that multiple exactly. 1 if no pixel
-    counts or if either image has no positive value there.
+    For a linear metric it is the factor of least squares, and also for a metric of neighbourhoods,
+    which would need whole images. For others, the mean is over at most 16,384 counted pixels, drawn
+    with a fixed seed. Whole stops bracket the minimum, a bounded scalar search (Brent) finds it to
+    0.001 stop, and the factors 1 and least squares compete with it, so a multiple of the reference
+    gives that multiple exactly. 1 if no pixel counts or if either image has no positive value.
     Raises as `comparisons.departure.metrics.delta_e_2000`.
     """
     from scipy.optimize import minimize_scalar
@@ -246,8 +248,8 @@ def best_exposure(
     # A random draw, not every n-th pixel: a stride would fall in step with the columns.
     places = np.flatnonzero(mask)
     count = min(len(places), _SEARCH_PIXELS)
-    drawn = places[np.random.default_rng(0).choice(len(places), count, replace=False)]
-    drawn = np.unravel_index(drawn, mask.shape)
+    chosen = np.random.default_rng(0).choice(len(places), count, replace=False)
+    drawn = np.unravel_index(places[chosen], mask.shape)
     some = tuple(index[:_BRACKET_PIXELS] for index in drawn)
     distances, bracketing = (metric.against(reference, at, viewing) for at in (drawn, some))
 
@@ -264,17 +266,17 @@ def best_exposure(
 
 
 def least_squares_factor(test: Array, reference: Array) -> float:
-    """``Σ test·reference / Σ test²``, 1 where that is not positive."""
+    """Return ``Σ test·reference / Σ test²``, or 1 if that is not positive."""
     energy = overlap = 0.0
     for rows in _rows(test):
         shown, truth = (np.asarray(image[rows], np.float64) for image in (test, reference))
-        energy, overlap = energy + float(np.vdot(shown, shown)), overlap + np.vdot(shown, truth)
-    overlap = float(overlap)
+        energy += float(np.vdot(shown, shown))
+        overlap += float(np.vdot(shown, truth))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
 
 
-#: The bins' range in decades, log10 of the metric's unit, and the bins in each decade.
 DECADES, BINS_A_DECADE = (-2, 3), 12
+"""Range of the bins, log10 of the metric's unit, and bins per decade."""
 
 
 class Histogram(Record):
@@ -286,12 +288,12 @@ class Histogram(Record):
     low: Positive
     high: Positive
     counts: tuple[Count, ...]
-    below: Annotated[Count, Meta(description="Pixels under `low`, zeros included.")]
+    below: Annotated[Count, Meta(description="Pixels below `low`, including zeros.")]
     above: Annotated[Count, Meta(description="Pixels at `high` or more.")]
 
 
 def histogram(values: ArrayLike) -> Histogram:
-    """The histogram of values ≥ 0, of any shape."""
+    """Return the histogram of values ≥ 0, of any shape."""
     values = np.asarray(values).ravel()
     first, last = DECADES
     edges = np.logspace(first, last, (last - first) * BINS_A_DECADE + 1)

@@ -1,1 +1,1 @@
-"""What methods cost at a size that is too large to try them all, predicted from smaller ones."""
+"""Predict the cost of methods at a size too large to try them all, from smaller sizes."""

@@ -1,9 +1,10 @@
-"""The prices of effects at a size that is asked for, from those of the study and of half its size.
+"""Prices of effects at a requested size, from those at the study's size and at half of it.
 
-What an effect removes follows a straight line in ``1 / width``, as errors do, and what it adds to
-the time one in the number of pixels.
+The ΔE2000 that an effect removes is linear in ``1 / width``, as errors are; the time that it adds
+is linear in the number of pixels.
 """
 
+from collections.abc import Sequence
 from math import hypot
 
 from comparisons.cost.cost_record import AskedPrice, Prices
@@ -21,7 +22,7 @@ def at_size(
     smaller, larger
         Prices with the same samples per pixel at the two ``sizes``.
     target
-        The asked width and height.
+        The requested width and height.
     """
     edges, pixels = (
         _reach([1 / width for width, _ in (*sizes, target)]),
@@ -30,22 +31,27 @@ def at_size(
     return tuple(
         AskedPrice(
             effect=after.effect,
-            removes=_continued(before.removes, after.removes, edges, doubt=0.5),
+            removes=_continued(before.removes, after.removes, edges, uncertainty=0.5),
             adds_s=_continued(before.adds_s, after.adds_s, pixels),
         )
         for before, after in zip(smaller.effects, larger.effects, strict=True)
     )
 
 
-def _reach(places):
-    """Return how far the last place is beyond the second, in steps from the first to that."""
+def _reach(places: Sequence[float]) -> float:
+    """Return how far the last place is beyond the second, in steps from first to second."""
     first, second, last = places
     return (last - second) / (second - first)
 
 
-def _continued(before, after, reach, doubt=0.0):
-    """Continue a line through two values, with their intervals and doubt of what it adds."""
+def _continued(
+    before: Estimated, after: Estimated, reach: float, uncertainty: float = 0.0
+) -> Estimated:
+    """Continue a line through two values and their intervals.
+
+    ``uncertainty`` is a share of the step beyond the second.
+    """
     moved = reach * (after.value - before.value)
     halves = [(one.high - one.low) / 2 for one in (before, after)]
-    half = hypot(reach * halves[0], (1 + reach) * halves[1], doubt * moved)
+    half = hypot(reach * halves[0], (1 + reach) * halves[1], uncertainty * moved)
     return Estimated(after.value + moved, after.value + moved - half, after.value + moved + half)

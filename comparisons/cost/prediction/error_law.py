@@ -1,14 +1,13 @@
 """Errors of all methods of a scene at another size and any count, with intervals.
 
-Between sizes the error of a count follows a straight line in ``1 / width``: edges make it depend on
-the size, and so does their share of the pixels. Between counts it follows a method's
+Between sizes, the error at a count is linear in ``1 / width``, as the edges' share of the pixels
+is. Between counts, it follows a method's
 :class:`~comparisons.cost.prediction.error_curve.ErrorCurve` at one size.
 
-How far off that is, the fitted points tell by cross-validation: the largest size is predicted from
-the others, and the middle counts of a curve from its other ones. What the line misses grows as the
-root of the error, for edges that meet the pixels by chance add up so; what the curve misses, as the
-part of the error that is noise. Both are told over all methods of the scene together, and of each
-method more by its own.
+Cross-validation shows how far off that is: the largest size is predicted from the others, and the
+middle counts of a curve from its other counts. The line's misfit grows as the root of the error,
+since edges meet the pixels by chance; the curve's misfit grows as the noise. Both are estimated
+over all methods of the scene, with more weight on a method's own cases.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,15 +22,15 @@ from scipy import stats
 from comparisons.cost.prediction.error_curve import ErrorCurve
 
 LEVEL = 0.9
-"""Chance of an interval to hold what is measured later."""
+"""Chance that an interval holds a later measurement."""
 
 SHARED = 4
-"""Cases that those of all methods count as, for one method beside its own two."""
+"""Weight of all methods' cases together, next to a method's own."""
 
 OWN_CHANCE = 1 / 3
-"""Of what the line misses at the largest size: what the edges of the asked one add by chance."""
+"""Share of the line's misfit at the largest size that edges add by chance at the requested size."""
 
-Point = tuple[float, int]
+Point = tuple[int, int]
 """A width and a count."""
 
 
@@ -42,32 +41,32 @@ class ErrorLaw:
     Attributes
     ----------
     widths
-        The sizes that were measured, three from the smallest; the curve is of the middle one.
+        The measured widths, from the smallest; the curve is of the middle one.
     errors
-        ``{(width, count): error of each round}``, with the counts of the largest at all widths.
+        ``{(width, count): error of each round}``; the largest width's counts are at all widths.
     curve
-        The method's, at the middle width.
+        The method's curve at the middle width.
     """
 
-    widths: tuple[float, float, float]
+    widths: tuple[int, int, int]
     errors: Mapping[Point, Sequence[float]]
     curve: ErrorCurve
 
     def at(self, width: float, spp: float) -> float:
-        """Return the error of a size and a count."""
+        """Return the error at a size and a count."""
         grown = [log(self._across(self.widths, s, width) / self._mean(1, s)) for s in self.counts]
         return self.curve.at(spp) * exp(np.interp(log(spp), np.log(self.counts), grown))
 
     @cached_property
     def counts(self) -> list[int]:
-        """The counts that were measured at every size."""
+        """The counts measured at every size."""
         return sorted(spp for width, spp in self.errors if width == self.widths[-1])
 
     @cached_property
     def missed_by_size(self) -> tuple[float, float]:
-        """Sums over the counts: the square of what the line misses of the largest size, the error.
+        """Sums over the counts at the largest size: squared misfit of the line, and the error.
 
-        The line is that of the other sizes.
+        The line is fitted to the other sizes.
         """
         *others, last = self.widths
         found = [self._mean(2, s) for s in self.counts]
@@ -79,7 +78,7 @@ class ErrorLaw:
 
     @cached_property
     def missed_by_count(self) -> tuple[float, float]:
-        """Sums over middle counts: squares of what the curve misses without them, and of noise."""
+        """Sums over middle counts: squared misfit of the curve without them, and squared noise."""
         held = sorted(self.curve.residuals)[1:-1]
         errors = [self._mean(1, s) for s in held]
         missed = [self.curve.without(s).at(s) - e for s, e in zip(held, errors, strict=True)]
@@ -87,7 +86,7 @@ class ErrorLaw:
         return float(np.square(missed).sum()), float(np.square(noise).sum())
 
     def spread(self, width: float, spp: float, by_size: float, by_count: float) -> float:
-        """Return the standard deviation of an error that is predicted.
+        """Return the standard deviation of a predicted error.
 
         ``by_size`` and ``by_count`` are the ratios of the sums of :attr:`missed_by_size` and
         :attr:`missed_by_count`, over all methods.
@@ -103,22 +102,22 @@ class ErrorLaw:
             value / error * float(np.std(rounds, ddof=1)) * sqrt(2 / len(rounds)),
         )
 
-    def _mean(self, place, spp):
+    def _mean(self, place: int, spp: int) -> float:
         return max(float(np.mean(self.errors[self.widths[place], spp])), TINY)
 
-    def _across(self, widths, spp, width):
-        """Continue errors along a line in 1 / width; at most, all of the last is at edges."""
+    def _across(self, widths: Sequence[float], spp: int, width: float) -> float:
+        """Continue errors along a line in 1 / width; at most, all of the last error is at edges."""
         errors = [self._mean(place, spp) for place in range(len(widths))]
         slope, end = np.polyfit(1 / np.asarray(widths, float), errors, 1, w=1 / np.array(errors))
         return max(slope / width + end, errors[-1] * min(widths[-1] / width, 1.0))
 
 
 TINY = 1e-9
-"""An error of nothing, as a number that has a logarithm."""
+"""Stands for an error of 0, which has no logarithm."""
 
 
-def _shrunk(own, shared, count):
-    """Return a ratio of sums: a method's own, drawn towards that of all."""
+def _shrunk(own: tuple[float, float], shared: float, count: int) -> float:
+    """Return a method's own ratio of sums, drawn towards that of all methods."""
     missed, whole = own
     return (missed / whole * count + SHARED * shared) / (count + SHARED) if whole else shared
 
@@ -132,7 +131,7 @@ def intervals(laws: Sequence[ErrorLaw], width: float) -> Callable[[ErrorLaw, flo
     by_size, by_count = (missed / max(whole, TINY) for missed, whole in (size, count))
     reach = stats.t.ppf((1 + LEVEL) / 2, SHARED + 2)
 
-    def interval(law, spp):
+    def interval(law: ErrorLaw, spp: float) -> NDArray:
         value, spread = law.at(width, spp), law.spread(width, spp, by_size, by_count)
         return np.clip([value, value - reach * spread, value + reach * spread], 0.0, None)
 

@@ -1,13 +1,14 @@
-"""What methods cost at a size that is too large to try them all: predicted from smaller ones.
+"""Predict the cost of methods at a size too large to try them all, from smaller sizes.
 
-Each method is rendered at three smaller sizes of the same shape, in turns, and curves are fitted to
-its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). Where asked to, it is rendered at
-the size itself, too, in the same turns, with counts that were not fitted.
+Each method is rendered at three smaller sizes of the same shape, in turn, and curves are fitted to
+its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). On request, it is also rendered at
+the size itself, in the same turns, with counts that were not fitted.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
+from math import inf
 from operator import attrgetter
 from statistics import median
 
@@ -23,7 +24,7 @@ from comparisons.cost.cost_record import (
 )
 from comparisons.cost.effort import DETERMINISTIC_SPP, Effort
 from comparisons.cost.front import ERRORS, reached
-from comparisons.cost.judging import judged
+from comparisons.cost.judging import Judge, judged
 from comparisons.cost.ladder import Distinct
 from comparisons.cost.methods import Methods
 from comparisons.cost.prediction.error_curve import ErrorCurve
@@ -32,6 +33,7 @@ from comparisons.cost.prediction.target import SEEN_SPP, Size, sizes
 from comparisons.cost.prediction.time_curve import TimeCurve
 from comparisons.cost.timing import interval
 from reference.rendering.passes import Progress, passes
+from reference.rendering.renderer import Renderer
 
 FITTED_SPP = (4, 16, 64), (4, 8, 16, 64), (4, 16)
 """Counts at each size, from the smallest; errors are drawn from the images of the middle one."""
@@ -54,15 +56,15 @@ def predict(
     Parameters
     ----------
     methods
-        The methods of a prepared comparison, whose film has the shape of the asked size.
+        The methods of a prepared comparison, whose film has the shape of the requested size.
     target
-        The asked width and height.
+        The requested width and height.
     effort
         Rounds, and samples of the reference.
     seed
-        Of the run.
+        Seed of the run.
     is_measured
-        Whether to render at the asked size, too.
+        Whether to render at the requested size, too.
     progress
         ``progress(stage, done, total)``.
 
@@ -109,14 +111,18 @@ def predict(
 
 
 def cheapest(forecasts: Sequence[Forecast], error: float) -> Cheapest:
-    """Return the method that reaches an error in the least time, as far as is predicted."""
+    """Return the method predicted to reach an error in the shortest time."""
     by_method = groupby(forecasts, key=attrgetter("method"))
-    found = [way for way in (_way(list(own), error) for _, own in by_method) if way.seconds]
-    return min(found, key=lambda way: way.seconds.value, default=Cheapest(error))
+    found = (_way(list(own), error) for _, own in by_method)
+    return min(found, key=_seconds, default=Cheapest(error))
 
 
-def _way(own, error):
-    """Return how a method reaches an error."""
+def _seconds(way: Cheapest) -> float:
+    return way.seconds.value if way.seconds else inf
+
+
+def _way(own: Sequence[Forecast], error: float) -> Cheapest:
+    """Return when a method reaches an error."""
     place = reached([forecast.error.value for forecast in own], error)
     if place is None:
         return Cheapest(error)
@@ -126,25 +132,33 @@ def _way(own, error):
 
 
 def _forecast_counts(rung: Distinct, is_measured: bool) -> Sequence[int]:
-    """Return the counts of a method; one without random numbers has few, and those measured."""
+    """Return the counts of a method; one without random numbers needs few."""
     seen = SEEN_SPP if is_measured else ()
     return sorted({*(FORECAST_SPP if rung.monte_carlo else DETERMINISTIC_SPP), *seen})
 
 
-def _renderers(methods, fitted, seen):
-    """Return a renderer for each method, size and count; scenes are shared, and resized."""
-    wanted = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
-    made = {}
+def _renderers(methods: Methods, fitted: Sequence[Size], seen: Size | None) -> dict[Key, Renderer]:
+    """Return a renderer for each method, size and count; scenes are shared and resized."""
+    jobs = [*zip(fitted, FITTED_SPP, strict=True), *([(seen, SEEN_SPP)] if seen else [])]
+    made: dict[Key, Renderer] = {}
     for rung in methods.rungs:
-        for size, (first, *others) in wanted:  # what a kernel prepares may have the film's size
+        for size, (first, *others) in jobs:  # what a kernel prepares may depend on the film's size
             own = made[rung.name, size, first] = methods.renderer(rung.method, first, size)
             made |= {(rung.name, size, spp): own.sampled(spp) for spp in others}
     return made
 
 
-def _measure(renderers, judges, kept_size, rounds, seed, progress):
-    """Render in turns; return seconds and errors of each key, and the images at one size."""
-    errors, images = defaultdict(list), defaultdict(list)
+def _measure(
+    renderers: Mapping[Key, Renderer],
+    judges: Mapping[Size, Judge],
+    kept_size: Size,
+    rounds: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[dict[Key, list[float]], dict[Key, list[float]], dict[Key, np.ndarray]]:
+    """Render in turn; return seconds and errors of each key, and the images at one size."""
+    errors: dict[Key, list[float]] = defaultdict(list)
+    images: dict[Key, list[np.ndarray]] = defaultdict(list)
     loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage="predicting")
     for one in loop:
         if one.number < 2:  # tracing, compilation and cold caches
@@ -158,8 +172,8 @@ def _measure(renderers, judges, kept_size, rounds, seed, progress):
     return seconds, errors, {key: np.stack(found) for key, found in images.items()}
 
 
-def _time_curve(name, seconds, target):
-    """Fit the times of a method, but those at the asked size."""
+def _time_curve(name: str, seconds: Mapping[Key, list[float]], target: Size) -> TimeCurve:
+    """Fit the times of a method, except at the requested size."""
     keys = [key for key in seconds if key[0] == name and key[1] != target]
     return TimeCurve.fit(
         [width * height for _, (width, height), _ in keys],
@@ -168,7 +182,13 @@ def _time_curve(name, seconds, target):
     )
 
 
-def _error_law(name, fitted, errors, images, judge):
+def _error_law(
+    name: str,
+    fitted: Sequence[Size],
+    errors: Mapping[Key, list[float]],
+    images: Mapping[Key, np.ndarray],
+    judge: Judge,
+) -> ErrorLaw:
     """Return the law of a method's errors, with its images at the middle size."""
     own = {
         (size[0], spp): found
@@ -176,12 +196,14 @@ def _error_law(name, fitted, errors, images, judge):
         if method == name and size in fitted
     }
     kept = {spp: images[name, size, spp] for method, size, spp in images if method == name}
-    widths = tuple(width for width, _ in fitted)
-    return ErrorLaw(widths, own, ErrorCurve.measured(kept, judge.distance))
+    (first, _), (middle, _), (last, _) = fitted
+    return ErrorLaw((first, middle, last), own, ErrorCurve.measured(kept, judge.distance))
 
 
-def _seen(key, seconds, errors):
-    """Return what was measured at the asked size, None where nothing was."""
+def _seen(
+    key: Key, seconds: Mapping[Key, list[float]], errors: Mapping[Key, list[float]]
+) -> Seen | None:
+    """Return the measurements at the requested size, None if there are none."""
     if key not in seconds:
         return None
     found = errors[key]

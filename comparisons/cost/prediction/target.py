@@ -1,4 +1,4 @@
-"""The size that is asked for, what is fitted for it, and whether either is possible."""
+"""The requested size, the sizes fitted for it, and whether both are possible."""
 
 from math import sqrt
 
@@ -8,52 +8,51 @@ from reference.rendering import memory
 from reference.rendering.renderer import LARGEST_PASS
 
 LARGEST_FITTED = 256**2
-"""Pixels of the largest size that is fitted, where the asked one is at least four times that."""
+"""Pixels of the largest fitted size, if the requested one has at least four times as many."""
 
 SEEN_SPP = (6, 32)
-"""Counts that are measured at the asked size: none of them is fitted."""
+"""Counts measured at the requested size; none of them is fitted."""
 
 Size = tuple[int, int]
 
 
 def sizes(target: Size) -> tuple[Size, Size, Size]:
-    """Return the sizes that are fitted for another one: smaller ones of its shape.
+    """Return the sizes fitted for another: smaller ones of its shape.
 
     Raises
     ------
     InputError
-        Where the asked size is too small for that.
+        When the requested size is too small for that.
     """
     area = target[0] * target[1]
     largest = min(LARGEST_FITTED, area / 4)
     scales = [sqrt(largest / area) * factor for factor in (1 / 4, 1 / 2, 1)]
-    found = tuple((round(target[0] * s), round(target[1] * s)) for s in scales)
-    if min(found[0]) < 4:
+    smallest, middle, last = ((round(target[0] * s), round(target[1] * s)) for s in scales)
+    if min(smallest) < 4:
         raise InputError(
-            f"{target[0]}x{target[1]} is too small to predict anything for: measure it itself with"
-            " --resolution."
+            f"{target[0]}x{target[1]} is too small for a prediction: measure it with --resolution."
         )
-    return found
+    return smallest, middle, last
 
 
 def require(name: str, target: Size, rendered: Size | None, is_measured: bool) -> None:
-    """Refuse what cannot be predicted, or measured where that is asked for, of a scene.
+    """Reject sizes that cannot be predicted for a scene, or measured if that is requested.
 
     Parameters
     ----------
     name
-        Of the scene.
+        Name of the scene.
     target
-        The asked width and height.
+        The requested width and height.
     rendered
-        Width and height of the study itself; None where they follow the asked ones.
+        Width and height of the study itself; None if derived from ``target``.
     is_measured
-        Whether to render at the asked size, too.
+        Whether to render at the requested size, too.
 
     Raises
     ------
     InputError
-        For a size that is too small, of another shape, or too large for the memory or one pass.
+        For a size that is too small, of another shape, or too large for memory or one pass.
     """
     sizes(target)
     if rendered is not None:
@@ -62,21 +61,21 @@ def require(name: str, target: Size, rendered: Size | None, is_measured: bool) -
         _require_room(name, *target)
 
 
-def _require_shape(rendered, target):
-    """Refuse two sizes that are not of one shape, to half a pixel of the smaller."""
+def _require_shape(rendered: Size, target: Size) -> None:
+    """Reject sizes of different shapes; a pixel of the smaller one is tolerated."""
     (width, height), (wide, high) = sorted([rendered, target])
     if abs(high * width / wide - height) > 1:
         raise InputError(
-            f"{rendered[0]}x{rendered[1]} and {target[0]}x{target[1]} are not of one shape: give"
-            " --resolution the shape of --at, or leave it out."
+            f"{rendered[0]}x{rendered[1]} and {target[0]}x{target[1]} differ in shape: give"
+            " --resolution the shape of --at, or omit it."
         )
 
 
-def _require_room(name, width, height):
+def _require_room(name: str, width: int, height: int) -> None:
     most = LARGEST_PASS // max(*SEEN_SPP, *DETERMINISTIC_SPP)
     if width * height > most:
         raise InputError(
-            f"{width}x{height} is too large to be measured: {most} pixels are allowed. Leave out"
-            " --measure to have it predicted."
+            f"{width}x{height} is too large to measure: at most {most} pixels are allowed. Omit"
+            " --measure to predict it."
         )
     memory.require(name, width, height)
