@@ -27,7 +27,7 @@ class Corner(Record):
         Median time of one rendering.
     """
 
-    effects: Annotated[tuple[str, ...], Meta(description="The effects that are simulated.")]
+    effects: Annotated[tuple[str, ...], Meta(description="Simulated effects.")]
     error: float
     seconds: float
 
