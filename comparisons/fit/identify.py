@@ -31,7 +31,7 @@ AT_BOUND = 1e-5
 """Share of the distance between two bounds; anything nearer to a bound is at it."""
 
 PARTNER = 0.1
-"""Share of a change that another parameter must have in it to be named."""
+"""Share of a change that another parameter must take up to be named."""
 
 COVERAGE = 1.96
 """Standard errors to either side, of an interval that covers 95 % of normal errors."""

@@ -1,9 +1,9 @@
-"""What a fit minimises: the mean over pixels of a distance between two images.
+"""The losses of a fit: means over pixels of a distance between two images.
 
 =================  =====================================================================  =========
 Loss               Distance of two pixels                                                 Unit
 =================  =====================================================================  =========
-``perceptual``     Euclidean in CAM16-UCS (`cam16ucs`)                                    ΔE
+``perceptual``     Euclidean in CAM16-UCS                                                 ΔE
 ``linear``         its square, in linear RGB; 1 is display white                          white
 ``log-luminance``  square of the ratio of luminances, each with                           stops
                    :data:`comparisons.departure.metrics.LOG2_EPSILON` added, in stops

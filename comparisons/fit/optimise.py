@@ -56,7 +56,7 @@ class Fittable(Protocol):
 
     @property
     def parameters(self) -> Sequence[Parameter]:
-        """What the vector holds."""
+        """The parameters in the vector."""
 
     def image(self, x: NDArray) -> NDArray:
         """Return the image (N, 3)."""

@@ -169,7 +169,7 @@ def _described(bsdf):
     """Return a ``phong`` as a material of plain numbers; a coefficient with a texture is 1."""
 
     def plain(values):
-        # The shortest decimals of single precision are what the scene says.
+        # The scene's numbers are the shortest decimals of single precision.
         return tuple(float(str(np.float32(value))) for value in np.ravel(values))
 
     point = dr.zeros(mi.SurfaceInteraction3f)

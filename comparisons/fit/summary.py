@@ -144,7 +144,7 @@ def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
     for index in graph.nodes(mi.ObjectType.BSDF):
         label = graph.label(index)
         for _, child in graph.children(index, mi.ObjectType.BSDF):
-            index = child  # of twosided, what is inside
+            index = child  # inside twosided
         found[label] = {"plugin": graph.plugin(index)} | _plain_properties(graph.props(index))
     return found
 

@@ -1,4 +1,4 @@
-"""What a hard case is, and how it is judged.
+"""A hard case, and how it is judged.
 
 A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
 the naive one does not. Tests demand both of every case; the report prints them. The cases are in
