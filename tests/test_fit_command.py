@@ -81,7 +81,7 @@ def test_bad_words_are_refused(words, expected, run, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("bsdf-mask", "nothing is seen through"), ("bsdf-principled", "n varies over the surface")],
+    [("bsdf-mask", "needs opaque materials"), ("bsdf-principled", "n varies over the surface")],
 )
 def test_what_a_fit_has_no_parameters_for_is_refused_by_name(name, expected, run, tmp_path):
     code, _, messages = run("fit", CORPUS / f"{name}.xml", "-o", tmp_path, *SMALL)

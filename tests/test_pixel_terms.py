@@ -219,7 +219,7 @@ def test_the_physical_lobe_of_a_mirror_like_surface_is_about_the_mirror_directio
     [
         ("fig-6-10", {}, "Flat shading"),
         ("fig-8-9", {"heuristic": "mean-ambient"}, "mean-ambient"),
-        ("fig-8-9", {"variant": "llvm_ad_spectral"}, "wavelength by wavelength"),
+        ("fig-8-9", {"variant": "llvm_ad_spectral"}, "by wavelength"),
     ],
 )
 def test_other_shading_has_no_terms_and_says_why(scene, options, reason):

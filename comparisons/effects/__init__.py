@@ -1,1 +1,1 @@
-"""The departure attributed to effects."""
+"""The departure, attributed to effects."""

@@ -1,17 +1,19 @@
-"""Scenes between the two halves: some differences simulated, the others as the heuristic has them.
+"""Scenes between the two halves: some differences simulated, the others as in the heuristic half.
 
 The halves of a pair differ in a few effects. Any subset of them makes a scene: the physical half
 with the BSDFs, lights and environment of the heuristic one where an effect is left out. Emission
-and ambient light of the heuristic half do not travel, so they are a picture of their own, of what
-a camera ray meets, to be added to the light that does.
+and ambient light of the heuristic half do not travel. They are a separate picture of what a camera
+ray meets, to be added to the light that does travel.
 """
 
 from collections.abc import Set
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import mitsuba as mi
 
+from heuristic.arrays import Scene
 from reference.effects import EFFECTS
 from reference.effects.effect import Effect
 from reference.effects.light_forms import ENVIRONMENT
@@ -36,18 +38,18 @@ class Between:
     pair
         Both halves, without tessellation.
     plan
-        Of the reference.
+        The reference's plan.
     scene
         The physical half, with the plan's sampler.
 
-    The last scene is kept for subsets that differ in what the integrator does alone, and no other:
-    Dr.Jit traces every BSDF that is alive, in whatever scene.
+    Only the last scene is kept, for subsets that differ only in what the integrator does: Dr.Jit
+    traces every BSDF that is alive, in any scene.
     """
 
     pair: Pair
     plan: Plan
-    scene: mi.Scene
-    _last: dict = field(default_factory=dict, init=False, repr=False)
+    scene: Scene
+    _last: dict[frozenset[Effect], Scene] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def differences(self) -> tuple[Effect, ...]:
@@ -56,10 +58,10 @@ class Between:
             effect for effect in EFFECTS if effect.differs(self.facts, self.plan.calls_for(effect))
         )
 
-    def of(self, simulated: Set[Effect]) -> mi.Scene:
+    def of(self, simulated: Set[Effect]) -> Scene:
         """Return the Mitsuba scene of some effects, whose light travels."""
         key = self.scene_key(simulated)
-        if key == self.scene_key(self.differences):
+        if key == self.scene_key(set(self.differences)):
             return self.scene
         if key not in self._last:
             self._last.clear()
@@ -68,11 +70,11 @@ class Between:
         return self._last[key]
 
     def scene_key(self, simulated: Set[Effect]) -> frozenset[Effect]:
-        """Return those of the effects that tell one scene from another."""
+        """Return the effects among them that change the scene."""
         return GRAFTED & set(simulated) & set(self.differences)
 
     def glow_key(self, simulated: Set[Effect]) -> frozenset[Effect]:
-        """Return those of the effects that tell what glows."""
+        """Return the effects among them that change what glows."""
         return frozenset(GLOWING) & set(simulated)
 
     def forget(self) -> None:
@@ -88,9 +90,9 @@ class Between:
         return graph
 
     def travelling(self, simulated: Set[Effect], spp: int) -> Renderer:
-        """Return what renders the light that travels, with the effects ``simulated``.
+        """Return the renderer of the light that travels, with the effects ``simulated``.
 
-        All subsets have one integrator, which can leave out what it has to.
+        All subsets share one integrator, which can leave out effects.
         """
         scene = self.of(simulated)
         alike = set(EFFECTS) - set(self.differences)
@@ -99,9 +101,9 @@ class Between:
         return Renderer(scene, integrator, spp, "image of some effects")
 
     def glowing(self, simulated: Set[Effect], spp: int) -> Renderer | None:
-        """Return what renders emission, ambient light and background; None where there is none.
+        """Return the renderer of emission, ambient light and background; None if there are none.
 
-        It is to be added to the light that travels, with equal seeds.
+        Its images are to be added to the light that travels, with equal seeds.
         """
         left_out = [effect for effect in GLOWING if effect not in simulated]
         if not left_out:
@@ -113,8 +115,10 @@ class Between:
                 graph.detach(0, key)
         for shape in graph.nodes(SHAPE):
             for _, index in graph.children(shape, BSDF):
-                phong, glow = graph.props(index), {}
+                phong = graph.props(index)
+                glow: dict[str, Any] = {}
                 for effect in left_out:
+                    assert effect.glow, "GLOWING has the effects with a glow"
                     glow |= effect.glow(phong, self.facts)
                 if glow:
                     glow["twosided"] = phong.get("twosided", False)
@@ -123,11 +127,11 @@ class Between:
         if not graph.nodes(EMITTER):
             return None
         scene = with_sampler(graph, self.plan.sampler).instantiate()
-        # Hiding emitters would hide the glow; the environment is gone where it is hidden.
+        # Hiding emitters would hide the glow; a hidden environment was detached above.
         integrator = mi.load_dict({"type": "path", "max_depth": 1, "hide_emitters": False})
         return Renderer(scene, integrator, spp, "image of emission and ambient light")
 
     @cached_property
     def facts(self) -> Facts:
-        """What tells the halves apart."""
+        """The facts in which the halves differ."""
         return Facts(self.pair, examine(self.pair.physical, self.scene))

@@ -1,6 +1,6 @@
-"""The corners of a lattice of effects: some simulated, the others as the heuristic has them.
+"""The corners of a lattice of effects: some simulated, the others as in the heuristic half.
 
-A page shows the picture of each corner that was rendered, with what it leaves and what it costs.
+A page shows the picture of each corner that was rendered, with its error and its cost.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from comparisons.records import Record
 from reference.effects.effect import Effect
@@ -21,12 +22,12 @@ class Corner(Record):
     effects
         Labels of the effects that are simulated.
     error
-        Mean ΔE2000 against the reference, without the part of noise; noise may leave it below 0.
+        Mean ΔE2000 against the reference, with noise removed; it may come out below 0.
     seconds
         Median time of one rendering.
     """
 
-    effects: Annotated[tuple[str, ...], Meta(description="Those that are simulated.")]
+    effects: Annotated[tuple[str, ...], Meta(description="Simulated effects.")]
     error: float
     seconds: float
 
@@ -34,8 +35,8 @@ class Corner(Record):
 def corners(
     players: Sequence[Effect],
     rendered: Iterable[frozenset[Effect]],
-    error: Callable,
-    seconds: Callable,
+    error: Callable[[frozenset[Effect]], NDArray],
+    seconds: Callable[[frozenset[Effect]], NDArray],
 ) -> tuple[Corner, ...]:
     """Return the corners that were rendered, fewest effects first.
 
@@ -46,7 +47,7 @@ def corners(
     rendered
         Sets of them.
     error, seconds
-        Of a set: errors (R + 1, N) whose first row is of all replicates, and times (R,).
+        Functions of a set: errors (R + 1, N), whose first row is of all replicates, and times (R,).
     """
     found = [
         Corner(labels(players, each), float(error(each)[0].mean()), float(np.median(seconds(each))))
@@ -56,5 +57,5 @@ def corners(
 
 
 def labels(players: Sequence[Effect], simulated: frozenset[Effect]) -> tuple[str, ...]:
-    """Return the labels of those effects that are simulated, in their order."""
+    """Return the labels of the effects that are simulated, in their order."""
     return tuple(effect.label for effect in players if effect in simulated)

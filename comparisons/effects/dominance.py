@@ -1,20 +1,25 @@
 """Which effect dominates where: the one that removes most of the error there."""
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.departure.regions import Region
 
 LEAST = 1.0
-"""ΔE2000: what removes less cannot be seen, and does not dominate."""
+"""ΔE2000: an effect that removes less cannot be seen, and does not dominate."""
 
 ALSO = 0.5
-"""Of what the first effect removes: a second one that removes as much is named beside it."""
+"""Share of what the first effect removes: a second one that removes as much is named too."""
 
 NONE, UNCOUNTED = -1, -2
 
 
-def dominating(effects, counted):
+def dominating(effects: Mapping[str, NDArray], counted: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return (H, W): the place of the dominating effect among the effects.
 
-    :data:`NONE` where none removes :data:`LEAST`, :data:`UNCOUNTED` where a pixel does not count.
+    :data:`NONE` if no effect removes :data:`LEAST`, :data:`UNCOUNTED` if a pixel does not count.
 
     Parameters
     ----------
@@ -30,29 +35,32 @@ def dominating(effects, counted):
     return np.where(counted, places, UNCOUNTED)
 
 
-def in_region(region, resolution, effects):
-    """Return the effect that removes most in a region, in words; None where none does.
+def in_region(
+    region: Region, resolution: tuple[int, int], effects: Mapping[str, NDArray]
+) -> str | None:
+    """Return the effect that removes most in a region, in words; None if none dominates.
 
     Parameters
     ----------
-    region : comparisons.departure.regions.Region
+    region
         The region.
     resolution
-        ``(width, height)`` of the image that the region is of; the maps may be smaller.
+        ``(width, height)`` of the region's image; the maps may be smaller.
     effects
         ``{name: (H, W)}``: the ΔE2000 that each removes.
     """
     return in_words({n: _mean(values, region, resolution) for n, values in effects.items()})
 
 
-def in_words(means):
+def in_words(means: Mapping[str, float]) -> str | None:
     """Return the effect of the largest mean ``{name: ΔE2000}``, and a second one that has half.
 
-    None where no mean reaches :data:`LEAST`.
+    None if no mean reaches :data:`LEAST`.
     """
-    first, *others = sorted(means, key=means.get, reverse=True) or [None]
-    if first is None or means[first] < LEAST:
+    ordered = sorted(means, key=lambda name: means[name], reverse=True)
+    if not ordered or means[ordered[0]] < LEAST:
         return None
+    first, *others = ordered
     if others and means[others[0]] >= max(ALSO * means[first], LEAST):
         return f"{first}, then {others[0]}"
     return first

@@ -4,16 +4,17 @@ from functools import partial
 
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.effects.dominance import in_region, in_words
 from comparisons.record import Comparison
 
 
-def named(comparison: Comparison, effects: dict) -> ComparisonRecord:
-    """Return the record of a comparison in which regions, shapes and materials name their effect.
+def named(comparison: Comparison, effects: dict[str, NDArray]) -> ComparisonRecord:
+    """Return a comparison's record in which regions, shapes and materials name their effect.
 
-    ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes, perhaps in a smaller size.
+    ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
     """
     record, images = comparison.record, comparison.images
     regions = tuple(
@@ -30,7 +31,7 @@ def named(comparison: Comparison, effects: dict) -> ComparisonRecord:
 
 
 def _carried(carriers, places, effects):
-    """Name the effects of carriers, by the cell of the maps in which each of their pixels lies."""
+    """Name the effects of carriers, by the maps' cell in which each of their pixels lies."""
     seen = places >= 0
     counts = np.bincount(places[seen], minlength=len(carriers))
     sums = {

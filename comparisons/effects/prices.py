@@ -1,23 +1,31 @@
 """The price of an effect: the error that it removes, and the time that it adds.
 
-Both depend on what is simulated already: shadows without the light that surfaces send each other
-can look worse than neither. The price is therefore the Shapley value over the effects in which the
-halves differ (:mod:`comparisons.effects.shapley`): the mean over all orders in which they can be
-added. The errors removed add up to the whole departure but for the closure, in the mean and in
-every pixel, and the times to the difference between reference and kernel. The closure is the error
-that is left where all effects are simulated, which nothing but a fault can leave.
+Both depend on what is simulated already: shadows without the light between surfaces can look worse
+than neither. The price is therefore the Shapley value over the effects in which the halves differ
+(:mod:`comparisons.effects.shapley`): the mean over all orders in which they can be added. The
+errors removed add up to the departure less the closure, in the mean and in every pixel, and the
+times to the difference between reference and kernel. The closure is the error that remains when all
+effects are simulated; only a fault can cause it.
 
-All errors are without the part of noise (:mod:`comparisons.effects.noiseless`).
+All errors are without noise (:mod:`comparisons.effects.noiseless`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons import intervals
 from comparisons.cost.cost_record import Closure, Price, Prices
 from comparisons.effects import shapley
 from comparisons.effects.corners import corners, labels
+from comparisons.effects.lattice import Lattice, Replicates
+from comparisons.effects.noiseless import Noiseless
+from comparisons.records import Estimated
+from reference.effects.effect import Effect
+
+Errors = dict[frozenset[Effect], NDArray]
 
 
 @dataclass(frozen=True)
@@ -29,61 +37,67 @@ class Priced:
     prices
         The means.
     closure
-        The mean that is left where all effects are simulated.
+        The mean error that remains when all effects are simulated.
     maps
         ``{effect: (H, W)}``: the ΔE2000 that each removes.
     departure
-        (H, W): the ΔE2000 of the heuristic half, which the maps and what is left add up to.
+        (H, W): the ΔE2000 of the heuristic half, the sum of ``maps`` and ``left``.
     left
-        (H, W): the ΔE2000 that is left where all effects are simulated.
+        (H, W): the ΔE2000 that remains when all effects are simulated.
     previews
         ``{labels of the effects that are simulated: (f H, f W, 3)}``, linear.
     """
 
     prices: Prices
     closure: Closure
-    maps: dict
+    maps: dict[str, NDArray]
     departure: np.ndarray
     left: np.ndarray
-    previews: dict
+    previews: dict[tuple[str, ...], NDArray]
 
 
-def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orders=shapley.ORDERS):
-    """Return the effects of a lattice as :class:`Priced`.
+def prices(
+    lattice: Lattice,
+    noiseless: Noiseless,
+    seed: int = 0,
+    exact_effects: int = shapley.EXACT_PLAYERS,
+    orders: int = shapley.ORDERS,
+) -> Priced:
+    """Return the prices of a lattice's effects.
 
     Parameters
     ----------
-    lattice : comparisons.effects.lattice.Lattice
+    lattice
         The images.
-    noiseless : comparisons.effects.noiseless.Noiseless
-        What tells their errors.
+    noiseless
+        Measures their errors.
     seed
-        Of the orders drawn where there are many effects.
+        Of the orders drawn if there are many effects.
     exact_effects, orders
-        As of :func:`comparisons.effects.shapley.shares`.
+        See :func:`comparisons.effects.shapley.shares`.
     """
     judge, counted = noiseless.judge, noiseless.judge.counted
     effects, everything = lattice.effects, frozenset(lattice.effects)
     if len(effects) <= exact_effects:
         lattice.render(key for each in shapley.subsets(effects) for key in lattice.needed(each))
     lattice.render([lattice.grafted])
-    errors = {}
+    errors: Errors = {}
 
-    def image(simulated):
-        # Not the reference itself: what the edits of the scene leave would not be seen.
+    def image(simulated: frozenset[Effect]) -> Replicates:
+        # Not the reference itself, which would hide errors of the scene's edits.
         is_whole = simulated == everything
         return lattice.of(lattice.grafted) if is_whole else lattice.simulating(simulated)
 
-    def error(simulated):
+    def error(simulated: frozenset[Effect]) -> NDArray:
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
             errors[simulated] = noiseless.errors(image(simulated).images)
         return errors[simulated]
 
-    def time(simulated):
+    def time(simulated: frozenset[Effect]) -> NDArray:
         return lattice.simulating(simulated).seconds
 
-    nothing = frozenset()
+    nothing: frozenset[Effect] = frozenset()
     shares = shapley.shares(effects, error, seed, exact_effects, orders)
     times = shapley.shares(effects, time, seed, exact_effects, orders)
     found, maps = [], {}
@@ -121,13 +135,13 @@ def prices(lattice, noiseless, seed=0, exact_effects=shapley.EXACT_PLAYERS, orde
     return Priced(priced, closure, maps, departure, left, previews)
 
 
-def _jackknife(values):
+def _jackknife(values: Sequence[float]) -> Estimated:
     """Return the first value, with an interval from the others, each leaving out one replicate."""
     value, *others = values
     return intervals.student(float(value), float(intervals.jackknife_error(others)), len(others))
 
 
-def _filled(values, counted):
+def _filled(values: NDArray, counted: NDArray[np.bool_]) -> NDArray[np.float64]:
     whole = np.zeros(counted.shape)
     whole[counted] = values
     return whole

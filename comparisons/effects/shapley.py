@@ -1,4 +1,4 @@
-"""Shapley values: what each of several effects is worth, whatever the order they are added in.
+"""Shapley values: the worth of each of several effects, whatever the order they are added in.
 
 For players ``N`` and a value ``v(S)`` of each subset, the share of player ``i`` is ::
 
@@ -8,17 +8,21 @@ its mean gain over all orders in which the players may come. The shares add up t
 ``v(N) - v(empty)``. Source: L. S. Shapley, *A value for n-person games*, 1953.
 """
 
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
+from typing import Any, TypeVar
 
 import numpy as np
+
+Player = TypeVar("Player", bound=Hashable)
 
 EXACT_PLAYERS = 6
 """Players up to which every subset is valued (64 of them); beyond, orders are drawn."""
 
 ORDERS = 48
-"""Orders drawn where there are too many subsets."""
+"""Orders drawn if there are too many subsets."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +34,18 @@ class Shares:
     values
         ``phi_i``: numbers or arrays, as the value function returns them.
     sampling_error
-        Standard error that drawing orders brings into the means of ``values``; 0 where exact.
+        Standard error of the means of ``values`` from drawing orders; 0 if exact.
     orders
-        Orders drawn; 0 where exact.
+        Orders drawn; 0 if exact.
     """
 
-    values: tuple
+    values: tuple[Any, ...]
     sampling_error: tuple[float, ...]
     orders: int
 
 
-def subsets(players):
-    """Return all subsets of the players, as frozen sets, small ones first."""
+def subsets(players: Sequence[Player]) -> list[frozenset[Player]]:
+    """Return all subsets of the players, small ones first."""
     return [
         frozenset(chosen)
         for size in range(len(players) + 1)
@@ -49,22 +53,28 @@ def subsets(players):
     ]
 
 
-def shares(players, value, seed=0, exact_players=EXACT_PLAYERS, orders=ORDERS):
-    """Return the :class:`Shares` of players in a game.
+def shares(
+    players: Iterable[Player],
+    value: Callable[[frozenset[Player]], Any],
+    seed: int = 0,
+    exact_players: int = EXACT_PLAYERS,
+    orders: int = ORDERS,
+) -> Shares:
+    """Return the shares of players in a game.
 
     Parameters
     ----------
     players
         Hashable names.
-    value : callable
-        ``value(frozenset) -> number or array``. Called more than once for a subset: it should
-        remember what is dear.
+    value
+        The number or array of a subset. It is called more than once per subset and should cache
+        what is expensive.
     seed
         Of the orders drawn.
     exact_players
         Players up to which every subset is valued.
     orders
-        Orders drawn where there are more: an even number, at least 4.
+        Orders drawn if there are more: an even number, at least 4.
     """
     players = tuple(players)
     if len(players) <= exact_players:

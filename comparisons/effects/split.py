@@ -1,34 +1,38 @@
-"""The departure split into its causes: a chain of images from the kernel to the reference.
+"""The departure, split into its causes: a chain of images from the kernel to the reference.
 
 ==================  ==========================================================================
 Part                Between
 ==================  ==========================================================================
-interpolation       the kernel as asked for, and with an exact normal at each point
+interpolation       the kernel as requested, and with an exact normal at each point
 implementation      the kernel, and the ``phong`` plugin under Mitsuba's direct light: nothing
-spectral            the variant of the heuristic half, and that of the reference
+spectral            the heuristic half's variant, and the reference's
 visibility          no shadows, and shadows
 light form          the heuristic half's lights, and the physical ones
 BSDF form           phong, and the physical BSDFs, both with direct light
-transport           direct light, and all of it
+transport           direct light, and all light
 ==================  ==========================================================================
 
-Every part is a signed linear image, later minus earlier, so that the parts add up to reference
-minus kernel in every pixel. A part that the scene does not have is left out; implementation, BSDF
-form and transport are always there.
+Every part is a signed linear image, later minus earlier: the parts add up to reference minus kernel
+in every pixel. A part that the scene does not have is left out; implementation, BSDF form and
+transport are always there.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.cost.cost_record import Part
 from comparisons.departure.metrics import delta_e_2000
-from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE
-from reference.effects.effect import PARTS
+from comparisons.departure.spaces import Viewing
+from comparisons.effects.lattice import KERNEL, PLAIN_KERNEL, REFERENCE, Key, Lattice
+from reference.effects.effect import PARTS, Effect
 from reference.effects.kernel_terms import POLYGONS
 
 ALWAYS = ("implementation", "BSDF form", "transport")
 
 
-def split(lattice, counted, viewing):
+def split(
+    lattice: Lattice, counted: NDArray[np.bool_], viewing: Viewing
+) -> tuple[tuple[Part, NDArray[np.float64]], ...]:
     """Return ``(Part, image)`` of each cause of a lattice's departure, and last of the whole.
 
     Images are (H, W, 3), linear and signed.
@@ -43,13 +47,13 @@ def split(lattice, counted, viewing):
     return (*parts, _part("departure", images[0], images[-1], counted, viewing))
 
 
-def _chain(lattice):
+def _chain(lattice: Lattice) -> list[tuple[str, Key]]:
     """Return ``(name of the step that leads there, image)`` from the kernel to the reference."""
     effects = set(lattice.effects)
-    chain = [("", KERNEL)]
+    chain: list[tuple[str, Key]] = [("", KERNEL)]
     if POLYGONS in effects:
-        chain.append((POLYGONS.part, PLAIN_KERNEL))
-    simulated = frozenset()
+        chain.append((str(POLYGONS.part), PLAIN_KERNEL))
+    simulated: frozenset[Effect] = frozenset()
     chain.append(("implementation", simulated))
     for name in PARTS[1:-1]:
         added = {effect for effect in effects if effect.part == name}

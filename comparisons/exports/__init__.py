@@ -1,1 +1,1 @@
-"""What another program needs to render the same scene."""
+"""A scene for another program to render."""

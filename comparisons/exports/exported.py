@@ -1,6 +1,6 @@
-"""A scene as plain data: camera, triangles, materials and lights as paired, and what pixels see.
+"""A scene as plain data: camera, triangles, paired materials and lights, and what pixels see.
 
-Everything is in world space and in display-linear units, those of the heuristic half.
+Everything is in world space and in the heuristic half's display-linear units.
 """
 
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.options import Options
+from heuristic.arrays import Scene
 from heuristic.errors import InputError
 from heuristic.scene_data import Triangles, camera, light_of, material_of, numbers, triangles_of
 from reference.pairing.halves import pair
@@ -28,12 +29,12 @@ class Exported:
     camera
         See :func:`heuristic.scene_data.camera`.
     shapes, materials, lights
-        Materials and lights as JSON has them, by :func:`exported`.
+        Materials and lights are JSON objects.
     ambient
-        I_a, three numbers.
+        ``I_a``, three numbers.
     layers
-        Of the pixel centres: ``P`` and ``N`` (H, W, 3), and ``shape`` (H, W), the number of the
-        shape from 1, 0 where there is none.
+        At the pixel centres: ``P`` and ``N`` (H, W, 3), and ``shape`` (H, W), the shape's number
+        from 1; 0 for the background.
     """
 
     name: str
@@ -46,13 +47,13 @@ class Exported:
 
 
 def exported(source: Source, options: Options) -> Exported:
-    """Return a scene as plain data, for the current variant, which is RGB.
+    """Return a scene as plain data, in the current variant, which is RGB.
 
     Raises
     ------
     InputError
-        For a camera without a perspective matrix, a shape that has no triangles, and what pairing
-        refuses.
+        For another variant, a camera without a perspective matrix, a shape without triangles, or a
+        scene that cannot be paired.
     """
     if not mi.is_rgb:
         raise InputError(f"variant {mi.variant()}: scenes are exported in RGB. Give llvm_ad_rgb.")
@@ -83,7 +84,7 @@ def exported(source: Source, options: Options) -> Exported:
     )
 
 
-def _layers(scene: mi.Scene) -> dict[str, np.ndarray]:
+def _layers(scene: Scene) -> dict[str, np.ndarray]:
     """Trace the rays through the pixel centres."""
     width, height = image_size(scene)
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)

@@ -1,20 +1,21 @@
 """Fitting the heuristic half of a scene to its reference.
 
-What is left of the loss at the best parameters is the *model error*: no values of them would remove
-it. What they removed is the *parameter error* of those that the pairing table gave. Both are told
-of the loss, which was minimised, and not of other metrics, of which other parameters may leave
-less.
+The loss at the best parameters is the *model error*: no other values would remove it. The part that
+they removed is the *parameter error* of the pairing table. Both refer to the loss that was
+minimised: by another metric, other parameters may be better.
 
-Of Phong's model the forms of its lobe are fitted; of a heuristic of a user's own the parameters
-that it declares (:mod:`comparisons.fit.own_parameters`).
+For Phong's model, the forms of its lobe are fitted; for a user's heuristic, the parameters that it
+declares (:mod:`comparisons.fit.own_parameters`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
-from comparisons.compare import guarded
+from comparisons.compare import Prepared, guarded
+from comparisons.departure.spaces import Viewing
 from comparisons.fit import own_parameters, summary
 from comparisons.fit.fit_record import FitRecord, FitTimes, FormFit, LossName
 from comparisons.fit.identify import identify
@@ -23,38 +24,41 @@ from comparisons.fit.model import Model
 from comparisons.fit.optimise import Residuals, minimise
 from comparisons.fit.own_parameters import OwnAttempt
 from comparisons.fit.parameters import parameters
-from comparisons.fit.rendering import filter_by_box, render
-from comparisons.fit.summary import Attempt, Fit, FitImages
+from comparisons.fit.rendering import Rendered, filter_by_box, render
+from comparisons.fit.summary import Departures, Fit, FitImages, FormAttempt
 from comparisons.options import Options
 from comparisons.record import guard_warnings, versions
 from comparisons.records import Pixels
+from heuristic.arrays import Scene
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
+from reference.rendering.passes import Progress
+from reference.scene.source import Source
 
 RESOLUTION = (96, 96)
 SPP = 64
-"""A fit is a mean over all pixels, so that fewer and noisier ones than of a comparison do."""
+"""A fit is a mean over all pixels: it needs fewer, and may have more noise, than a comparison."""
 
 
 @dataclass(frozen=True)
 class FitOptions:
-    """What can be chosen about a fit, beside the rendering.
+    """Choices of a fit besides the rendering.
 
     Parameters
     ----------
     loss
         A name in :data:`comparisons.fit.loss.LOSSES`.
     forms
-        Of the lobe: any of :data:`heuristic.materials.FORMS`.
+        Forms of the lobe, some of :data:`heuristic.materials.FORMS`.
     intensities
         Whether to fit the lights' intensities too, each by one factor.
 
     Raises
     ------
     InputError
-        For an unknown loss or form, or none.
+        For an unknown loss, an unknown form, or no form.
     """
 
     loss: str = "perceptual"
@@ -65,38 +69,40 @@ class FitOptions:
         if self.loss not in LOSSES:
             raise unknown("loss", self.loss, LOSSES)
         if not self.forms or not set(self.forms) <= set(FORMS):
-            raise InputError(f"forms {self.forms} are not known: choose of {', '.join(FORMS)}.")
+            raise InputError(f"forms {self.forms}: give one or more of {', '.join(FORMS)}.")
 
 
-def fit(source, options=None, chosen=None, progress=None, command=""):
+def fit(
+    source: Source,
+    options: Options | None = None,
+    chosen: FitOptions | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Fit:
     """Fit the heuristic half of a scene to its reference, in the current variant.
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    options : comparisons.options.Options, optional
-        What is rendered; :data:`RESOLUTION` and :data:`SPP` where it does not say. Films get a box
-        filter, which keeps pixels independent.
-    chosen : FitOptions, optional
+    options
+        Of the rendering; its resolution and samples are :data:`RESOLUTION` and :data:`SPP` if
+        omitted. Films get a box filter, which keeps pixels independent.
+    chosen
         How it is fitted.
-    progress : callable, optional
+    progress
         Called as ``progress(stage, done, total)`` after each pass.
     command
-        How to repeat the fit, for the record.
-
-    Returns
-    -------
-    Fit
+        Repeats the fit, for the record.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
-        Phong interpolation, something can be seen through or has a texture for ``n``, or no pixel
-        sees a surface.
+        If the scene cannot be read or paired, its heuristic half is not in RGB or not shaded by
+        Phong interpolation, a material is transparent or has a texture for ``n``, or no pixel sees
+        a surface.
     NonFiniteError
-        When a rendering holds a NaN or an infinity.
+        If a rendering holds a NaN or an infinity.
     """
     begin = perf_counter()
     chosen = chosen or FitOptions()
@@ -105,19 +111,19 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     ready = guarded(source.edited(filter_by_box), options)
     rendered = render(ready, options, progress or (lambda *_: None), heuristic is PHONG)
     rendering = perf_counter() - begin
+    attempts: Sequence[FormAttempt | OwnAttempt]
     if heuristic is PHONG:
         attempts = [_attempt(rendered, form, chosen, options.viewing) for form in chosen.forms]
     else:
-        attempts = [
-            own_parameters.attempt(ready, heuristic, rendered, LOSSES[chosen.loss], options)
-        ]
+        loss = LOSSES[chosen.loss]
+        attempts = [own_parameters.attempt(ready, heuristic, rendered, loss, options)]
     best = min(range(len(attempts)), key=lambda place: attempts[place].solution.loss)
     fits, maps = _judged(ready, rendered, attempts, options.viewing, chosen.intensities)
     record = FitRecord(
         scene=source.name,
         variant=ready.reference.variant,
         seed=options.seed,
-        resolution=options.resolution,
+        resolution=options.resolution or RESOLUTION,
         spp=ready.reference.spp * ready.passes,
         passes=ready.passes,
         viewing=options.viewing,
@@ -136,45 +142,53 @@ def fit(source, options=None, chosen=None, progress=None, command=""):
     return Fit(record, FitImages(rendered.before, rendered.reference.mean, after, maps[best]))
 
 
-def _completed(options):
+def _completed(options: Options) -> Options:
     """Fill in a fit's own defaults."""
     options.require_model("a fit")
     if options.heuristic != PHONG.name and named(options.heuristic).is_own:
         raise InputError(
-            f"heuristic {options.heuristic} cannot be fitted: the forms of --form are fitted, phong"
-            " and blinn among them. Leave --heuristic out."
+            f"heuristic {options.heuristic} cannot be fitted: --form has the built-in lobes,"
+            f" {' and '.join(FORMS)}. Omit --heuristic."
         )
     if options.interpolation is not Interpolation.PHONG:
         raise InputError(
-            f"interpolation {options.interpolation.value} cannot be fitted: its values are those of"
-            " vertices or faces. Give --interpolation phong."
+            f"interpolation {options.interpolation.value} cannot be fitted: it shades vertices or"
+            " faces. Give --interpolation phong."
         )
     return replace(options, resolution=options.resolution or RESOLUTION, spp=options.spp or SPP)
 
 
-def _attempt(rendered, form, chosen, viewing):
+def _attempt(rendered: Rendered, form: str, chosen: FitOptions, viewing: Viewing) -> FormAttempt:
     loss, counted = LOSSES[chosen.loss], rendered.counted
+    assert rendered.surface, "Phong's model is fitted on the surface"
     surface = rendered.surface.within(counted.ravel())
-    wanted = parameters(surface, form, loss.sees_colour, chosen.intensities)
-    model = Model(surface, form, wanted)
+    fitted = parameters(surface, form, loss.sees_colour, chosen.intensities)
+    model = Model(surface, form, fitted)
     residuals = Residuals(model, rendered.reference.mean[counted], loss, viewing)
     solution = minimise(residuals)
     reached = [len(np.unique(samples.pixel)) for samples in surface.samples]
     pixels = [
         counted.sum() if parameter.name == "intensity" else reached[parameter.owner]
-        for parameter in wanted
+        for parameter in fitted
     ]
     error = rendered.difference.standard_error[counted]
     verdicts, covariance = identify(residuals, solution.x, np.array(pixels), error)
     paired_loss = residuals.loss_of(rendered.before[counted])
-    return Attempt(model, solution, paired_loss, verdicts, covariance)
+    return FormAttempt(model, solution, paired_loss, verdicts, covariance)
 
 
-def _judged(ready, rendered, attempts, viewing, intensities):
+def _judged(
+    ready: Prepared,
+    rendered: Rendered,
+    attempts: Sequence[FormAttempt | OwnAttempt],
+    viewing: Viewing,
+    intensities: bool,
+) -> tuple[tuple[FormFit, ...], list[dict[str, np.ndarray]]]:
     """Return the fits of all attempts, and the residual maps of each attempt."""
     physical = summary.physical_materials(ready.pair.physical)
     lights = _light_names(ready.heuristic.scene) if intensities else []
-    fits, maps = [], []
+    fits: list[FormFit] = []
+    maps = []
     for attempt in attempts:
         departure, residual = summary.departure(
             rendered.before,
@@ -192,7 +206,7 @@ def _judged(ready, rendered, attempts, viewing, intensities):
     return tuple(fits), maps
 
 
-def _own_fit(attempt, name, departure):
+def _own_fit(attempt: OwnAttempt, name: str, departure: Departures) -> FormFit:
     """Return the fit of the parameters that a heuristic declares."""
     return FormFit(
         form=name,
@@ -207,13 +221,15 @@ def _own_fit(attempt, name, departure):
     )
 
 
-def _light_names(scene):
+def _light_names(scene: Scene) -> list[str]:
     """Return the names of the lights that the kernel knows, in its order."""
     return [emitter.id() for emitter in scene.emitters() if hasattr(emitter, "light")]
 
 
-def _form_fits(attempt, departure, physical, lights):
-    """Return a form as the chapters have it, and normalised: one fit, two ``k_s``."""
+def _form_fits(
+    attempt: FormAttempt, departure: Departures, physical: dict[str, dict], lights: list[str]
+) -> list[FormFit]:
+    """Return a form as in the chapters, and normalised: one fit, two ``k_s``."""
     return [
         FormFit(
             form=attempt.model.form,

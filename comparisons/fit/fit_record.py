@@ -10,14 +10,14 @@ from comparisons.records import VERSION, Amount, Count, Pixels, Record, Resoluti
 class Departure(Record):
     """Means of a metric over the counted pixels, in its unit.
 
-    It is not what was minimised, so that other parameters may leave less of it.
+    The loss was minimised, not this: by this metric other parameters may be better.
 
     Attributes
     ----------
     before, after
         With the paired parameters, and with the fitted ones.
     noise_floor
-        What the reference's noise alone would give.
+        Mean that the reference's noise alone would give.
     """
 
     before: Amount
@@ -27,28 +27,28 @@ class Departure(Record):
 
 
 class Fitted(Record, kw_only=True):
-    """A parameter in the terms of the chapters, and of this form of the lobe.
+    """A parameter as the chapters name it, for this form of the lobe.
 
     Attributes
     ----------
     name
         ``k_a``, ``k_d``, ``k_s``, ``n`` or ``intensity``, or a name that a heuristic declares.
     channel
-        Of a coefficient that has a number for each; otherwise empty.
+        Of a coefficient with one number per channel; otherwise empty.
     is_factor
         Whether the numbers are factors: on a texture, or on a paired intensity.
     paired
-        By the pairing table.
+        Value by the pairing table.
     fitted
-        The best value; null where the image does not tell it.
+        The best value; null if the image does not determine it.
     stopped_at
-        Where the search ended; of a parameter that is not identifiable, any value would do.
+        Where the search ended; if the parameter is not identifiable, any value would do.
     interval
-        95 %, by the reference's noise alone; null at a bound, and where not identifiable.
+        95 %, by the reference's noise alone; null at a bound, or if not identifiable.
     reason
-        Why it is not identifiable, otherwise empty.
+        Why it is not identifiable; otherwise empty.
     bounds
-        Null where there is none.
+        Lower and upper; null if there is none.
     partners
         Parameters that make up for it.
     """
@@ -96,17 +96,16 @@ class FormFit(Record):
     Attributes
     ----------
     form
-        Of the lobe, ``phong`` or ``blinn``; the name of a heuristic whose own parameters were
-        fitted.
+        Of the lobe, ``phong`` or ``blinn``; or the heuristic whose own parameters were fitted.
     normalised
         Whether k_s is the lobe's albedo at normal incidence.
     loss
         At the best parameters, in the loss's own unit: the *model error*, which no parameters of
         this form remove.
     parameter_error
-        The loss of the heuristic image as paired, less that: what better parameters remove.
+        The paired image's loss less the model error: what better parameters remove.
     lights
-        Factors on intensities; empty where they were not fitted.
+        Factors on intensities; empty if they were not fitted.
     convergence
         All searches.
     own
@@ -125,7 +124,7 @@ class FormFit(Record):
 
 
 class LossName(Record):
-    """What was minimised."""
+    """The loss that was minimised."""
 
     name: str
     unit: str
@@ -144,7 +143,7 @@ class FitTimes(Record):
 
 
 class FitRecord(Record, kw_only=True):
-    """The heuristic parameters that come nearest to one scene's reference, and what they leave.
+    """The heuristic parameters nearest to one scene's reference, and the remaining error.
 
     Attributes
     ----------

@@ -1,35 +1,37 @@
-"""Which fitted parameters the image determines, and how far the reference's noise leaves them open.
+"""Which fitted parameters the image determines, and how uncertain the reference's noise makes them.
 
 A parameter that the image does not show, or that others can make up for, has no fitted value, only
-one at which the search happened to stop. Two questions of the Jacobian's columns tell:
+one at which the search happened to stop. The Jacobian's columns answer two questions:
 
 1. *Does it show?* The root mean square change of the loss's coordinates, over the pixels that the
    parameter can reach, for one natural change of it (:mod:`comparisons.fit.parameters`).
-2. *Can others undo that?* The same for what is left of the change when all other parameters have
-   been set to undo as much of it as they can: ``1 / sqrt((J^T J)^-1)`` on the diagonal, from the
-   singular values of ``J``.
+2. *Can others undo that?* The same for the change that remains when all other parameters undo as
+   much of it as they can: ``1 / sqrt((J^T J)^-1)`` on the diagonal, from the singular values of
+   ``J``.
 
-Where either is under the loss's threshold, the parameter is not identifiable. Both are judged to
-first order, at the fitted values, and as if a parameter at its bound were free to leave it: it may
-be there for no reason but that the search began there. The covariance holds it there.
+If either is below the loss's threshold, the parameter is not identifiable. Both are judged to first
+order, at the fitted values, and as if a parameter at its bound were free to leave it: it may be
+there only because the search began there. The covariance holds it there.
 
 The covariance carries the reference's noise to the parameters: noise ``e`` in a pixel's coordinates
 moves the gradient of the loss by ``J^T C e`` and its minimum by ``H^-1 J^T C e``, with the loss's
-second derivatives ``C`` by a pixel's coordinates and ``H`` by the parameters. It speaks of noise
-alone: a model that is wrong has a best fit all the same, and that fit is as certain as the image.
+second derivatives ``C`` by a pixel's coordinates and ``H`` by the parameters. It is about noise
+alone: even a wrong model has a best fit, which is as certain as the image.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from comparisons.fit.optimise import Residuals
 from comparisons.fit.parameters import bounds
 
 AT_BOUND = 1e-5
-"""Of the distance of two bounds; nearer to one of them is at it."""
+"""Share of the distance between two bounds; anything nearer to a bound is at it."""
 
 PARTNER = 0.1
-"""Share of a change that another parameter must take part in to be named."""
+"""Share of a change that another parameter must take up to be named."""
 
 COVERAGE = 1.96
 """Standard errors to either side, of an interval that covers 95 % of normal errors."""
@@ -37,18 +39,18 @@ COVERAGE = 1.96
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the image says about one parameter.
+    """Whether the image determines a parameter.
 
     Attributes
     ----------
     shows
         Root mean square change in the loss's coordinates by a natural change of it.
     own
-        The part of that which no other parameters undo.
+        The part of that change which no other parameters undo.
     reason
-        Why it is not identifiable, empty where it is.
+        Why it is not identifiable; empty if it is.
     partners
-        Numbers of the parameters that undo it.
+        Indices of the parameters that undo it.
     at_bound
         Whether it is at one of its bounds.
     """
@@ -60,13 +62,15 @@ class Verdict:
     at_bound: bool = False
 
 
-def identify(residuals, x, pixels, standard_error):
+def identify(
+    residuals: Residuals, x: NDArray, pixels: NDArray[np.int64], standard_error: NDArray
+) -> tuple[list[Verdict], NDArray[np.float64]]:
     """Judge each parameter at the best fit.
 
     Parameters
     ----------
-    residuals : comparisons.fit.optimise.Residuals
-        What was minimised.
+    residuals
+        Of the loss that was minimised.
     x
         (P,), the best parameters.
     pixels
@@ -76,9 +80,10 @@ def identify(residuals, x, pixels, standard_error):
 
     Returns
     -------
-    verdicts : list of Verdict
+    verdicts
+        One per parameter.
     covariance
-        (P, P), in the vector's numbers; 0 for what is not identifiable or at its bound.
+        (P, P), in the vector's numbers; 0 for parameters not identifiable or at a bound.
     """
     low, high = bounds(residuals.model.parameters)
     near, threshold = AT_BOUND * (high - low), residuals.distance.threshold
@@ -95,7 +100,8 @@ def identify(residuals, x, pixels, standard_error):
     lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
     verdicts = []
     for number in range(len(x)):
-        reason, partners = "", ()
+        reason = ""
+        partners: tuple[int, ...] = ()
         if shows[number] < threshold:
             reason = "does not show in the image"
         elif free[number] and not determined[number]:
@@ -112,7 +118,7 @@ def identify(residuals, x, pixels, standard_error):
 
 
 def _inverse_normal(jacobian):
-    """Return ``(J^T J)^-1``; singular values at rounding count as if they were at it."""
+    """Return ``(J^T J)^-1``; singular values below rounding are raised to it."""
     if not jacobian.shape[1]:
         return np.zeros((0, 0))
     _, singular, rows = np.linalg.svd(jacobian, full_matrices=False)
@@ -135,7 +141,7 @@ def _covariance(residuals, x, determined, standard_error):
 
 
 def _partners(inverse, free, number):
-    """Return the parameters that change along when one does and the image stays as it is."""
+    """Return the parameters that must change with one for the image to stay unchanged."""
     place = int(np.flatnonzero(free == number)[0])
     direction = np.abs(inverse[place] / inverse[place, place])
     return tuple(

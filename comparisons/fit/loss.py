@@ -1,28 +1,28 @@
-"""What a fit minimises: the mean over pixels of a distance between two images.
+"""The losses of a fit: means over pixels of a distance between two images.
 
 =================  =====================================================================  =========
 Loss               Distance of two pixels                                                 Unit
 =================  =====================================================================  =========
-``perceptual``     Euclidean in CAM16-UCS (`cam16ucs`)                                    ΔE
+``perceptual``     Euclidean in CAM16-UCS                                                 ΔE
 ``linear``         its square, in linear RGB; 1 is display white                          white
 ``log-luminance``  square of the ratio of luminances, each with                           stops
                    :data:`comparisons.departure.metrics.LOG2_EPSILON` added, in stops
 =================  =====================================================================  =========
 
 ``perceptual`` is the default: departures are reported as mean colour differences, and of the three
-metrics CAM16-UCS alone is a plain Euclidean distance that is also close to ΔE2000. ΔE ITP is one
-too, but it is ruled by the darkest pixels, where the models differ whatever the parameters are.
+metrics only CAM16-UCS is a plain Euclidean distance that is also close to ΔE2000. ΔE ITP is
+Euclidean too, but dominated by the darkest pixels, where the models differ for all parameters.
 
-- It is not clipped at display white, as the metric is: a highlight that a display cuts off would
-  tell nothing of how high and how narrow it is, and its lobe would be bent to other ends.
-- It is the distance and not its square that is averaged, as in the reports: a shadow, which no
-  parameter makes, would otherwise bend all of them towards itself. Below :attr:`Loss.rounding` the
-  distance turns into its square, ``sqrt(d^2 + c^2) - c``, so that it has derivatives everywhere.
-  That is a tenth of what is just noticeable: the loss is the mean distance to less than 0.1, and so
-  is its minimum.
+- Unlike the metric, it is not clipped at display white: a clipped highlight would not show how high
+  and narrow it is, and its lobe would be used to fit something else.
+- The distance is averaged, not its square, as in the reports: otherwise a shadow, which no
+  parameter makes, would pull all of them towards itself. Below :attr:`Loss.rounding` the distance
+  turns into its square, ``sqrt(d^2 + c^2) - c``, to have derivatives everywhere. That is a tenth of
+  a just noticeable difference: the loss is the mean distance to less than 0.1, and so is its
+  minimum.
 
-Residuals are not weighted by the reference's standard error: where a reference has no noise all
-weights would be infinite, and a fit to what is certain is not a fit to what is seen.
+Residuals are not weighted by the reference's standard error: a reference without noise would have
+infinite weights, and a fit to what is certain is not a fit to what is seen.
 """
 
 from collections.abc import Callable
@@ -30,9 +30,10 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.departure.metrics import LOG2_EPSILON
-from comparisons.departure.spaces import cam16ucs, luminance
+from comparisons.departure.spaces import Viewing, cam16ucs, luminance
 
 STEP = 1e-4
 """Relative step of the finite differences of colour spaces; their own error is its square."""
@@ -47,23 +48,23 @@ class Loss:
     Attributes
     ----------
     name, unit
-        As in the table above.
+        See the table above.
     coordinates
         ``(rgb (N, 3), viewing) -> (N, K)``.
     derivative
         ``(rgb (N, 3), viewing) -> (N, K, 3)``, of the coordinates by R, G and B.
     threshold
-        Root mean square change of the coordinates that counts as none.
+        Root mean square change of the coordinates below which nothing shows.
     sees_colour
-        Whether it tells colours of one luminance apart.
+        Whether it distinguishes colours of equal luminance.
     rounding
         ``c`` above; infinite for squares.
     """
 
     name: str
     unit: str
-    coordinates: Callable
-    derivative: Callable
+    coordinates: Callable[[NDArray, Viewing], NDArray]
+    derivative: Callable[[NDArray, Viewing], NDArray]
     threshold: float
     sees_colour: bool = True
     rounding: float = inf
@@ -92,7 +93,7 @@ def _perceptual(rgb, viewing):
 
 
 def _perceptual_derivative(rgb, viewing):
-    """Central differences, all six images of them converted at once."""
+    """Return central differences; all six images are converted at once."""
     step = STEP * np.abs(rgb) + SMALLEST_STEP
     shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])
     values = _perceptual(rgb + shifts[:, None, :] * step, viewing)

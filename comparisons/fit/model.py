@@ -1,18 +1,21 @@
 """Images of the heuristic model, and their derivatives by every parameter.
 
 The model (8.10) is linear in its coefficients: an image is a sum of coefficients times *bases*,
-images of the ambient, diffuse and specular term alone. They are the kernel's, with coefficients of
-1; the derivative of the specular one by ``n`` is Dr.Jit's, in forward mode, since one ``n`` acts on
-all pixels. So one call of the kernel a material gives an image with its whole Jacobian.
+images of the ambient, diffuse and specular term alone. The kernel renders them with coefficients of
+1; Dr.Jit differentiates the specular one by ``n`` in forward mode, since one ``n`` acts on all
+pixels. So one call of the kernel per material gives an image with its whole Jacobian.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import drjit as dr
 import numpy as np
+from numpy.typing import NDArray
 
-from comparisons.fit.parameters import ambient_of
+from comparisons.fit.parameters import Parameter, ambient_of
+from comparisons.fit.samples import Surface
 from heuristic.materials import Material
 from heuristic.shading import shade
 
@@ -22,15 +25,15 @@ class Model:
 
     Parameters
     ----------
-    surface : comparisons.fit.samples.Surface
-        What is seen.
+    surface
+        The surface that is seen.
     form
         Of the lobe, ``phong`` or ``blinn``.
-    parameters : sequence of Parameter
-        What the vectors of the methods hold.
+    parameters
+        The parameters in the vectors of the methods.
     """
 
-    def __init__(self, surface, form, parameters):
+    def __init__(self, surface: Surface, form: str, parameters: Sequence[Parameter]):
         self.surface = surface
         self.form = form
         self.parameters = parameters
@@ -39,30 +42,30 @@ class Model:
         if any(parameter.name == "intensity" for parameter in parameters):
             self._groups = [[light] for light in surface.lights]
         self._ambient, self._diffuse = cache(self._ambient_basis), cache(self._diffuse_bases)
-        self._lobes = {}
-        self._last = None
+        self._lobes: dict[int, _Lobe] = {}
+        self._last: tuple[bytes, NDArray] | None = None
 
-    def image(self, x):
+    def image(self, x: NDArray) -> NDArray[np.float64]:
         """Return the image (N, 3) of the surface's pixels for a vector of parameters."""
         columns = self.columns(x)[self.linear]
         return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
-    def columns(self, x):
+    def columns(self, x: NDArray) -> NDArray[np.float64]:
         """Return the derivatives (number of parameters, N, 3) of the image."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self._columns(x)
         return self._last[1]
 
-    def coefficients(self, x, name):
-        """Return RGB of a coefficient for each material (of ``k_s``, the lobe's albedo)."""
+    def coefficients(self, x: NDArray, name: str) -> dict[int, NDArray]:
+        """Return RGB of a coefficient for each material (for ``k_s``, the lobe's albedo)."""
         sums = {owner: np.zeros(3) for owner in range(len(self.surface.samples))}
         for number, parameter in zip(x, self.parameters, strict=True):
             if parameter.name == name:
                 sums[parameter.owner] += number * np.array(parameter.tint)
         return sums
 
-    def exponent(self, x, material):
+    def exponent(self, x: NDArray, material: int) -> float:
         """Return ``n`` of a material."""
         (number,) = (
             number
@@ -112,7 +115,7 @@ class Model:
         return self._stacked([self._basis(owner, "k_d", lights) for lights in self._groups])
 
     def _lobe(self, owner, n):
-        """Return the specular bases of a material, and what they gain where ``ln n`` does."""
+        """Return the specular bases of a material, and their derivatives by ``ln n``."""
         if owner not in self._lobes or self._lobes[owner].n != n:
             pairs = [self._specular(owner, n, lights) for lights in self._groups]
             bases, derivatives = zip(*pairs, strict=True) if pairs else ((), ())
@@ -142,7 +145,7 @@ class Model:
         return self.surface.pixels(self.surface.samples[owner], value)
 
     def _shaded(self, owner, name, lights, ambient=0, **lobe):
-        """Call the kernel with one coefficient of 1; None where no sample sees the material."""
+        """Call the kernel with one coefficient of 1; None if no sample sees the material."""
         samples = self.surface.samples[owner]
         if not len(samples.pixel):
             return None

@@ -1,9 +1,9 @@
-"""Fitting the parameters that a heuristic of a user's own declares, by its derivatives.
+"""Fitting the parameters that a user's heuristic declares, by its derivatives.
 
-The heuristic is not known to be linear in anything, so that an image is a rendering: the passes of
-the heuristic half, with the seeds of the reference's. Its derivative by a parameter is Dr.Jit's, in
-forward mode, through the user's code. What a step function hides (``ceil``, ``select``) has no
-derivative there; the search begins from several places for that reason, too.
+The heuristic need not be linear in anything, so an image is a rendering: the passes of the
+heuristic half, with the reference's seeds. Dr.Jit differentiates it by a parameter in forward mode,
+through the user's code. A step function (``ceil``, ``select``) has no derivative; that is one more
+reason to begin the search from several places.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from comparisons.compare import Prepared
 from comparisons.fit.fit_record import Fitted
 from comparisons.fit.identify import COVERAGE, identify
+from comparisons.fit.loss import Loss
 from comparisons.fit.optimise import Residuals, Solution, Start, descend
 from comparisons.fit.parameters import Parameter
+from comparisons.fit.rendering import Rendered
 from comparisons.fit.summary import Attempt
+from comparisons.options import Options
 from heuristic.errors import InputError
 from heuristic.heuristics import Heuristic
 from reference.rendering.passes import pass_seed
@@ -26,10 +30,10 @@ STARTS = 6
 """Places within the bounds to start from, besides the defaults."""
 
 FOLLOWED = 2
-"""The starts that are followed to their minimum, besides the defaults: those of least loss."""
+"""The starts of least loss that are followed to their minimum, besides the defaults."""
 
 REACH = 4.0
-"""Of a parameter without bounds: starts lie within so many times its default, or its unit."""
+"""Starts of a parameter without bounds lie within this many times its default, or its unit."""
 
 
 class OwnModel:
@@ -40,7 +44,7 @@ class OwnModel:
     renderer
         Of the heuristic half.
     heuristic
-        What shades it.
+        Shades it.
     seeds
         Of the passes.
     counted
@@ -80,7 +84,7 @@ class OwnModel:
     def _rendered(self, x: np.ndarray, by: int | None) -> np.ndarray:
         """Return the mean of the passes, or of their derivatives by one parameter."""
         integrator, scene = self._renderer.integrator, self._renderer.scene
-        total = 0.0
+        total = np.zeros(())
         with variant(self._renderer.variant):
             values = {one.name: mi.Float(v) for one, v in zip(self.parameters, x, strict=True)}
             dr.make_opaque(values)
@@ -101,15 +105,15 @@ class OwnModel:
 
 
 @dataclass(frozen=True)
-class OwnAttempt(Attempt):
+class OwnAttempt(Attempt[OwnModel]):
     """The best fit of the heuristic's own parameters."""
 
-    def image(self, rendered) -> np.ndarray:
+    def image(self, rendered: Rendered) -> np.ndarray:
         """Return the whole image, (H, W, 3)."""
         return self.model.whole(self.solution.x)
 
     def fitted(self) -> tuple[Fitted, ...]:
-        """Return what was fitted, parameter by parameter."""
+        """Return the fitted parameters."""
         return tuple(self._one(place) for place in range(len(self.model.parameters)))
 
     def _one(self, place: int) -> Fitted:
@@ -125,7 +129,7 @@ class OwnAttempt(Attempt):
             fitted=None if verdict.reason else found,
             stopped_at=found,
             interval=None if verdict.reason or verdict.at_bound else interval,
-            bounds=tuple(bound if np.isfinite(bound) else None for bound in (low, high)),
+            bounds=(low if np.isfinite(low) else None, high if np.isfinite(high) else None),
             at_bound=verdict.at_bound,
             identifiable=not verdict.reason,
             reason=verdict.reason,
@@ -133,36 +137,38 @@ class OwnAttempt(Attempt):
         )
 
 
-def attempt(ready, heuristic: Heuristic, rendered, loss, options) -> OwnAttempt:
+def attempt(
+    ready: Prepared, heuristic: Heuristic, rendered: Rendered, loss: Loss, options: Options
+) -> OwnAttempt:
     """Fit the parameters that a heuristic declares.
 
     Parameters
     ----------
-    ready : comparisons.compare.Prepared
+    ready
         The scene.
     heuristic
-        What shades its heuristic half.
-    rendered : comparisons.fit.rendering.Rendered
-        Both halves as they are.
-    loss : comparisons.fit.loss.Loss
-        What is minimised.
-    options : comparisons.options.Options
+        Shades its heuristic half.
+    rendered
+        Both halves, with the parameters' defaults.
+    loss
+        To be minimised.
+    options
         Seed and viewing.
 
     Raises
     ------
     InputError
-        When it declares none, or has no derivatives.
+        If it declares no parameters, or has no derivatives.
     """
     if not heuristic.traced:
         raise InputError(
             f"heuristic {heuristic.name} has no derivatives, which a fit needs. Write it in Python:"
-            " a function `shade(point, gloss: Range(0, 1) = 0.5)` has parameters to fit."
+            " `def shade(point, gloss: Range(0, 1) = 0.5)` has a parameter to fit."
         )
     if not heuristic.parameters:
         raise InputError(
-            f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds, as"
-            " in `def shade(point, gloss: Range(0, 1) = 0.5)`."
+            f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
+            " `def shade(point, gloss: Range(0, 1) = 0.5)`."
         )
     counted = rendered.counted
     seeds = [pass_seed(options.seed, number) for number in range(ready.passes)]

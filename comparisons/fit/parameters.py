@@ -12,21 +12,24 @@ an intensity   ``ln`` of a factor on the paired    :data:`FACTORS`              
                one
 =============  ==================================  ===========================  ====================
 
-A lobe's albedo is what an image shows of ``k_s`` whatever ``n`` is, so that the two are searched
-almost apart. It also makes a form and its normalised variant one and the same fit: they are the
-same set of images, in which ``k_s`` has another meaning.
+An image shows the lobe's albedo for any ``n``, so the two are nearly independent in the search. It
+also makes a form and its normalised variant one and the same fit: they are the same set of images,
+in which ``k_s`` has another meaning.
 
-A coefficient is one number where it is grey in the scene, and three where it has a colour; a factor
-on its texture, where it has one; and its largest component, with the others in proportion, where
-the loss sees luminance alone.
+A coefficient is one number if it is grey in the scene, and three if it has a colour. With a texture
+it is a factor on it. If the loss sees luminance alone, it is its largest component, with the others
+in proportion.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
 
 import numpy as np
+from numpy.typing import NDArray
 
-from heuristic.terms import normalisation
+from comparisons.fit.samples import Surface
+from heuristic.arrays import Colour
 from reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
 
 EXPONENTS = (0.5, 4096.0)
@@ -48,13 +51,13 @@ class Parameter:
     name
         ``k_a``, ``k_d``, ``k_s``, ``n`` or ``intensity``.
     owner
-        Number of the material, or of the light.
+        Index of the material, or of the light.
     paired, low, high
         Value by the pairing table, and bounds, as in the vector.
     tint
         RGB of which a coefficient is a multiple.
     channel
-        ``R``, ``G`` or ``B`` of a coefficient that has three numbers, otherwise empty.
+        ``R``, ``G`` or ``B`` of a coefficient with three numbers, otherwise empty.
     is_factor
         Whether the number is a factor on a texture.
     """
@@ -64,32 +67,34 @@ class Parameter:
     paired: float
     low: float
     high: float
-    tint: tuple = GREY
+    tint: tuple[float, ...] = GREY
     channel: str = ""
     is_factor: bool = False
 
     @property
-    def is_linear(self):
+    def is_linear(self) -> bool:
         """Whether the image is linear in it."""
         return self.name.startswith("k_")
 
 
-def parameters(surface, form, sees_colour=True, intensities=False):
-    """Return the parameters of a surface that a fit of one form has, material by material.
+def parameters(
+    surface: Surface, form: str, sees_colour: bool = True, intensities: bool = False
+) -> tuple[Parameter, ...]:
+    """Return the parameters that a fit of one form has on a surface, material by material.
 
     Parameters
     ----------
-    surface : comparisons.fit.samples.Surface
-        What is seen.
+    surface
+        The surface that is seen.
     form
         Of the lobe, ``phong`` or ``blinn``.
     sees_colour
-        Whether the loss does; otherwise coefficients keep their paired colour.
+        Whether the loss sees colour; otherwise coefficients keep their paired colour.
     intensities
         Whether lights' intensities are fitted. The first light keeps its own: only the products of
         intensities with ``k_d`` and ``k_s`` show.
     """
-    found = []
+    found: list[Parameter] = []
     for owner, material in enumerate(surface.materials):
         textured = surface.samples[owner].textures
         if ambient_of(surface, intensities) is not None:
@@ -109,10 +114,10 @@ def parameters(surface, form, sees_colour=True, intensities=False):
     return tuple(found)
 
 
-def ambient_of(surface, intensities):
-    """Return ``I_a``, None where there is none to fit.
+def ambient_of(surface: Surface, intensities: bool) -> Colour | None:
+    """Return ``I_a``, None if there is none to fit.
 
-    Where intensities are fitted and the scene has no ambient light, it is 1: the image shows only
+    If intensities are fitted and the scene has no ambient light, it is 1: the image shows only
     ``I_a k_a``.
     """
     if isinstance(surface.ambient, int):
@@ -120,22 +125,19 @@ def ambient_of(surface, intensities):
     return surface.ambient
 
 
-def coefficient(form, normalised, albedo, n):
-    """Return ``k_s`` of a lobe's albedo at normal incidence."""
-    return albedo if normalised else albedo * normalisation(form, n)
-
-
-def start(parameters):
+def start(parameters: Sequence[Parameter]) -> NDArray[np.float64]:
     """Return the paired values as a vector, moved into the bounds."""
     return np.array([min(max(p.paired, p.low), p.high) for p in parameters])
 
 
-def bounds(parameters):
+def bounds(parameters: Sequence[Parameter]) -> NDArray[np.float64]:
     """Return the lower and upper bounds as two vectors."""
     return np.array([[p.low for p in parameters], [p.high for p in parameters]])
 
 
-def _coefficients(name, owner, paired, sees_colour, is_textured):
+def _coefficients(
+    name: str, owner: int, paired: Colour, sees_colour: bool, is_textured: bool
+) -> list[Parameter]:
     """Return the parameters of one coefficient."""
     if is_textured:
         return [Parameter(name, owner, float(paired[0]), 0.0, LARGEST_FACTOR, is_factor=True)]

@@ -1,7 +1,9 @@
 """Rendering the heuristic half for its surface: where each camera ray of each pass ends.
 
-The rays are those of the reference's passes: the same sampler, seeds and film.
+The rays are the reference's: the same sampler, seeds and film.
 """
+
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -16,7 +18,7 @@ from reference.rendering.renderer import Renderer, variant
 from reference.rendering.sums import Accumulator
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
-"""Those that are fitted."""
+"""The coefficients that are fitted."""
 
 
 class Recorder:
@@ -24,16 +26,16 @@ class Recorder:
 
     Parameters
     ----------
-    renderer : reference.rendering.renderer.Renderer
+    renderer
         Of the heuristic half, with Phong shading and a box filter.
 
     Raises
     ------
     InputError
-        When something can be seen through, or ``n`` is a texture.
+        If a material is transparent, or ``n`` is a texture.
     """
 
-    def __init__(self, renderer):
+    def __init__(self, renderer: Renderer):
         self._variant = renderer.variant
         with variant(self._variant):
             shading = renderer.integrator
@@ -46,16 +48,16 @@ class Recorder:
             self._ambient = shading.ambient_at(point, True)
         self._renderer = Renderer(renderer.scene, self._eye, renderer.spp, "heuristic samples")
         self._fixed = Accumulator()
-        self._parts = [[] for _ in self._names]
-        self._samples_a_pixel = 0
+        self._parts: list[list[dict[str, Any]]] = [[] for _ in self._names]
+        self._samples_per_pixel = 0
 
-    def render(self, seed):
+    def render(self, seed: int) -> None:
         """Keep the samples of the pass with this seed."""
         image = self._renderer.render(seed)
         self._fixed.add(image)
         seen, self._eye.seen = self._eye.seen, None
         spp = dr.width(seen["position"]) // (image.shape[0] * image.shape[1])
-        self._samples_a_pixel += spp
+        self._samples_per_pixel += spp
         for number, parts in enumerate(self._parts):
             index = dr.compress(seen["facing"] & (seen["material"] == number))
             kept = {
@@ -65,15 +67,15 @@ class Recorder:
             }
             parts.append(kept | {"pixel": np.array(index) // spp})
 
-    def surface(self):
-        """Return what the passes so far have seen."""
+    def surface(self) -> Surface:
+        """Return the surface that the passes so far have seen."""
         samples = []
         for bsdf, parts in zip(self._materials.bsdfs, self._parts, strict=True):
             whole = {key: _joined([part[key] for part in parts]) for key in parts[0]}
             shadows = (f"light {number}" for number in range(len(whole)))
             samples.append(
                 Samples(
-                    *(whole[key] for key in (*VECTORS, "pixel")),
+                    **{key: whole[key] for key in (*VECTORS, "pixel")},
                     textures={name: whole[name] for name in _textured(bsdf)},
                     visible=tuple(whole[key] for key in shadows if key in whole),
                 )
@@ -86,28 +88,28 @@ class Recorder:
             tuple(self._lights),
             self._ambient,
             fixed,
-            self._samples_a_pixel,
+            self._samples_per_pixel,
         )
 
 
 def _require_fittable(names, bsdfs):
-    """Refuse what one sees through, a sample is of one surface; and what has many exponents."""
+    """Reject transparent materials, since a sample has one surface, and varying exponents."""
     clear = [name for name, bsdf in zip(names, bsdfs, strict=True) if bsdf.is_clear]
     if clear:
         raise InputError(
-            f"{', '.join(clear)}: a fit needs materials that nothing is seen through; glass, masks"
-            " and `null` let light pass. Replace them by opaque ones."
+            f"{', '.join(clear)}: a fit needs opaque materials; glass, masks and `null` let light"
+            " pass. Replace them."
         )
     varying = [n for n, bsdf in zip(names, bsdfs, strict=True) if isinstance(bsdf.n, mi.Texture)]
     if varying:
         raise InputError(
-            f"{', '.join(varying)}: n varies over the surface, and a fit has one n for a material."
+            f"{', '.join(varying)}: n varies over the surface, and a fit has one n per material."
             " Give its roughness as a number."
         )
 
 
 def _eye(shading):
-    """Make an integrator that keeps what ``shading`` would shade, and shows emission alone."""
+    """Make an integrator that keeps the points that ``shading`` would shade, and shows emission."""
 
     class Eye(type(shading)):
         def shaded(self, scene, si, view, normal, active):
@@ -147,7 +149,7 @@ def _read(materials, number, name, si, active):
 
 
 def _visibility(shading, scene, si, active):
-    """Return a mask for each light, in the order in which the kernel asks for them."""
+    """Return a mask for each light, in the kernel's order."""
     test, masks = shading.visibility(scene, si, active), []
 
     def keeping(toward, distance):
@@ -164,10 +166,10 @@ def _textured(bsdf):
 
 
 def _described(bsdf):
-    """Return a ``phong`` as a material of plain numbers, 1 for what varies over the surface."""
+    """Return a ``phong`` as a material of plain numbers; a coefficient with a texture is 1."""
 
     def plain(values):
-        # The shortest decimals of single precision are what the scene says.
+        # The scene's numbers are the shortest decimals of single precision.
         return tuple(float(str(np.float32(value))) for value in np.ravel(values))
 
     point = dr.zeros(mi.SurfaceInteraction3f)
@@ -194,9 +196,9 @@ def _joined(parts):
 
 
 def _names(scene, bsdfs):
-    """Return a name for each material: its id, that of the first shape that has it, or a number.
+    """Return a name for each material: its id, the id of its first shape, or a number.
 
-    Shapes of a group that is instanced are not among the scene's.
+    Shapes of an instanced group are not among the scene's.
     """
     shapes = {}
     for shape in scene.shapes():

@@ -5,17 +5,20 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
+from comparisons.compare import Prepared
 from comparisons.fit.recorder import Recorder
+from comparisons.fit.samples import Surface
+from comparisons.options import Options
 from heuristic.errors import InputError
-from reference.rendering.passes import passes
+from reference.rendering.passes import Progress, passes
 from reference.rendering.renderer import variant
-from reference.rendering.sums import Accumulator, add_difference
-from reference.scene.graph import properties
+from reference.rendering.sums import Accumulator, Estimate, add_difference
+from reference.scene.graph import Graph, properties
 
 VARIANT = "llvm_ad_rgb"
 
 
-def filter_by_box(graph):
+def filter_by_box(graph: Graph) -> None:
     """Give the films of a scene a box filter."""
     for film in graph.nodes(mi.ObjectType.Film):
         for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
@@ -34,14 +37,16 @@ class Rendered:
     """Both halves' passes: the image of the paired parameters, the reference, and the surface."""
 
     before: np.ndarray
-    reference: object
-    difference: object
-    surface: object
+    reference: Estimate
+    difference: Estimate
+    surface: Surface | None
     counted: np.ndarray
 
 
-def render(ready, options, progress, with_surface=True):
-    """Render the passes of both halves in turn, and keep the heuristic half's surface if wanted."""
+def render(
+    ready: Prepared, options: Options, progress: Progress, with_surface: bool = True
+) -> Rendered:
+    """Render the passes of both halves in turn, and keep the heuristic half's surface if asked."""
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"

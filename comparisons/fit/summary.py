@@ -1,23 +1,33 @@
-"""What a fit returns: images, and its record made of parameters and verdicts."""
+"""The results of a fit: images, and its record made of parameters and verdicts."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, sqrt
+from typing import Any, Generic
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.departure.metrics import drawn
+from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.fit.fit_record import Departure, FitRecord, Fitted, FittedLight, FittedMaterial
-from comparisons.fit.identify import AT_BOUND, COVERAGE
+from comparisons.fit.identify import AT_BOUND, COVERAGE, Verdict
 from comparisons.fit.model import Model
-from comparisons.fit.optimise import Solution
+from comparisons.fit.optimise import AnyModel, Solution
+from comparisons.fit.parameters import Parameter
+from comparisons.fit.rendering import Rendered
 from heuristic.terms import normalisation
+from reference.scene.graph import Graph
+
+Departures = dict[str, Departure]
+"""By metric."""
 
 
 @dataclass(frozen=True)
 class FitImages:
-    """Linear images (H, W, 3), and the residual maps (H, W) after the fit by metric."""
+    """Linear images (H, W, 3), and residual maps (H, W) after the fit, by metric."""
 
     before: np.ndarray
     reference: np.ndarray
@@ -27,33 +37,51 @@ class FitImages:
 
 @dataclass(frozen=True)
 class Fit:
-    """What a fit returns: its record, and the images of the best form."""
+    """A fit: its record, and the images of the best form."""
 
     record: FitRecord
     images: FitImages
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """The best fit of one form, and what :mod:`comparisons.fit.identify` says of it.
+class Attempt(Generic[AnyModel]):
+    """The best fit of a model, and how well the image determines it.
 
-    ``paired_loss`` is the loss of the image as paired.
+    Attributes
+    ----------
+    paired_loss
+        The loss of the image as paired.
+    verdicts, covariance
+        See :func:`comparisons.fit.identify.identify`.
     """
 
-    model: Model
+    model: AnyModel
     solution: Solution
     paired_loss: float
-    verdicts: list
+    verdicts: list[Verdict]
     covariance: np.ndarray
 
-    def image(self, rendered):
+
+@dataclass(frozen=True)
+class FormAttempt(Attempt[Model]):
+    """The best fit of one form of the lobe."""
+
+    def image(self, rendered: Rendered) -> NDArray[np.float64]:
         """Return the whole image, (H, W, 3)."""
+        assert rendered.surface, "Phong's model is fitted on the surface"
         model = Model(rendered.surface, self.model.form, self.model.parameters)
         return model.image(self.solution.x).reshape(rendered.before.shape)
 
 
-def departure(before, after, reference, counted, noise, viewing):
-    """Return the :class:`Departure` by metric, and the metrics' maps (H, W) after the fit."""
+def departure(
+    before: NDArray,
+    after: NDArray,
+    reference: NDArray,
+    counted: NDArray[np.bool_],
+    noise: NDArray,
+    viewing: Viewing,
+) -> tuple[Departures, dict[str, NDArray]]:
+    """Return the departure by metric, and the metrics' maps (H, W) after the fit."""
     found, maps = {}, {}
     for name, metric in drawn().items():
         first, maps[name] = (metric(image, reference, viewing) for image in (before, after))
@@ -67,8 +95,10 @@ def departure(before, after, reference, counted, noise, viewing):
     return found, maps
 
 
-def materials(attempt, normalised, physical):
-    """Return what was fitted, material by material."""
+def materials(
+    attempt: FormAttempt, normalised: bool, physical: dict[str, dict[str, Any]]
+) -> tuple[FittedMaterial, ...]:
+    """Return the fitted parameters, material by material."""
     surface = attempt.model.surface
     return tuple(
         FittedMaterial(
@@ -85,7 +115,7 @@ def materials(attempt, normalised, physical):
     )
 
 
-def lights(attempt, names):
+def lights(attempt: FormAttempt, names: Sequence[str]) -> tuple[FittedLight, ...]:
     """Return the named factors on the intensities of lights, relative to the first."""
     first = FittedLight(
         light=names[0],
@@ -98,7 +128,7 @@ def lights(attempt, names):
         bounds=(1.0, 1.0),
         at_bound=False,
         identifiable=False,
-        reason="only products with k_d and k_s show; other lights' factors are relative to it",
+        reason="only its products with k_d and k_s show; other lights are relative to it",
     )
     others = (
         FittedLight(light=names[parameter.owner], **_parameter(attempt, place, False))
@@ -108,13 +138,13 @@ def lights(attempt, names):
     return (first, *others)
 
 
-def physical_materials(graph):
+def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
     """Return the plain parameters of each named BSDF of the physical half."""
     found = {}
     for index in graph.nodes(mi.ObjectType.BSDF):
         label = graph.label(index)
         for _, child in graph.children(index, mi.ObjectType.BSDF):
-            index = child  # of twosided, what is inside
+            index = child  # inside twosided
         found[label] = {"plugin": graph.plugin(index)} | _plain_properties(graph.props(index))
     return found
 
@@ -130,8 +160,8 @@ def _plain_properties(props):
     return values
 
 
-def _parameter(attempt, place, normalised):
-    """Return one parameter in the units of the chapters, as the fields of :class:`Fitted`."""
+def _parameter(attempt: FormAttempt, place: int, normalised: bool) -> dict[str, Any]:
+    """Return one parameter in the chapters' units, as the fields of :class:`Fitted`."""
     model, verdicts, covariance = attempt.model, attempt.verdicts, attempt.covariance
     parameter, verdict = model.parameters[place], verdicts[place]
     reason, x = verdict.reason, attempt.solution.x
@@ -166,10 +196,12 @@ def _parameter(attempt, place, normalised):
     }
 
 
-def _unnormalised(model, x, covariance, place, at_n):
+def _unnormalised(
+    model: Model, x: NDArray, covariance: NDArray, place: int, at_n: int
+) -> tuple[float, float, float, float]:
     """Return ``k_s`` of an albedo and ``n``: paired, fitted, and the ends of its interval."""
 
-    def k_s(albedo, log_n):
+    def k_s(albedo: float, log_n: float) -> float:
         return albedo * normalisation(model.form, exp(log_n))
 
     step = 1e-5
@@ -183,13 +215,13 @@ def _unnormalised(model, x, covariance, place, at_n):
     return paired, fitted, fitted - spread, fitted + spread
 
 
-def _place_of_exponent(parameters, owner):
+def _place_of_exponent(parameters: Sequence[Parameter], owner: int) -> int:
     (place,) = (i for i, p in enumerate(parameters) if (p.name, p.owner) == ("n", owner))
     return place
 
 
-def _label(model, place):
-    """Return a name of a parameter for a reader."""
+def _label(model: Model, place: int) -> str:
+    """Return a readable name of a parameter."""
     parameter = model.parameters[place]
     owner = (
         f"light {parameter.owner + 1}"

@@ -1,19 +1,19 @@
-"""The built-in scenes: the chapters' figures, and physical scenes of the project's own.
+"""The built-in scenes: the chapters' figures, and the project's own physical scenes.
 
-A scene is a dictionary as ``mitsuba.load_dict`` takes it. The figures give every number but the
-field of view and the up vector; one camera that frames the sphere serves them all.
+A scene is a dictionary for ``mitsuba.load_dict``. The figures give every number but the field of
+view and the up vector; one camera that frames the sphere serves them all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from heuristic.errors import InputError, suggestion
 
-if TYPE_CHECKING:  # names are known at once, without Mitsuba
+if TYPE_CHECKING:  # names are listed without importing Mitsuba
     from reference.scene.source import Source
 
 RESOLUTION = 512
@@ -33,9 +33,9 @@ THREE_LIGHTS = (
 class Scene:
     """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
 
-    ``variant`` is the one that it needs, ``heuristic_variant`` that of the heuristic half if it is
-    another: RGB against the spectral reference. ``interpolation`` and ``tessellation`` are those
-    of the heuristic half.
+    ``variant`` is the variant that it needs, ``heuristic_variant`` the heuristic half's if
+    different: RGB against the spectral reference. ``interpolation`` and ``tessellation`` are the
+    heuristic half's.
     """
 
     name: str
@@ -53,18 +53,18 @@ class Scene:
         return Source(self.name, self.make)
 
 
-def builtin(name):
-    """Return a built-in scene by name.
+def builtin(name: str) -> Scene:
+    """Return the built-in scene with a name.
 
     Raises
     ------
     InputError
-        Listing the names, when there is none of this one.
+        If there is none; the message lists the names.
     """
     if name not in SCENES:
         raise InputError(
             f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)}. Built-in"
-            f" are: {', '.join(SCENES)}."
+            f" scenes: {', '.join(SCENES)}."
         )
     return SCENES[name]
 
@@ -88,8 +88,8 @@ def _camera(viewer):
 def _figure(name, title, lights, viewer, **coefficients):
     """A unit sphere at the origin; lights with ``I_p0 = 1`` and ``f_att = 1``; ``I_a = 1``."""
 
-    def make():
-        scene = {
+    def make() -> dict[str, Any]:
+        scene: dict[str, Any] = {
             "type": "scene",
             "integrator": {"type": "heuristic"},
             "sensor": _camera(viewer),
@@ -111,7 +111,7 @@ def _figure(name, title, lights, viewer, **coefficients):
     return Scene(name, title, make)
 
 
-def _figures():
+def _figures() -> Iterator[Scene]:
     levels = {"a": 0.5, "b": 0.7, "c": 0.9}
     for letter, k in levels.items():
         title = f"Figure 8.5{letter}: ambient light alone, k_a = {k}"
@@ -129,20 +129,20 @@ def _figures():
     title = "Figure 8.9: as 8.8c with a sharper highlight, n = 9"
     yield _figure("fig-8-9", title, WHITE_LIGHT, VIEWER_C, **whole, n=9)
     for n, reading in {9: "text", 3: "caption"}.items():
-        title = f"Figure 8.11: red, green and blue light, n = {n} (as the {reading} has it)"
+        title = f"Figure 8.11: red, green and blue light, n = {n} (from the {reading})"
         yield _figure(f"fig-8-11-n{n}", title, THREE_LIGHTS, VIEWER_C, **whole, n=n)
 
 
-def _made_in(module, function, *arguments):
-    """Return what makes a scene by a function of another module of this folder, imported then."""
+def _made_in(module: str, function: str, *arguments: float) -> Callable[[], dict]:
+    """Return a function that imports another module of this folder and makes its scene."""
 
-    def make():
+    def make() -> dict:
         return getattr(import_module(f"comparisons.gallery.{module}"), function)(*arguments)
 
     return make
 
 
-def _chapter_six():
+def _chapter_six() -> Iterator[Scene]:
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
         yield Scene(f"fig-6-5-m{m:g}", title, _made_in("chapter_six", "spot", m))
@@ -223,7 +223,7 @@ def _plastic_spheres():
     return scene
 
 
-def _physical():
+def _physical() -> Iterator[Scene]:
     yield Scene(
         "lambert-sphere", "A diffuse sphere under a point light: an exact pair", _lambert_sphere
     )

@@ -1,4 +1,6 @@
-"""The figures of chapter 6 that name no numbers: spots (6.5) and polygon shading (6.10, 6.14)."""
+"""The figures of chapter 6 without numbers: spots (6.5) and polygon shading (6.10, 6.14)."""
+
+from typing import Any
 
 import mitsuba as mi
 
@@ -6,7 +8,7 @@ HIGHLIGHT = (0.45, -0.3, 0.0)
 """Where the light of figure 6.14 is mirrored to the viewer: inside one of the two triangles."""
 
 
-def spot(exponent):
+def spot(exponent: float) -> dict[str, Any]:
     """Figure 6.5: a spot on a white floor; a small ``m`` gives a beam without a clear border."""
     return {
         "type": "scene",
@@ -27,8 +29,8 @@ def spot(exponent):
     }
 
 
-def coarse_sphere():
-    """Figure 6.10: a sphere of few polygons, whose borders flat shading shows."""
+def coarse_sphere() -> dict[str, Any]:
+    """Figure 6.10: a sphere of few polygons, whose edges show under flat shading."""
     return {
         "type": "scene",
         "integrator": {"type": "heuristic", "ambient": 1.0},
@@ -48,7 +50,7 @@ def coarse_sphere():
     }
 
 
-def highlight_in_a_triangle():
+def highlight_in_a_triangle() -> dict[str, Any]:
     """Figure 6.14: a highlight inside a triangle, which none of its vertices sees."""
     viewer = (0.0, -2.6, 3.0)
     # The mirror image of the viewer about the plane's normal through the highlight.

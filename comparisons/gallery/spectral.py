@@ -1,13 +1,15 @@
-"""Built-in scenes in which three numbers a colour are too few: light and surface must be spectra.
+"""Built-in scenes for which three numbers per colour are too few: they need spectra.
 
-Each is compared across variants: the heuristic in RGB, as a textbook renderer would, against the
+Each is compared across variants: the heuristic in RGB, as in a textbook renderer, against the
 spectral reference.
 """
 
 from functools import lru_cache
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 WAVELENGTHS = np.arange(380.0, 721.0, 5.0)
 """Nanometres."""
@@ -16,7 +18,7 @@ SODIUM = 589.3
 """The mean of the sodium doublet, nanometres."""
 
 
-def narrow_band_lamp():
+def narrow_band_lamp() -> dict[str, Any]:
     """Four spheres, red, green, blue and white, under a lamp of a single spectral line.
 
     Under one wavelength every surface has the lamp's colour and differs in lightness alone. RGB
@@ -33,11 +35,11 @@ def narrow_band_lamp():
     return _row(spheres, _spectrum(_at_luminance(line, 70.0)))
 
 
-def metameric_pair():
+def metameric_pair() -> dict[str, Any]:
     """Two spheres of the same colour in daylight, under an incandescent lamp (CIE A).
 
     Their reflectances differ by a metameric black of D65: a spectrum that gives X = Y = Z = 0 under
-    that light. RGB, whose numbers are those of daylight, cannot tell them apart.
+    that light. RGB, whose numbers are for daylight, cannot tell them apart.
     """
     plain, other = metamers()
     surfaces = {"plain": _spectrum(plain), "metamer": _spectrum(other)}
@@ -45,11 +47,11 @@ def metameric_pair():
 
 
 @lru_cache
-def metamers():
-    """Return two reflectances at :data:`WAVELENGTHS` that have one colour under D65.
+def metamers() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return two reflectances at :data:`WAVELENGTHS` that have the same colour under D65.
 
-    The second is the first plus the largest admissible multiple of a cosine less its projection on
-    the three weights (D65 times the colour-matching functions), which is the metameric black.
+    The second is the first plus the largest admissible multiple of the metameric black: a cosine
+    less its projection on the three weights (D65 times the colour-matching functions).
     """
     weights = (_d65() * _colour_matching()).T
     plain = 0.45 - 0.12 * np.cos(2 * np.pi * (WAVELENGTHS - 380) / 340)
@@ -75,7 +77,7 @@ def _incandescent():
 
 
 def _at_luminance(spectrum, luminance):
-    """Scale a spectrum so that its Y, by Mitsuba's normalisation, is a given one."""
+    """Scale a spectrum to a given Y, by Mitsuba's normalisation."""
     y = np.sum(spectrum * _colour_matching()[1]) * (WAVELENGTHS[1] - WAVELENGTHS[0])
     return spectrum * luminance / (y * mi.MI_CIE_Y_NORMALIZATION)
 

@@ -1,25 +1,27 @@
-"""What a hard case is, and how it is judged.
+"""A hard case, and how it is judged.
 
 A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
-the naive one does not. Tests demand both of every case; the report prints them. The cases
-themselves are in `comparisons.hard.collection`.
+the naive one does not. Tests demand both of every case; the report prints them. The cases are in
+:mod:`comparisons.hard.collection`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from comparisons.hard.textbook import Setting
 
 ABSENT = 1e-3
-"""Values below this share of the largest are judged by their absolute error: the bound of the issue
-of highlights holds where they exceed a thousandth."""
+"""Values below this share of the largest are judged by their absolute error."""
+
+Values = Callable[[], ArrayLike]
 
 
 @dataclass(frozen=True)
 class Description:
-    """A case in words: its name and group, what is hard, and the bound on the relative error."""
+    """A case in words: its name and group, the difficulty, and the bound on the relative error."""
 
     name: str
     group: str
@@ -29,44 +31,44 @@ class Description:
 
 @dataclass(frozen=True)
 class HardCase(Description):
-    """A case, which can be evaluated.
+    """A case that can be evaluated.
 
-    ``naive``, ``ours`` and ``exact`` take nothing and return arrays of one shape.
+    ``naive``, ``ours`` and ``exact`` return arrays of one shape.
     """
 
-    naive: Callable
-    ours: Callable
-    exact: Callable
+    naive: Values
+    ours: Values
+    exact: Values
     setting: Setting | None = None
 
-    def described(self):
+    def described(self) -> Description:
         """Return the words without the code, which cannot be sent to another process."""
         return Description(self.name, self.group, self.hard, self.bound)
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What is defined by convention: no formula breaks, but somebody must decide."""
+    """A convention: no formula breaks, but somebody must decide."""
 
     name: str
     text: str
-    stated: object
+    stated: ArrayLike
 
 
 @dataclass(frozen=True)
 class Convention(Statement):
     """A statement that can be tested.
 
-    ``ours`` takes nothing and returns what is to equal ``stated``, which ``text`` says in words.
+    ``ours`` must return ``stated``, which ``text`` says in words.
     """
 
-    ours: Callable
+    ours: Values
 
-    def holds(self):
-        """Tell whether what is done is what is stated, to single precision."""
+    def holds(self) -> bool:
+        """Return whether the code does what is stated, to single precision."""
         return bool(np.allclose(self.ours(), self.stated, rtol=1e-6, atol=0))
 
-    def described(self):
+    def described(self) -> Statement:
         """Return the words without the code."""
         return Statement(self.name, self.text, self.stated)
 
@@ -80,18 +82,18 @@ class Outcome:
     our_error: float
 
     @property
-    def holds(self):
+    def holds(self) -> bool:
         """Whether ours keeps the bound."""
         return self.our_error <= self.case.bound
 
 
-def evaluate(case):
-    """Return the :class:`Outcome` of a case."""
+def evaluate(case: HardCase) -> Outcome:
+    """Return the outcome of a case."""
     exact = np.asarray(case.exact(), np.longdouble)
     return Outcome(case.described(), error(case.naive(), exact), error(case.ours(), exact))
 
 
-def error(found, exact):
+def error(found: ArrayLike, exact: np.ndarray) -> float:
     """Return the largest error, relative to the exact value or to a thousandth of the largest."""
     found = np.asarray(found, np.longdouble)
     if found.shape != exact.shape:
@@ -105,10 +107,10 @@ def error(found, exact):
     return float((difference / scale).max())
 
 
-def quietly(function):
-    """Return a function without NumPy's warnings of NaN and infinities, which cases are about."""
+def quietly(function: Values) -> Values:
+    """Return a function without NumPy's warnings of NaN and infinities, which cases provoke."""
 
-    def call():
+    def call() -> ArrayLike:
         with np.errstate(all="ignore"):
             return function()
 

@@ -1,4 +1,4 @@
-"""All hard cases in one place, and evaluated: what the tests and the report show of them.
+"""All hard cases, and their evaluation for the tests and the report.
 
 Cases of the group ``reference`` need a Mitsuba variant and the plugins.
 """
@@ -33,7 +33,7 @@ PICTURE = 160
 
 @dataclass(frozen=True)
 class Picture:
-    """One thing seen by the naive formula and by ours: images (H, W) of values from 0 to 1."""
+    """The same view by the naive formula and by ours: images (H, W) of values from 0 to 1."""
 
     title: str
     naive: np.ndarray
@@ -44,8 +44,8 @@ class Picture:
 class HardCases:
     """All cases with their errors, the conventions, pictures of some, and the models' energy.
 
-    ``conventions`` are pairs of a :class:`Statement` and whether it holds; ``furnaces`` have the
-    models' albedo under light from each of ``angles``, in degrees, and their asymmetry.
+    ``conventions`` are pairs of a statement and whether it holds; ``furnaces`` have the models'
+    albedo under light from each of ``angles``, in degrees, and their asymmetry.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -54,12 +54,12 @@ class HardCases:
     furnaces: tuple[Furnace, ...]
     angles: tuple[float, ...] = furnace.ANGLES
 
-    def of_group(self, name):
+    def of_group(self, name: str) -> list[Outcome]:
         """Return the outcomes of the cases of a group."""
         return [outcome for outcome in self.outcomes if outcome.case.group == name]
 
 
-def collect():
+def collect() -> HardCases:
     """Evaluate everything, in the current Mitsuba variant; a few seconds."""
     return HardCases(
         outcomes=tuple(map(evaluate, CASES)),
@@ -99,7 +99,7 @@ def _highlight(n, half):
 
 
 def _spot(cutoff):
-    """Return a setting of points in a square below a spot, which is somewhat aslant."""
+    """Return a setting of points in a square below a slightly tilted spot."""
     x, y = _grid(2.5 * np.deg2rad(cutoff))
     position = np.concatenate([x, y, 0 * x], axis=1)
     light = (0.3, 0.4, 0.8)

@@ -1,10 +1,13 @@
-"""The hard cases of colour: where a metric's formula, taken as printed, has no value.
+"""The hard cases of colour: where a metric's formula, as printed, has no value.
 
-Metrics compute in double precision; what breaks here are the formulas, not their rounding: powers
-of negative numbers, quotients and angles of zero, and the mean of two hues across 0 degrees.
+Metrics compute in double precision. Here the formulas break, not their rounding: powers of negative
+numbers, quotients and angles of zero, and the mean of two hues across 0 degrees.
 """
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.departure.metrics import LOG2_EPSILON, log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING, ciede2000, itp, lab
@@ -19,20 +22,20 @@ _PUBLISHED = np.array([4.3065, 27.1492])
 """Two of the pairs of Sharma, Wu and Dalal (2005) whose hues lie on either side of 0 degrees."""
 
 TO_BT2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
-"""From BT.709, of ITU-R BT.2087; its four digits set the bound of negative colours."""
+"""From BT.709, by ITU-R BT.2087; its four digits set the bound of negative colours."""
 
 
-def pq(luminance):
+def pq(luminance: NDArray) -> NDArray:
     """Return the curve of ITU-R BT.2100 as printed, of a luminance in cd/m²."""
     power = (luminance / 1e4) ** 0.1593017578125
     return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
 
 
-def naive_ciede2000(a, b, hue):
-    """ΔE2000 of CIE L*a*b* colours (N, 3), with ``hue(a, b)`` in degrees and its plain mean.
+def naive_ciede2000(a: NDArray, b: NDArray, hue: Callable[[NDArray, NDArray], NDArray]) -> NDArray:
+    """Return ΔE2000 of CIE L*a*b* colours (N, 3), with ``hue(a, b)`` in degrees and its plain mean.
 
-    Source: Sharma, Wu and Dalal (2005), whose rules for undefined hues and for differences of more
-    than 180 degrees are what is left out.
+    Source: Sharma, Wu and Dalal (2005), without their rules for undefined hues and for differences
+    of more than 180 degrees.
     """
     mean_chroma = (np.hypot(a[:, 1], a[:, 2]) + np.hypot(b[:, 1], b[:, 2])) / 2
     g = 0.5 * (1 - np.sqrt(mean_chroma**7 / (mean_chroma**7 + 25.0**7)))
@@ -116,7 +119,7 @@ CASES = (
     ),
     HardCase(
         "1e6 cd/m²", "colour",
-        "The curve of BT.2100 ends at 10,000 cd/m² with 1; beyond it still rises, to no meaning.",
+        "The curve of BT.2100 ends at 10,000 cd/m² with 1; beyond, it rises without meaning.",
         1e-6, lambda: pq(_MILLION[..., 0] * DEFAULT_VIEWING.white_luminance),
         lambda: _intensity(_MILLION), lambda: np.ones((1, 1)),
     ),
@@ -127,7 +130,7 @@ CASES = (
     ),
     HardCase(
         "hues on either side of 0°", "colour",
-        "The mean of 10° and 350° is 0° and not 180°; ΔE2000 weighs by it.", 2e-5,
+        "The mean of 10° and 350° is 0°, not 180°; ΔE2000 depends on it.", 2e-5,
         quietly(lambda: naive_ciede2000(*_ACROSS, _full_hue)),
         lambda: ciede2000(*_ACROSS), lambda: _PUBLISHED,
     ),

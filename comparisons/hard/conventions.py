@@ -1,4 +1,4 @@
-"""What is defined by convention: limits at which no formula breaks, but which are no mathematics.
+"""Conventions: limits at which no formula breaks, but which mathematics does not settle.
 
 Each could be defined otherwise; tests hold the code to these.
 """
@@ -28,22 +28,22 @@ def _behind_an_even_spot(exponent):
 CONVENTIONS = (
     cases.Convention(
         "m = 0 of a spot",
-        "An even cone, lit up to its cutoff beyond 90° too, though cos^m is dark there for every"
-        " m > 0; the same for an m compiled in and one that is not.",
+        "An even cone, lit up to its cutoff even beyond 90°, though cos^m is dark there for every"
+        " m > 0; the same for a compiled-in m and a run-time m.",
         [1.0, 1.0],
         lambda: np.ravel([_behind_an_even_spot(m) for m in (0, dr.opaque(Float, 0))]),
     ),
     cases.Convention(
         "normals of length 1e-40",
         "Below the smallest normal float a length counts as 0 or as less than 1, as the processor's"
-        " threads treat such numbers: the surface may be too dark, and never NaN or too bright.",
+        " threads treat such numbers: the surface may be too dark, but never NaN or too bright.",
         True,
         lambda: float(dr.norm(vectors.normalise(dr.opaque(Array3f, (6e-41, 0, 8e-41))))[0]) <= 1,
     ),
     cases.Convention(
         "IOR 1",
-        "Mitsuba refuses it, since it makes no surface. A lobe too faint for any IOR above"
-        " 1.0001 gets that, and reflects 2.5e-9.",
+        "Mitsuba rejects it, since it makes no surface. A lobe too faint for any IOR above"
+        " 1.0001 gets 1.0001, and reflects 2.5e-9.",
         SMALLEST_IOR,
         lambda: (
             to_roughplastic(Phong((0.5,) * 3, (1e-12,) * 3, 9.0), Convention.MATCHED)[0].int_ior

@@ -1,16 +1,18 @@
-"""Which models of reflection keep energy, and which are reciprocal: facts, by quadrature.
+"""Which models of reflection conserve energy, and which are reciprocal: facts, by quadrature.
 
 In a white furnace, light of radiance 1 from all sides, a surface that loses nothing looks like the
-furnace; one that shows more creates light. What is tabulated is the directional-hemispherical
-albedo ``2 pi int f cos(theta_o)`` for light from one angle, with coefficients and reflectances of
-1, and how far ``f(i, o)`` is from ``f(o, i)``.
+furnace; one that looks brighter creates light. The table has the directional-hemispherical albedo
+``2 pi int f cos(theta_o)`` for light from one angle, with coefficients and reflectances of 1, and
+how far ``f(i, o)`` is from ``f(o, i)``.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 ANGLES = (0.0, 45.0, 80.0)
 AZIMUTHS, HEIGHTS = 960, 720
@@ -52,19 +54,19 @@ MODELS = {
 """The models, as Mitsuba dictionaries; the plugins must be registered."""
 
 
-def table():
-    """Return a :class:`Furnace` for each of :data:`MODELS`, in the current variant."""
+def table() -> list[Furnace]:
+    """Return the albedo and asymmetry of each of :data:`MODELS`, in the current variant."""
     return [
         Furnace(name, tuple(albedo(bsdf, angle) for angle in ANGLES), asymmetry(bsdf))
         for name, bsdf in ((name, mi.load_dict(model)) for name, model in MODELS.items())
     ]
 
 
-def albedo(bsdf, degrees):
-    """Return the albedo of a BSDF for light that comes at an angle from the normal.
+def albedo(bsdf: Any, degrees: float) -> float:
+    """Return the albedo of a BSDF for light at an angle from the normal.
 
-    Mitsuba's ``eval(wi, wo)`` is ``f cos(theta_wo)`` with the light at ``wo``; the outgoing
-    directions are those of ``wi`` here, so that models without reciprocity keep their sense.
+    Mitsuba's ``eval(wi, wo)`` is ``f cos(theta_wo)`` with the light at ``wo``. Here ``wi`` are the
+    outgoing directions, so models without reciprocity keep their sense.
     """
     light = direction(np.deg2rad(degrees), 0.0)
     outgoing, solid_angle = hemisphere()
@@ -72,8 +74,8 @@ def albedo(bsdf, degrees):
     return float((value * outgoing[2] * solid_angle).sum())
 
 
-def hemisphere(azimuths=AZIMUTHS, heights=HEIGHTS):
-    """Return directions (3, N) above a surface, and the solid angle (N,) that each stands for.
+def hemisphere(azimuths: int = AZIMUTHS, heights: int = HEIGHTS) -> tuple[NDArray, NDArray]:
+    """Return directions (3, N) above a surface, and the solid angle (N,) of each.
 
     They are even in ``t`` with ``cos(theta) = 1 - t^2``, and so dense about the normal.
     """
@@ -83,14 +85,14 @@ def hemisphere(azimuths=AZIMUTHS, heights=HEIGHTS):
     return direction(np.arccos(1 - t * t), phi), 2 * t * 2 * np.pi / len(t)
 
 
-def asymmetry(bsdf):
+def asymmetry(bsdf: Any) -> float:
     """Return the largest relative difference of ``f(i, o)`` and ``f(o, i)``."""
     a, b = random_pairs()
     there, back = evaluate(bsdf, a, b) / b[2], evaluate(bsdf, b, a) / a[2]
     return float(relative_differences(there, back).max())
 
 
-def random_pairs(count=20_000):
+def random_pairs(count: int = 20_000) -> list[NDArray]:
     """Return two sets of random directions (3, N), within 80 degrees of the normal."""
     rng = np.random.default_rng(0)
     return [
@@ -100,14 +102,14 @@ def random_pairs(count=20_000):
     ]  # fmt: skip
 
 
-def relative_differences(there, back):
-    """Return ``|a - b|`` over the mean of both, and 0 where that is under 1/1000 of the largest."""
+def relative_differences(there: NDArray, back: NDArray) -> NDArray:
+    """Return ``|a - b|`` over the mean of both, and 0 where that is below 1/1000 of the largest."""
     mean = (there + back) / 2
     counted = mean > 1e-3 * mean.max()
     return np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
 
 
-def evaluate(bsdf, wi, wo):
+def evaluate(bsdf: Any, wi: NDArray, wo: NDArray) -> NDArray[np.float64]:
     """Return ``f cos(theta_wo)`` of a white BSDF, for directions (3, N)."""
     count = max(wi.shape[1], wo.shape[1])
     si = dr.zeros(mi.SurfaceInteraction3f, count)
@@ -118,7 +120,7 @@ def evaluate(bsdf, wi, wo):
     return np.atleast_2d(np.array(value, float))[0]
 
 
-def direction(theta, phi):
+def direction(theta: ArrayLike, phi: ArrayLike) -> NDArray:
     """Return unit vectors (3, N) at angles from the normal and about it, in radians."""
     theta, phi = np.broadcast_arrays(np.atleast_1d(theta), phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])

@@ -3,11 +3,13 @@
 Here the naive evaluation is the textbook's formula in single precision.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import drjit as dr
 import numpy as np
 from drjit.llvm import Array3f, Float
+from numpy.typing import NDArray
 
 import heuristic
 from comparisons.hard import textbook
@@ -17,8 +19,8 @@ from comparisons.hard.textbook import Setting
 POINTS = 2001
 
 
-def by_kernel(setting):
-    """Evaluate `heuristic.shade` at a setting, in single precision: an array (N,)."""
+def by_kernel(setting: Setting) -> NDArray[np.float32]:
+    """Evaluate :func:`heuristic.shade` at a setting, in single precision: an array (N,)."""
     s = setting.rounded()
     count = max(np.size(getattr(s, name)) // 3 for name in ("position", "normal", "view", "light"))
     count = max(count, np.size(s.n), np.size(s.intensity))
@@ -28,13 +30,14 @@ def by_kernel(setting):
 
     light = vector(s.light)
     intensity = Float(np.broadcast_to(s.intensity, count).copy())
-    attenuation = tuple(map(float, s.attenuation))
+    k0, k1, k2 = map(float, s.attenuation)
+    lamp: heuristic.PointLight | heuristic.SpotLight
     if s.direction is None:
-        lamp = heuristic.PointLight(light, intensity, attenuation)
+        lamp = heuristic.PointLight(light, intensity, (k0, k1, k2))
     else:
         direction = tuple(map(float, s.direction))
         lamp = heuristic.SpotLight(
-            light, direction, intensity, float(s.cutoff), float(s.m), attenuation
+            light, direction, intensity, float(s.cutoff), float(s.m), (k0, k1, k2)
         )
     n = Float(np.broadcast_to(s.n, count).copy())
     material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=n)
@@ -44,7 +47,14 @@ def by_kernel(setting):
     return np.array(value + dr.zeros(Float, count))
 
 
-def shaded(name, group, hard, bound, setting, naive=textbook.shade):
+def shaded(
+    name: str,
+    group: str,
+    hard: str,
+    bound: float,
+    setting: Setting,
+    naive: Callable[[Setting, type[np.floating]], NDArray] = textbook.shade,
+) -> HardCase:
     """Make a case of a setting; ``naive(setting, dtype)`` is the formula as people write it."""
     setting = setting.rounded()
     return HardCase(
@@ -59,8 +69,8 @@ def shaded(name, group, hard, bound, setting, naive=textbook.shade):
     )
 
 
-def highlight(n, points=POINTS):
-    """Return a setting across a highlight, from its middle to where it is a thousandth."""
+def highlight(n: float, points: int = POINTS) -> Setting:
+    """Return a setting across a highlight, from its middle to a thousandth of its peak."""
     width = np.sqrt(2 * np.log(1e3) / n)
     return Setting(
         normal=(0.1, 0.2, 0.9), light=(1.0, 2.0, 4.0), k_s=1.0, n=n,
@@ -79,7 +89,7 @@ def _mirrored(light, normal, angle):
 
 
 def _mirror_directions():
-    """Return views in the mirror direction of a light, as nearly as single precision has it."""
+    """Return views in the mirror direction of a light, to single precision."""
     normal = np.random.default_rng(2).normal(size=(POINTS, 3)).astype(np.float32).astype(float)
     normal[:, 2] = np.abs(normal[:, 2]) + 0.1
     unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -115,7 +125,7 @@ def _under_a_spot(angle, **changes):
 _AGAINST = np.array([(3, 5, -4), (3, -5, -4), (7, 0, -1), (-1, 0, -7)])
 _RAYS = (_AGAINST * np.arange(1, 51)[:, None, None]).reshape(-1, 3).astype(float)
 _ON_CONE = Setting(k_d=1.0, cutoff=135.0, direction=(-3.0, 0.0, 4.0), light=-_RAYS, normal=-_RAYS)
-"""Whole numbers at exactly 135 degrees from an axis: as much against it as across."""
+"""Integers at exactly 135 degrees from an axis: as far against it as across it."""
 
 CASES = (
     shaded("exponent 0 at the lobe's end", "exponents",
@@ -125,13 +135,13 @@ CASES = (
            "The scalar product cancels to a few digits, whose root is still visible.", 2e-4,
            replace(_HIGHLIGHT, n=0.5, view=_AT_END)),
     shaded("exponent 1e-3, R·V just above 0", "exponents",
-           "The lobe is almost even and ends at once; the sign of R·V is all that matters.", 2e-4,
+           "The lobe is almost even and ends abruptly; only the sign of R·V matters.", 2e-4,
            replace(_HIGHLIGHT, n=1e-3, view=_mirrored((1.0, 2.0, 4.0), (0.1, 0.2, 0.9),
                    np.pi / 2 + np.linspace(-3e-7, 3e-7, POINTS)))),
     shaded("exponent 1e5", "exponents",
            "The power multiplies the rounding of R·V near 1 by n.", 2e-4, highlight(1e5)),
     shaded("exponent 1e6", "exponents",
-           "The same; already rounding N, L and V turns the highlight visibly.", 2e-4,
+           "The same; even rounding N, L and V turns the highlight visibly.", 2e-4,
            _HIGHLIGHT),
     shaded("exponent 123456.78", "exponents", "A large exponent that is not an integer.", 2e-4,
            highlight(123456.78)),
@@ -160,7 +170,7 @@ CASES = (
     shaded("a scene of size 1e6, n = 1e5", "geometry", "A sharp highlight in a huge scene.", 2e-4,
            replace(highlight(1e5), light=(1e6, 2e6, 4e6))),
     shaded("far from the origin, n = 1e5", "geometry",
-           "Light and point 1e6 away: their difference is exact, and all the rest rounds.", 2e-4,
+           "Light and point 1e6 away: their difference is exact, all else rounds.", 2e-4,
            replace(highlight(1e5), position=(1e6, 1e6, 1e6), light=(1e6 + 1, 1e6 + 2, 1e6 + 4))),
     shaded("intensity 1e-30 at a distance of 1e-20", "lights",
            "1/d² overflows, and the intensity brings it back to 1e10.", 1e-6,
@@ -171,7 +181,7 @@ CASES = (
     shaded("a spot with m = 1e5", "lights", "The power multiplies the rounding of the cosine by m.",
            1e-3, _under_a_spot(np.linspace(0, 0.01, POINTS), m=1e5, cutoff=30.0)),
     shaded("a cutoff of 1e-4 degrees", "lights",
-           "The cosine of the cutoff rounds to 1, and with it those of points far outside.", 1e-5,
+           "The cosine of the cutoff rounds to 1, as do the cosines of points far outside.", 1e-5,
            _under_a_spot(np.deg2rad(1e-4) * np.array([0, 0.2, 0.5, 0.8, 1.2, 2, 10, 50, 150]),
                          cutoff=1e-4)),
     shaded("a cutoff of 179.99 degrees", "lights",
@@ -180,7 +190,7 @@ CASES = (
                    position=[(2 * np.deg2rad(0.01) * f, 0, 0) for f in (0, 0.3, 0.8, 1.2, 3)])),
     replace(
         shaded("a point exactly on the cone", "lights",
-               "6.2 says ≥: coordinates on the cone are lit, whatever their roundings say.", 1e-6,
+               "6.2 says ≥: coordinates on the cone are lit, however they round.", 1e-6,
                _ON_CONE),
         exact=lambda: np.ones(len(_RAYS))),
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """The hard cases of sides: lights and viewers behind a surface, and normals of other lengths.
 
-Rounding has little part in these. The naive forms are what is often written: 8.5 and 8.9 without
-their condition ``N.L > 0``, a normal turned to face the viewer, an interpolated normal as it comes.
+Rounding hardly matters here. The naive forms are common ones: 8.5 and 8.9 without their condition
+``N.L > 0``, a normal turned to face the viewer, an interpolated normal that is not normalised.
 """
 
 from functools import partial
@@ -68,13 +68,13 @@ def _unseen():
 
 
 def _opposing():
-    """Normals exactly opposite to the light, which is their mirror image; seen from there."""
+    """Normals exactly opposite to the light, which is its own mirror image; seen from there."""
     light = np.array([(0, 0, 1), (0, 3, 4), (-1, 2, 2)], float)
     return Setting(normal=-light, light=light, view=light, k_d=0.2, k_s=0.8, n=8)
 
 
 def _shortened():
-    """Normals half way between two units, whose length is what interpolation leaves: 0.1 to 1."""
+    """Interpolated normals, 0.1 to 1 long."""
     normal, light, view = _directions(14)
     light *= np.sign((light * normal).sum(axis=1, keepdims=True))
     length = np.linspace(0.1, 1, POINTS)[:, None]
@@ -86,16 +86,16 @@ CASES = (
            "N·L < 0 all over the outside: without its condition the diffuse term takes light away,"
            " and an even power makes a highlight of R·V < 0.", 1e-6, _inside(), _UNCONDITIONAL),
     shaded("normals opposite to the light", "geometry",
-           "R is then L itself: a full highlight on the dark side, where N·L > 0 is not asked.",
+           "R is then L itself: a full highlight on the dark side, unless N·L > 0 is required.",
            1e-6, _opposing(), _UNCONDITIONAL),
     shaded("normals that are not unit vectors", "geometry",
-           "Interpolation leaves lengths below 1; taken as they come they dim the surface and bend"
-           " R.", 2e-4, _shortened(), _AS_IT_COMES),
+           "Interpolation leaves lengths below 1, which dim the surface and bend R.", 2e-4,
+           _shortened(), _AS_IT_COMES),
     shaded("a shading normal that faces away from the light", "shading",
-           "Mirrored about such a normal the light points to the viewer: a highlight out of the"
-           " dark.", 1e-6, _behind(), _UNCONDITIONAL),
+           "Mirrored about such a normal, the light points to the viewer: a highlight in the dark.",
+           1e-6, _behind(), _UNCONDITIONAL),
     shaded("a shading normal that faces away from the viewer", "shading",
-           "At the silhouettes of smoothed meshes. 8.5 asks nothing of the viewer; a normal turned"
-           " to face him loses its light.", 1e-5, _unseen(), _facing_viewer),
+           "At the silhouettes of smoothed meshes. 8.5 ignores the viewer; a normal turned to face"
+           " the viewer loses its light.", 1e-5, _unseen(), _facing_viewer),
 )  # fmt: skip
 """The cases of sides."""

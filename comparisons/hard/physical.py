@@ -1,17 +1,20 @@
-"""The hard cases of the reference: where Mitsuba, or how it is read, would be at fault.
+"""The hard cases of the reference: where Mitsuba, or a reading of it, would be at fault.
 
-Two kinds. Where Mitsuba is right but its formula breaks as printed, ours is the reference's own
-value, compared with the formula in extended precision. Where Mitsuba itself is at fault, what
-counts is attributed to the heuristic: the exact value over the reference's, which is to be 1.
-Naively every pixel counts; ours leaves out those that `comparisons.departure.limits` marks.
+There are two kinds. Where Mitsuba is right but its formula breaks as printed, ours is the
+reference's own value, compared with the formula in extended precision. Where Mitsuba itself is at
+fault, its error is attributed to the heuristic: the exact value over the reference's, which should
+be 1. Naively every pixel counts; ours omits the pixels that :mod:`comparisons.departure.limits`
+marks.
 
-All of it needs a Mitsuba variant and the plugins.
+All of them need a Mitsuba variant and the plugins.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.limits import LOST, Lights, Surfaces, find
 from comparisons.hard import microfacets, terminators
@@ -29,14 +32,17 @@ ROUGH = (0.01, 0.05, 0.1, 0.2, 0.5, 1.0)
 INDICES = (1.3, 1.5, 2.0, 3.0, 5.0, 10.0, 100.0, 1e3)
 NEAR_1 = (1.0001, 1.001, 1.01)
 
+Measured = tuple[NDArray, NDArray, NDArray]
+"""Exact values, the reference's, and the mask of the pixels where it is at fault."""
 
-def booked(exact, reference, at_fault):
-    """Return the ratio of exact to reference, and 1 where the reference is set aside."""
+
+def attributed(exact: ArrayLike, reference: NDArray, at_fault: NDArray) -> NDArray:
+    """Return the ratio of exact to reference, and 1 where the reference is at fault."""
     return np.where(at_fault, 1, np.asarray(exact, float) / reference)
 
 
 def _limits(alpha, furnace, mean, error):
-    """Return what `find` says of a row of pixels, seen and lit from above."""
+    """Return the limits of a row of pixels, seen and lit from above."""
     row = np.broadcast_to([0.0, 0.0, 1.0], (1, len(alpha), 3))
     surfaces = Surfaces(
         np.ones((1, len(alpha)), bool), np.array([alpha], float), np.array([furnace], float),
@@ -62,7 +68,7 @@ def _directions(alpha, degrees):
 
 
 def _by_mitsuba(alpha, light, view):
-    """Return the specular part of ``roughplastic`` of IOR 1.5, one roughness a row."""
+    """Return the specular part of ``roughplastic`` of IOR 1.5, one roughness per row."""
     values = np.empty(len(alpha))
     for a in np.unique(alpha):
         bsdf, rows = mi.load_dict(_plastic(a, diffuse_reflectance=0.0)), alpha == a
@@ -81,9 +87,9 @@ def _lobes(dtype):
 
 
 @cache
-def too_sharp():
+def too_sharp() -> Measured:
     """Return exact and Mitsuba's peaks for light from the normal, and the mask."""
-    light, view = (np.tile(np.float32([0, 0, 1]), (len(TOO_SHARP), 1)) for _ in range(2))
+    light, view = np.zeros((2, len(TOO_SHARP), 3), np.float32) + np.array([0, 0, 1], np.float32)
     exact = microfacets.specular(light, view, TOO_SHARP, 1.5, EXACT)
     found = _by_mitsuba(TOO_SHARP, light, view)
     mean = _row(found)
@@ -94,17 +100,17 @@ def too_sharp():
 
 
 @cache
-def white(parameters):
+def white(parameters: tuple[tuple[float, float], ...]) -> Measured:
     """Return Mitsuba's albedos of white surfaces of ``(alpha, ior)``, and the mask."""
-    found = [albedo.of_roughplastic(RoughPlastic(WHITE, *pair)) for pair in parameters]
-    found = np.array([float((a.diffuse + a.specular)[0]) for a in found])
+    albedos = [albedo.of_roughplastic(RoughPlastic(WHITE, *pair)) for pair in parameters]
+    found = np.array([float((a.diffuse + a.specular)[0]) for a in albedos])
     mean = _row(found)
     alpha = np.array([pair[0] for pair in parameters])
     return np.ones(len(found)), found, _limits(alpha, found, mean, 0 * mean).energy_loss[0]
 
 
 def _faint(subtract):
-    """Return the specular albedo near an IOR of 1, by itself or as whole less diffuse part."""
+    """Return the specular albedo near an IOR of 1, directly or as total less diffuse part."""
     values = []
     for ior in NEAR_1:
         if not subtract:
@@ -121,14 +127,14 @@ def _faint(subtract):
 
 
 def _naive_weight(k_d, k_s, n, cosine):
-    """Return value over density in the mirror direction, with a lobe chosen by its share."""
+    """Return value over density in the mirror direction, for lobes chosen by their shares."""
     share = k_s / (k_d + k_s)
     density = share * (n + 1) / (2 * np.pi) + (1 - share) * cosine / np.pi
     return (k_d * cosine + k_s) / np.pi / density
 
 
 def _black():
-    """Return the weights of samples of a surface whose texture is black, by our plugin."""
+    """Return the sample weights of a surface with a black texture, by our plugin."""
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.zeros((2, 2, 3), np.float32)), "raw": True}
     bsdf = mi.load_dict({"type": "phong", "k_d": texture, "k_s": dict(texture), "n": 9})
     si = mi.SurfaceInteraction3f()
@@ -143,10 +149,10 @@ PASSES, PIXELS, RARE, BRIGHT = 16, 48, 2.5e-4, 20.0
 
 
 @cache
-def caustic():
+def caustic() -> Measured:
     """Return exact values, estimates and mask of pixels with a path that few passes find.
 
-    Light of :data:`BRIGHT` arrives in one pass of ``1 / RARE``, on top of steady light of 0.5.
+    Light of :data:`BRIGHT` arrives in one of ``1 / RARE`` passes, on top of steady light of 0.5.
     """
     rng = np.random.default_rng(7)
     passes = 0.5 + 0.01 * rng.normal(size=(PASSES, PIXELS, PIXELS))
@@ -162,15 +168,15 @@ def caustic():
     return (0.5 + RARE * BRIGHT) * ones, mean[..., 0], mask
 
 
-def _set_aside(name, hard, bound, measure):
-    """Make a case of ``measure()``, which returns exact values, the reference's and the mask."""
+def _set_aside(name: str, hard: str, bound: float, measure: Callable[[], Measured]) -> HardCase:
+    """Make a case in which the pixels at fault are set aside."""
 
-    def naive():
+    def naive() -> NDArray:
         exact, reference, _ = measure()
-        return booked(exact, reference, np.zeros(reference.shape, bool))
+        return attributed(exact, reference, np.zeros(reference.shape, bool))
 
     return HardCase(
-        name, "reference", hard, bound, quietly(naive), quietly(lambda: booked(*measure())),
+        name, "reference", hard, bound, quietly(naive), quietly(lambda: attributed(*measure())),
         lambda: np.ones(measure()[1].shape),
     )  # fmt: skip
 
@@ -178,24 +184,24 @@ def _set_aside(name, hard, bound, measure):
 CASES = (
     HardCase(
         "α from 1e-4 to 1", "reference",
-        "Beckmann's tan² = 1 / cos² − 1 is rounding, next to α² = 1e-8. Views to 89.9°.", 1e-3,
+        "Beckmann's tan² = 1 / cos² − 1 is rounding noise next to α² = 1e-8. Views to 89.9°.", 1e-3,
         quietly(lambda: _lobes(NAIVE)),
         lambda: _by_mitsuba(SHARP, *_directions(SHARP, ANGLES)),
         lambda: _lobes(EXACT),
     ),
     _set_aside("α below 1e-4",
-               "Mitsuba computes with 1e-4: its mirror images are up to 10,000 times too dark.",
+               "Mitsuba uses 1e-4 instead: its mirror images are up to 10,000 times too dark.",
                1e-5, too_sharp),
     _set_aside("ρ = 1 in a white furnace",
                "A rough white surface follows light through one reflection, and loses the rest.",
                LOST, lambda: white(tuple((a, 1.5) for a in ROUGH))),
     _set_aside("IOR from 1.3 to 1e3 in a white furnace",
-               "Light that leaves the base is mostly thrown back inside, and lost.",
+               "Light that leaves the base is mostly reflected back inside, and lost.",
                LOST, lambda: white(tuple((0.1, ior) for ior in INDICES))),
     HardCase(
         "IOR just over 1", "reference",
-        "The specular albedo is 2.5e-9: as the difference of the whole and its diffuse part it is"
-        " rounding, and its logarithm may not exist.", 1e-3,
+        "The specular albedo is 2.5e-9: as total less diffuse part it is rounding noise, and its"
+        " logarithm may not exist.", 1e-3,
         lambda: _faint(subtract=True), lambda: _faint(subtract=False),
         lambda: [((ior - 1) / (ior + 1)) ** 2 for ior in NEAR_1],
     ),

@@ -6,11 +6,11 @@ centre, the radiance is the same everywhere ::
     L = ρ I / (π (1 − ρ))
 
 because each reflection sends the same irradiance to all of the sphere. A path takes about
-1 / (1 − ρ) reflections, and as many pairs of random numbers. Where those depend on each other, the
+1 / (1 − ρ) reflections, and as many pairs of random numbers. If those depend on each other, the
 mean of an image is wrong, however many passes are taken: no standard error shows it.
 
-Naively the sampler is Mitsuba's own; ours is :mod:`reference.scene.sampler`, at the same number of
-samples. Both are measured with the Mitsuba that is installed.
+Naively the sampler is Mitsuba's; ours is :mod:`reference.scene.sampler`, with the same number of
+samples. Both are measured with the installed Mitsuba.
 """
 
 from functools import cache
@@ -27,14 +27,14 @@ RADIANCE = REFLECTANCE / (np.pi * (1 - REFLECTANCE))
 """Closed form for an intensity of 1."""
 
 BOUND = 0.005
-"""Of the relative error: some four standard errors of :data:`SAMPLES`."""
+"""On the relative error: about four standard errors of :data:`SAMPLES`."""
 
 SAMPLES, WIDTH = 256, 32
 STOCK = (("multijitter", 4), ("multijitter", 16), ("ldsampler", 16))
 
 
 def sphere(reflectance: float, width: int, sampler: dict | None = None) -> dict:
-    """Return the scene, seen from a place off its centre, as a dictionary."""
+    """Return the scene as a dictionary, seen from inside, off its centre."""
     view = mi.ScalarTransform4f().look_at((0.3, 0.1, 0.2), (1, 0.2, 0), (0, 1, 0))
     film = {"type": "hdrfilm", "width": width, "height": width, "rfilter": {"type": "box"}}
     sensor = {"type": "perspective", "fov": 60, "to_world": view, "film": film}
@@ -62,16 +62,17 @@ def mean(sampler: str, count: int) -> float:
     return float(np.mean([np.array(image).mean() for image in images]))
 
 
-CASES = tuple(
-    HardCase(
+def _case(sampler: str, count: int) -> HardCase:
+    return HardCase(
         f"{sampler} at {count} samples per pass",
         "reference",
-        f"Inside a sphere of ρ = {REFLECTANCE} a path takes some ten reflections, and the numbers"
-        " that it takes depend on each other.",
+        f"Inside a sphere of ρ = {REFLECTANCE} a path takes about ten reflections, and its random"
+        " numbers depend on each other.",
         BOUND,
-        lambda sampler=sampler, count=count: np.array([mean(sampler, count)]),
-        lambda count=count: np.array([mean(SAMPLER, count)]),
+        lambda: np.array([mean(sampler, count)]),
+        lambda: np.array([mean(SAMPLER, count)]),
         lambda: np.array([RADIANCE]),
     )
-    for sampler, count in STOCK
-)
+
+
+CASES = tuple(_case(sampler, count) for sampler, count in STOCK)

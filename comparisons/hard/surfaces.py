@@ -1,8 +1,9 @@
-"""The hard cases of surfaces, triangles and their normals, and of sums of many lights."""
+"""The hard cases of surfaces, triangles and their normals, and sums of many lights."""
 
 import drjit as dr
 import numpy as np
 from drjit.llvm import Array3f, Array3u
+from numpy.typing import ArrayLike, NDArray
 
 import heuristic
 from comparisons.hard import textbook
@@ -12,10 +13,14 @@ from heuristic import interpolation, normals, vertex_normals
 LIGHTS = 10_000
 
 
+def _single(values: ArrayLike) -> NDArray[np.float32]:
+    return np.asarray(values, np.float32)
+
+
 def _lights():
     """Return the intensities and positions of one light of 1e6 and many of 1e-2 around it."""
     rng = np.random.default_rng(3)
-    position = rng.normal(size=(LIGHTS, 3)).astype(np.float32) + np.float32([0, 0, 8])
+    position = rng.normal(size=(LIGHTS, 3)).astype(np.float32) + _single([0, 0, 8])
     intensity = np.full(LIGHTS, 0.01, np.float32)
     intensity[0] = 1e6
     return intensity, position
@@ -40,7 +45,7 @@ def _kernel_sum():
 
 
 def _triangle(name, hard, corners, bound=1e-5, exact=None):
-    corners = np.float32(corners)
+    corners = _single(corners)
 
     def ours():
         return np.array(
@@ -55,8 +60,8 @@ def _triangle(name, hard, corners, bound=1e-5, exact=None):
     )  # fmt: skip
 
 
-_AXES = np.float32([1e3, 1.0, 1e-3])
-_ON_ELLIPSOID = np.float32([600.0, 0.48, 0.64e-3])
+_AXES = _single([1e3, 1.0, 1e-3])
+_ON_ELLIPSOID = _single([600.0, 0.48, 0.64e-3])
 _ELLIPSOID_SCALE = np.float32(1e-20)
 
 
@@ -75,7 +80,7 @@ def _our_ellipsoid_normal():
 
 
 # Two sides of a sheet: each face is there twice, once turned over.
-_SHEET = np.float32([[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4]])
+_SHEET = _single([[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4]])
 
 
 def _naive_vertex_normals():
@@ -92,7 +97,7 @@ def _our_vertex_normals():
 
 
 def _naive_scan_line():
-    middle = np.float32([0.6, 0.0, 0.8]) * np.float32(0.5) + np.float32([-0.6, 0, -0.8]) * 0.5
+    middle = _single([0.6, 0.0, 0.8]) * _single(0.5) + _single([-0.6, 0, -0.8]) * 0.5
     with np.errstate(all="ignore"):
         return middle / np.sqrt((middle * middle).sum())
 
@@ -102,9 +107,9 @@ def _our_scan_line():
     return np.array(interpolation.scan_line_normal(a, -a, 0, 1, dr.opaque(type(a.x), 0.5)))[:, 0]
 
 
-_HUGE = np.float32(
-    [[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4], [0.5, 0.6, 0.5]]
-) * np.float32(1e15)
+_HUGE = _single([[0.1, 0.2, 0.3], [1.3, 0.1, 0.9], [0.2, 1.7, 0.4], [0.5, 0.6, 0.5]]) * _single(
+    1e15
+)
 """Three corners, and a point above the triangle."""
 
 
@@ -124,7 +129,7 @@ def _our_weights():
 CASES = (
     HardCase(
         "10,000 lights of mixed magnitude", "lights",
-        "One light of 1e6 swallows the last digits of 9,999 of 0.01, one after the other.", 1e-6,
+        "One light of 1e6 swallows the last digits of 9,999 lights of 0.01, one by one.", 1e-6,
         lambda: _sum_of_lights(textbook.NAIVE), _kernel_sum,
         lambda: _sum_of_lights(textbook.EXACT),
     ),

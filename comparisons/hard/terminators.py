@@ -1,13 +1,14 @@
 """A coarse mesh with smooth normals under a light: where its two normals disagree.
 
-No face of the mesh hides another, so that the light at each point is known: ``max(N.L, 0) / d²``
-of the shading normal, which is what the heuristic computes.
+No face of the mesh hides another, so the light at each point is known: ``max(N.L, 0) / d²`` of the
+shading normal, as in the heuristic.
 """
 
 from functools import cache
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.departure.limits import find, of_scene
 from heuristic.meshes import to_mesh
@@ -16,13 +17,13 @@ SIDE = 48
 LIGHT, CAMERA = (4.0, -3.0, 1.0), (0.0, -4.0, 0.5)
 
 
-def lit():
-    """Return exact value, Mitsuba's and the mask, of pixels whose normals both see the viewer."""
+def lit() -> tuple[NDArray, NDArray, NDArray]:
+    """Return exact value, Mitsuba's and the mask, of pixels whose normals agree on the viewer."""
     return _of_pixels(lambda viewed, light: viewed)
 
 
-def seen():
-    """The same, of pixels whose normals agree about the light."""
+def seen() -> tuple[NDArray, NDArray, NDArray]:
+    """Return the same, of pixels whose normals agree on the light."""
     return _of_pixels(lambda viewed, light: light)
 
 
@@ -66,7 +67,7 @@ def _picture():
 
 
 def _radiance(scene):
-    """Return what Mitsuba's ``direct`` sees along the rays through the centres of pixels."""
+    """Return the radiance that Mitsuba's ``direct`` finds through the centres of pixels."""
     x, y = (axis.ravel() for axis in np.meshgrid(*[(np.arange(SIDE) + 0.5) / SIDE] * 2))
     place = mi.Point2f(mi.Float(x), mi.Float(y))
     ray, _ = scene.sensors()[0].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))

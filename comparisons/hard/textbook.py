@@ -2,12 +2,16 @@
 
 In single precision it is the naive form that the hard cases break. In extended precision
 (:data:`EXACT`; on machines without it, double) the same lines are exact enough to judge by, since
-the inputs are of single precision. Nothing here is shared with the kernel.
+the inputs are of single precision. It shares nothing with the kernel.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heuristic.arrays import Array
 
 NAIVE, EXACT = np.float32, np.longdouble
 
@@ -19,34 +23,34 @@ class Setting:
     ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``.
     """
 
-    position: object = (0.0, 0.0, 0.0)
-    normal: object = (0.0, 0.0, 1.0)
-    view: object = (0.0, 0.0, 1.0)
-    light: object = (0.0, 0.0, 1.0)
-    intensity: object = 1.0
-    attenuation: tuple = (1.0, 0.0, 0.0)
+    position: Array = (0.0, 0.0, 0.0)
+    normal: Array = (0.0, 0.0, 1.0)
+    view: Array = (0.0, 0.0, 1.0)
+    light: Array = (0.0, 0.0, 1.0)
+    intensity: Array = 1.0
+    attenuation: Array = (1.0, 0.0, 0.0)
     k_d: float = 0.0
     k_s: float = 0.0
-    n: object = 1.0
-    direction: object = None
+    n: Array = 1.0
+    direction: Array = None
     cutoff: float = 90.0
     m: float = 0.0
 
-    def rounded(self):
+    def rounded(self) -> "Setting":
         """Return the setting with all numbers rounded to single precision."""
-        names = ("position", "normal", "view", "light", "intensity", "n", "k_d", "k_s", "direction")
-        names += ("cutoff", "m", "attenuation")
-        values = {name: getattr(self, name) for name in names}
-        return replace(
-            self, **{k: np.float32(v) if v is not None else None for k, v in values.items()}
-        )
+        rounded: dict[str, Any] = {
+            name: np.float32(value) for name, value in vars(self).items() if value is not None
+        }
+        return replace(self, **rounded)
 
 
-def shade(setting, dtype, horizon=True, unit_normal=True):
-    """Equation 8.10 for one light, without any precaution: an array (N,) of a precision.
+def shade(
+    setting: Setting, dtype: type[np.floating], horizon: bool = True, unit_normal: bool = True
+) -> NDArray:
+    """Evaluate equation 8.10 for one light, without precautions: an array (N,) of a precision.
 
-    Without ``horizon`` nothing asks whether ``N.L`` and ``R.V`` are above 0, as 8.5 and 8.9 are
-    printed; without ``unit_normal`` the normal is taken for a unit vector as it comes.
+    Without ``horizon``, ``N.L`` and ``R.V`` need not be above 0, as 8.5 and 8.9 are printed;
+    without ``unit_normal``, the normal is taken for a unit vector.
     """
     s = setting
     with np.errstate(all="ignore"):
@@ -69,8 +73,8 @@ def shade(setting, dtype, horizon=True, unit_normal=True):
         return np.atleast_1d(np.where(horizon & (cosine <= 0), 0, value))
 
 
-def shade_exactly(setting):
-    """The same in extended precision, with what the equations leave out where they are undefined.
+def shade_exactly(setting: Setting) -> NDArray:
+    """Evaluate the same in extended precision, and define it where the equations do not.
 
     A direction that does not exist receives no light, and the lobe ends where ``R.V <= 0``, for
     ``n = 0`` too.
@@ -86,11 +90,13 @@ def shade_exactly(setting):
     return np.where(exists, value, 0)
 
 
-def triangle_normal(p0, p1, p2, dtype):
-    """Equation 6.19 as printed."""
-    p0, p1, p2 = (_of(p, dtype) for p in (p0, p1, p2))
+def triangle_normal(
+    p0: ArrayLike, p1: ArrayLike, p2: ArrayLike, dtype: type[np.floating]
+) -> NDArray:
+    """Evaluate equation 6.19 as printed."""
+    a, b, c = (_of(p, dtype) for p in (p0, p1, p2))
     with np.errstate(all="ignore"):
-        return _unit(np.cross(p1 - p0, p2 - p0))
+        return _unit(np.cross(b - a, c - a))
 
 
 def _of(value, dtype):

@@ -1,11 +1,10 @@
 """The lobes of the physical materials in the plane of incidence, tabulated.
 
-For a light of intensity 1 a physical surface has the value ``pi f(V, L) (N·L)``, where the
-textbook's has ``k_d (N·L) + k_s (R·V)^n``: both are on one scale, and neither is normalised.
+For a light of intensity 1, a physical surface has the value ``pi f(V, L) (N·L)``, and the
+textbook's ``k_d (N·L) + k_s (R·V)^n``: both are on one scale, and neither is normalised.
 """
 
 from dataclasses import replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.terms.term_grid import TermGrid
+from heuristic.arrays import Interaction, Number, Scene, Vector
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from reference.rendering.gbuffer import pixel_rays
 
@@ -25,19 +25,19 @@ INCIDENCES = GRAZING * (1 - np.linspace(1, 0, 25) ** 2.5)
 _EVEN = np.linspace(-1, 1, 73)
 VIEWS = _EVEN * abs(_EVEN)
 """Directions of view: 0 is the mirror direction, -1 and 1 are the horizon on the light's side and
-on the other. Lobes keep their place between incidences, and are finest where they are highest."""
+on the opposite side. So lobes stay in place between incidences, and are finest at their peak."""
 
 SPECTRA = 16
 """Sets of wavelengths over which luminance is summed in spectral variants."""
 
 
 def view_angles(incidence: float) -> NDArray[np.float64]:
-    """Return the degrees from the normal that :data:`VIEWS` are for an incidence."""
+    """Return :data:`VIEWS` for an incidence, in degrees from the normal."""
     side = np.where(VIEWS < 0, GRAZING + incidence, GRAZING - incidence)
     return incidence + VIEWS * side
 
 
-def completed(grid: TermGrid, scene: Any) -> TermGrid:
+def completed(grid: TermGrid, scene: Scene) -> TermGrid:
     """Return a grid whose materials have the lobes of their physical partners in a scene."""
     first = [np.argwhere(grid.material == number)[0] for number in range(len(grid.materials))]
     if not first:
@@ -48,8 +48,10 @@ def completed(grid: TermGrid, scene: Any) -> TermGrid:
     return replace(grid, materials=tuple(replace(m, physical=lobe) for m, lobe in materials))
 
 
-def _table(scene: Any, resolution: tuple[int, int], x: NDArray, y: NDArray) -> NDArray[np.float64]:
-    """Return what the surfaces at pixels send back, (pixels, incidences, views): luminance."""
+def _table(
+    scene: Scene, resolution: tuple[int, int], x: NDArray, y: NDArray
+) -> NDArray[np.float64]:
+    """Return the luminance that the surfaces at pixels reflect, (pixels, incidences, views)."""
     incidence = np.repeat(INCIDENCES, len(VIEWS))
     view = np.concatenate([view_angles(each) for each in INCIDENCES])
     directions = len(view)
@@ -61,13 +63,13 @@ def _table(scene: Any, resolution: tuple[int, int], x: NDArray, y: NDArray) -> N
     return np.array(value, np.float64).reshape(len(x), len(INCIDENCES), len(VIEWS))
 
 
-def _in_plane(degrees: NDArray[np.float64]) -> mi.Vector3f:
+def _in_plane(degrees: NDArray[np.float64]) -> Vector:
     angle = mi.Float(np.radians(degrees))
     return mi.Vector3f(dr.sin(angle), 0, dr.cos(angle))
 
 
-def _luminance(si: mi.SurfaceInteraction3f, toward: mi.Vector3f) -> mi.Float:
-    """Return the luminance of BSDF times cosine, of white that of a white one."""
+def _luminance(si: Interaction, toward: Vector) -> Number:
+    """Return the luminance of BSDF times cosine, relative to a white spectrum's."""
     context, bsdf = mi.BSDFContext(), si.bsdf()
     if not mi.is_spectral:
         value = bsdf.eval(context, si, toward)

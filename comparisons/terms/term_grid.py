@@ -12,13 +12,13 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class TermMaterial:
-    """A material as the kernel has it at some points; a lobe's normalisation is within ``k_s``.
+    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``.
 
     Attributes
     ----------
     physical
-        ``(incidences, views)``, see :mod:`comparisons.terms.polar`: what the physical partner
-        sends back, the luminance for a light of intensity 1.
+        ``(incidences, views)``, see :mod:`comparisons.terms.polar`: the luminance that the physical
+        partner reflects of a light of intensity 1.
     """
 
     name: str
@@ -43,11 +43,11 @@ class GridLight:
     attenuation
         ``f_att``, the cone of a spot light included.
     cos_incidence
-        ``N·L``; below 0 where the light is behind the surface.
+        ``N·L``; below 0 if the light is behind the surface.
     cos_view
-        ``L·V``, from which follows ``R·V = 2 (N·L) (N·V) − L·V``.
+        ``L·V``, which gives ``R·V = 2 (N·L) (N·V) − L·V``.
     lobe
-        ``(R·V)^n`` or ``(N·H)^n`` as the kernel computes it, 0 below the horizon.
+        The kernel's ``(R·V)^n`` or ``(N·H)^n``, 0 below the horizon.
     """
 
     name: str
@@ -60,7 +60,7 @@ class GridLight:
 
 @dataclass(frozen=True)
 class LightTerms:
-    """What one light gives at a point; ``diffuse`` and ``specular`` are RGB, display-linear."""
+    """The terms of one light at a point; ``diffuse`` and ``specular`` are RGB, display-linear."""
 
     name: str
     intensity: Colour
@@ -80,11 +80,11 @@ class PixelTerms:
     Attributes
     ----------
     pixel
-        Column and row of the point of the grid that was nearest.
+        Column and row of the nearest point of the grid.
     cos_view
         ``N·V``.
     others
-        What lights beyond those listed give together.
+        The sum of the lights that are not listed.
     """
 
     pixel: tuple[int, int]
@@ -97,7 +97,7 @@ class PixelTerms:
 
     @property
     def total(self) -> Colour:
-        """The sum, which is what the kernel returns here."""
+        """The sum, which equals the kernel's value here."""
         lit = [part for light in self.lights for part in (light.diffuse, light.specular)]
         return _colour(sum(map(np.array, (self.emission, self.ambient, self.others, *lit))))
 
@@ -111,11 +111,11 @@ class TermGrid:
     columns, rows
         Of the pixels.
     material
-        (H, W), the place in ``materials``; -1 where no shaded surface is seen.
+        (H, W), the index in ``materials``; -1 where no shaded surface is seen.
     cos_view
         (H, W), ``N·V``.
     others
-        (H, W, 3), the light of those that are not among ``lights``; None where all are.
+        (H, W, 3), the sum of the lights that are not in ``lights``; None if there are none.
     """
 
     resolution: tuple[int, int]
@@ -128,7 +128,7 @@ class TermGrid:
     others: NDArray[np.float64] | None = None
 
     def at(self, x: int, y: int) -> PixelTerms | None:
-        """Return the terms at the point of the grid nearest to a pixel; None on the background.
+        """Return the terms at the grid's point nearest to a pixel; None for the background.
 
         Raises
         ------
@@ -138,7 +138,7 @@ class TermGrid:
         width, height = self.resolution
         if not (0 <= x < width and 0 <= y < height):
             raise InputError(
-                f"pixel {x}, {y} is outside the image: give one below {width}, {height}."
+                f"pixel {x}, {y} is outside the image: give 0, 0 to {width - 1}, {height - 1}."
             )
         place = y * len(self.rows) // height, x * len(self.columns) // width
         if self.material[place] < 0:
@@ -156,7 +156,7 @@ class TermGrid:
         )
 
     def light_image(self, light: GridLight) -> NDArray[np.float64]:
-        """Return what one light gives, (H, W, 3); 0 where no shaded surface is seen."""
+        """Return one light's terms, (H, W, 3); 0 where no shaded surface is seen."""
         k_d, k_s = (
             np.array([getattr(material, name) for material in self.materials] + [(0.0, 0.0, 0.0)])
             for name in ("k_d", "k_s")
@@ -166,7 +166,7 @@ class TermGrid:
         return np.multiply(light.intensity, light.attenuation[..., None]) * (diffuse + specular)
 
     def total(self) -> NDArray[np.float64]:
-        """Return the sum of all terms, (H, W, 3), which is what the kernel returns there."""
+        """Return the sum of all terms, (H, W, 3), which equals the kernel's image."""
         even = [np.add(m.k_i, np.multiply(m.ambient, m.k_a)) for m in self.materials]
         image = np.array([*even, np.zeros(3)])[self.material]
         image = image + sum(map(self.light_image, self.lights))

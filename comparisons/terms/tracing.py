@@ -1,21 +1,28 @@
 """The terms of 8.10 read from the kernel, at a grid of pixels."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.options import Options
 from comparisons.terms import polar
 from comparisons.terms.term_grid import GridLight, TermGrid, TermMaterial
 from heuristic import arguments, colours, lobes, terms, vectors
+from heuristic.arrays import Scene
 from heuristic.interpolation import Interpolation
 from heuristic.materials import COEFFICIENTS, FORMS, Material
 from reference.rendering.gbuffer import image_size, pixel_rays
-from reference.rendering.renderer import variant
+from reference.rendering.renderer import Renderer, variant
+
+if TYPE_CHECKING:  # it imports this module
+    from comparisons.compare import Prepared
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -24,24 +31,24 @@ VALUES = 8192
 """Points times lights, at most: more lights leave a coarser grid."""
 
 LIGHTS = 4
-"""Lights that have terms of their own: those that give most. The others are summed."""
+"""Lights with separate terms: the strongest ones. The others are summed."""
 
 MOST_LIGHTS = 64
-"""Beyond which no terms are read: each light is evaluated by itself."""
+"""With more lights no terms are read: each light is evaluated separately."""
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
 
 
-def trace(ready: Any, options: Any) -> tuple[TermGrid | None, str]:
+def trace(ready: Prepared, options: Options) -> tuple[TermGrid | None, str]:
     """Return the terms of a prepared scene, or why there are none.
 
     Parameters
     ----------
-    ready : comparisons.compare.Prepared
+    ready
         The scene.
-    options : comparisons.options.Options
-        What it is shaded by.
+    options
+        How it is shaded.
     """
     half = ready.heuristic
     if options.image:
@@ -55,8 +62,8 @@ def trace(ready: Any, options: Any) -> tuple[TermGrid | None, str]:
     return polar.completed(grid, ready.scene), ""
 
 
-def _without(half: Any, options: Any) -> str:
-    """Return why equation 8.10 does not say how a half is shaded; empty where it does."""
+def _without(half: Renderer, options: Options) -> str:
+    """Return why equation 8.10 does not describe a half's shading; empty if it does."""
     if options.heuristic not in ("phong", "blinn"):
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if options.interpolation is not Interpolation.PHONG:
@@ -64,15 +71,15 @@ def _without(half: Any, options: Any) -> str:
             f"{options.interpolation.value.capitalize()} shading does not evaluate 8.10 at pixels."
         )
     if mi.is_spectral:
-        return "The heuristic half is rendered wavelength by wavelength, and its terms are not RGB."
+        return "The heuristic half is rendered by wavelength, so its terms are not RGB."
     if len(half.scene.emitters()) > MOST_LIGHTS:
         return f"There are more than {MOST_LIGHTS} lights."
     if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
-        return "Surfaces let light through, so that a pixel shows several of them at once."
+        return "Some surfaces are transparent, so a pixel shows several of them at once."
     return ""
 
 
-def _traced(scene: Any, integrator: Any) -> TermGrid | None:
+def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     emitters = [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
@@ -101,9 +108,9 @@ def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]
 
 
 class _Points:
-    """What the kernel is given at the points that rays see."""
+    """The kernel's arguments at the points that rays see."""
 
-    def __init__(self, scene: Any, integrator: Any, ray: mi.RayDifferential3f) -> None:
+    def __init__(self, scene: Scene, integrator: Any, ray: Any) -> None:
         self.si = scene.ray_intersect(ray)
         normal, is_shaded = integrator.seen_side(scene, self.si, self.si.is_valid())
         self.hit = np.array(self.si.is_valid() & is_shaded)
@@ -124,15 +131,15 @@ class _Points:
         return np.array(mi.Color3f(value) + dr.zeros(mi.Color3f, len(self.hit)), np.float64).T
 
     def select(self, read: Callable[[Material], NDArray]) -> NDArray[np.float64]:
-        """Return what is read of the material that holds at each point, (N, C)."""
-        found = 0.0
+        """Return numbers read from the material at each point, (N, C)."""
+        found = np.zeros(())
         for material, mask in self.given:
             held = np.array(mi.Bool(mask) & dr.full(mi.Bool, True, len(self.hit)))[:, None]
             found = found + np.where(held, read(material), 0.0)
         return found
 
     def materials(self) -> tuple[tuple[TermMaterial, ...], NDArray[np.int64]]:
-        """Return the different materials, and which of them each point has."""
+        """Return the different materials, and the index of each point's."""
         number = self.floats(self.known.index(self.si, self.si.is_valid()))
         rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
         different, places = np.unique(rows[self.hit], axis=0, return_inverse=True)
@@ -149,13 +156,15 @@ class _Points:
 
     def _material(self, row: list[float]) -> TermMaterial:
         number, *values = row
-        triples = [tuple(values[begin : begin + 3]) for begin in (0, 3, 6, 9, 14)]
-        *coefficients, ambient = triples
-        name = self.known.bsdfs[int(number)].id()
-        return TermMaterial(name, *coefficients, values[12], FORMS[int(values[13])], ambient)
+        k_i, k_a, k_d, k_s, ambient = (
+            (red, green, blue)
+            for red, green, blue in (values[begin : begin + 3] for begin in (0, 3, 6, 9, 14))
+        )
+        name, form = self.known.bsdfs[int(number)].id(), FORMS[int(values[13])]
+        return TermMaterial(name, k_i, k_a, k_d, k_s, values[12], form, ambient)
 
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
-        """Return what a light gives at all points."""
+        """Return a light at all points."""
         light = emitter.light(self.si, self.si.is_valid())
         toward, arriving, _ = light.illuminate(self.position)
         cos_incidence = dr.dot(self.normal, toward)
@@ -176,7 +185,7 @@ class _Points:
 
 
 def _strongest(grid: TermGrid) -> TermGrid:
-    """Keep the lights that give most over all points; sum the others."""
+    """Keep the lights that are strongest over all points; sum the others."""
     given = [grid.light_image(light) for light in grid.lights]
     order = np.argsort([-image.sum() for image in given], kind="stable")
     kept, others = sorted(order[:LIGHTS]), order[LIGHTS:]
