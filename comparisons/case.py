@@ -210,7 +210,7 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
     """
     asked = request or Request()
     if isinstance(scene, Mapping) or callable(scene):
-        own = name or getattr(scene, "__name__", "scene")
+        own = name or str(getattr(scene, "__name__", "scene"))
         return _opened(Source(own, scene), asked, own)
     path = file_of(scene)
     if path is not None:
@@ -223,15 +223,16 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
         return _opened(Source(name or path.stem, content, asked.define), asked, str(path))
     known = builtin(str(scene))
     # A requested variant is meant for both halves.
+    variant = asked.variant or known.variant
     both = known.heuristic_variant if asked.variant is None else None
     completed = replace(
         asked,
-        variant=asked.variant or known.variant,
+        variant=variant,
         heuristic_variant=asked.heuristic_variant or both,
         interpolation=asked.interpolation or known.interpolation,
         tessellation=asked.tessellation or known.tessellation,
     )
-    set_variant(completed.variant)
+    set_variant(variant)
     return Case(known.source(), completed, known.name)
 
 

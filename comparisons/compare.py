@@ -198,12 +198,14 @@ def _compare(
 ) -> Comparison:
     stages = _Stages()
     ready = guarded(source, options)
-    heuristic, reference = ready.heuristic, ready.reference
-    stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
-    stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
+    heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
+    reference, guard = ready.reference, ready.guard
+    assert guard is not None
+    stages.done("scene and pairing", ready.planning_seconds + guard.seconds)
+    stages.seconds |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     width, height = image_size(ready.scene)
     # Before any long rendering: a picture may be flipped.
-    place = ready.heuristic.located(ready.scene) if options.image else None
+    place = heuristic.located(ready.scene) if options.image else None
     estimates = render.render(ready, options, ready.counted, progress, kept)
     # Passes of an earlier run took no time in this one.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
@@ -248,7 +250,7 @@ def _compare(
         warnings=(
             *(picture.odd if picture else ()),
             *ready.pair.warnings,
-            *record.guard_warnings(ready.guard),
+            *record.guard_warnings(guard),
             *record.path_warnings(ready),
         ),
         versions=record.versions(),
@@ -286,7 +288,7 @@ def _picture(place: Registration, options: Options, images: Images) -> PictureRe
         files=options.image,
         transfer=options.transfer,
         repeats=len(options.image),
-        shift=None if place.x is None else (place.x, place.y),
+        shift=None if place.x is None or place.y is None else (place.x, place.y),
         edges=place.correlation,
         ratio=suspicions.ratios(shown, reference),
     )

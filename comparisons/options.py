@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import inf
 from numbers import Integral, Real
+from typing import Any
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic import heuristics
@@ -124,9 +125,9 @@ class Options:
         )
 
 
-def _require_whole(name: str, value: object, low: int, high: int) -> None:
+def _require_whole(name: str, value: Any, low: int, high: int) -> None:
     is_whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if value is not None and not (is_whole and low <= value <= high):
+    if value is not None and not (is_whole and low <= int(value) <= high):
         raise InputError(
             f"{name} = {value!r} is not allowed: give a whole number from {low} to {high}."
         )
@@ -135,5 +136,5 @@ def _require_whole(name: str, value: object, low: int, high: int) -> None:
 def _is_size(resolution: object) -> bool:
     if not isinstance(resolution, (tuple, list)):
         return False
-    sides = [side for side in resolution if isinstance(side, Integral) and side >= 1]
+    sides = [side for side in resolution if isinstance(side, Integral) and int(side) >= 1]
     return len(sides) == len(resolution) == 2

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -28,7 +28,7 @@ from comparisons.comparison import (
     Unrepresentable,
 )
 from comparisons.processes.pool import cores
-from comparisons.records import Kind
+from comparisons.records import Record
 from comparisons.terms.term_grid import TermGrid
 from heuristic import __version__
 from heuristic.heuristics import named
@@ -41,6 +41,8 @@ from reference.rendering.renderer import PassTimes
 
 if TYPE_CHECKING:
     from comparisons.compare import Prepared
+
+Copied = TypeVar("Copied", bound=Record)
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "flip-evaluator", "OpenEXR")
 
@@ -175,7 +177,7 @@ def _ruling(ruling: Ruling) -> RuleRecord:
     return RuleRecord(
         name=ruling.rule.name,
         applies=ruling.holds,
-        premise="" if ruling.holds else ruling.failed.sentence,
+        premise="" if ruling.failed is None else ruling.failed.sentence,
         evidence=ruling.words,
     )
 
@@ -237,7 +239,7 @@ def times(of_passes: PassTimes) -> Times:
     )
 
 
-def copied(kind: type[Kind], source: object) -> Kind:
+def copied(kind: type[Copied], source: object) -> Copied:
     """Make a record from an object that has its fields."""
     return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from comparisons.comparison import NoiseTarget
 from comparisons.departure.blocks import bands
+from comparisons.departure.metric import Pixelwise
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import Viewing
 from comparisons.options import Options
@@ -164,11 +165,10 @@ def render(
     if options.noise is not None:
         if reached is None:
             reached = noise_percentile(sums, counted, options.viewing)
-        by = "target" if reached <= options.noise else "samples"
         stop = NoiseTarget(
             target=options.noise,
             reached=reached,
-            stopped_by=by,
+            stopped_by="target" if reached <= options.noise else "samples",
             limit_spp=ready.passes * ready.reference.spp,
         )
     # From here on images have single precision, like the files. Each sum is freed as it is read.
@@ -194,6 +194,7 @@ def noise_percentile(sums: Sums, counted: np.ndarray, viewing: Viewing) -> float
     The noise is that of the difference of the halves, in which shared noise cancels.
     """
     metric = LEADING
+    assert isinstance(metric, Pixelwise)
     reference, noise = sums[1].mean(np.float32), sums[2].noise(np.float32)
     if not noise[counted].any():
         return 0.0

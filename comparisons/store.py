@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from hashlib import sha256
 from math import prod
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
@@ -150,7 +150,7 @@ def _write_arrays(file: BinaryIO, content: Mapping[str, Any], key: str) -> None:
                 np.lib.format.write_array(member, np.asanyarray(value), allow_pickle=False)
 
 
-def _array(file: BinaryIO) -> np.ndarray:
+def _array(file: IO[bytes]) -> np.ndarray:
     """Read one array in NumPy's format, whose header must match its size."""
     version = np.lib.format.read_magic(file)
     if version != (1, 0):

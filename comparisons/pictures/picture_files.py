@@ -181,7 +181,7 @@ def _require_finite(image: np.ndarray, word: str) -> None:
 
 
 def _require_light(image: np.ndarray, word: str) -> None:
-    wrong = (image < MOST_NEGATIVE).any(axis=-1)
+    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
     if wrong.any():
         raise InputError(
             f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"

@@ -111,7 +111,7 @@ def _of(seen: np.ndarray, edges: np.ndarray) -> Registration:
     height, width = edges.shape
     reach = max(1, min(REACH, min(height, width) // 4))
     table = _correlations(seen, edges, reach)
-    y, x = np.unravel_index(np.argmax(table), table.shape)
+    y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
     if highest < LEAST:
         return Registration(None, None, highest)

@@ -131,6 +131,7 @@ class Worker:
         # Not `join`: it waits forever for a process that closed all its files.
         while self.process.is_alive() and monotonic() < until:
             sleep(PAUSE_S)
+        assert self.process.pid is not None
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()

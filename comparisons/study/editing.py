@@ -39,10 +39,11 @@ EDITABLE: dict[str, dict[str, tuple[str, Convert | None]]] = {
     },
     "diffuse": {"reflectance": ("reflectance.value", None)},
     "disk": {"to_world": ("to_world", lambda props: _transform(props["to_world"]))},
-} | {
-    plugin: {key: (name, None) for key, name in names.items()}
-    for kind in lights.KINDS
-    for plugin, names in kind.edits.items()
+    **{
+        plugin: {key: (name, None) for key, name in names.items()}
+        for kind in lights.KINDS
+        for plugin, names in kind.edits.items()
+    },
 }
 """Editable values: for each plugin and property, its name in ``mitsuba.traverse``, and a function
 that makes the value from the properties if it is not the property itself."""

@@ -62,8 +62,8 @@ class Radiance:
 def material(point: Point, convention: Convention) -> Material:
     """Return the material of a point, which has the parameters of one of the models."""
     if "n" in point:
-        grey = [(point[name],) * 3 for name in ("k_d", "k_s")]
-        return _of_phong(Phong(*grey, point["n"]), convention)
+        k_d, k_s = ((point[name],) * 3 for name in ("k_d", "k_s"))
+        return _of_phong(Phong(k_d, k_s, point["n"]), convention)
     grey = (point["reflectance"],) * 3
     return _of_plastic(RoughPlastic(grey, point["alpha"], point["int_ior"]), convention)
 
@@ -162,10 +162,10 @@ class Hemisphere:
 def hemisphere() -> Hemisphere:
     """Return the Gauss-Legendre nodes in polar angle and azimuth."""
     x, w = np.polynomial.legendre.leggauss(HEIGHTS)
-    theta, w = (x + 1) * 45, w / 2
+    w = w / 2
     y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
-    phi, v = (y + 1) * 90, v / 2
-    theta, phi = np.meshgrid(theta, phi)
+    v = v / 2
+    theta, phi = np.meshgrid((x + 1) * 45, (y + 1) * 90)
     weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
     return Hemisphere(direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum())
 
