@@ -257,7 +257,7 @@ def file_of(scene: str | Path) -> Path | None:
         str(path.resolve()).encode()
     except UnicodeEncodeError as error:
         raise InputError(
-            f"{atomic.printable(path.resolve())}: Mitsuba cannot open this name, which is not"
+            f"{atomic.printable(path.resolve())}: Mitsuba cannot open this name, which is not in"
             " UTF-8. Rename the file, or its folder."
         ) from error
     return path

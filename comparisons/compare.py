@@ -93,8 +93,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     width, height = image_size(physical)
     if width * height > LARGEST_PASS:
         raise InputError(
-            f"{source.name}: {width}x{height} pixels are too many: at most {LARGEST_PASS} are"
-            " allowed. Give a smaller --resolution."
+            f"{source.name}: an image of {width}x{height} pixels is too large: at most"
+            f" {LARGEST_PASS} pixels are allowed. Give a smaller --resolution."
         )
     memory.require(source.name, width, height)
     begin = perf_counter()

@@ -180,7 +180,7 @@ def test_edges_that_tell_nothing_are_said_to(cornell):
     assert (found.x, found.y) == (None, None)
     record = PictureRecord(files=("x",), transfer=None, repeats=2, shift=None, edges=0.0,
                            ratio=(1.0, 1.0, 1.0))  # fmt: skip
-    assert "do not tell whether it lies" in next(
+    assert "do not show whether it is aligned" in next(
         suspicions.told(record, cornell[0], cornell[0], np.ones((SIDE, SIDE), bool))
     )
 
@@ -247,12 +247,12 @@ NAN = np.where(np.arange(8)[None, :, None] == 3, np.nan, GREY)
     ("make", "message"),
     [
         (lambda path: write(path, NAN), r"8 of 64 pixels, the first at .* = \(3, 0\), are NaN"),
-        (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours beyond"),
+        (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours outside"),
         (lambda path: write(path, GREY, alpha=np.full((8, 8), 0.5)), "alpha below 1"),
         (
             lambda path: write(path, GREY, {"chromaticities": (0.708, 0.292, 0.17, 0.797, 0.131,
                                                                0.046, 0.3127, 0.329)}),
-            r"its primaries and white are \(0.708.*BT.709's",
+            r"its primaries and white are \(0.708.*Convert it to BT.709",
         ),
         (
             lambda path: write(path, GREY, {"displayWindow": (np.array([0, 0], np.int32),
@@ -283,7 +283,7 @@ def test_a_png_needs_its_transfer_function(rgb, tmp_path):
 @pytest.mark.parametrize(
     ("shape", "more", "message"),
     [
-        ((8, 12, 3), {}, "12x8 pixels, an aspect of 1.5, and the scene's film .*x.*, 1"),
+        ((8, 12, 3), {}, "12x8 pixels, an aspect ratio of 1.5, and the scene's film .*x.*, 1"),
         ((8, 8, 3), {"resolution": (16, 16)}, "8x8 pixels, and --resolution 16x16 is requested"),
     ],
 )
@@ -297,7 +297,7 @@ def test_repeats_are_alike_and_even(rgb, tmp_path):
     files[1] = write(tmp_path / "other.exr", GREY)
     with pytest.raises(InputError, match="pictures of 8x8, 9x9: give repeats of one size"):
         picture_of("fig-8-9", tuple(files))
-    with pytest.raises(InputError, match="3 repeats: give an even number"):
+    with pytest.raises(InputError, match="3 repeats: give one, or an even number"):
         picture_of("fig-8-9", (files[0], files[1], files[0]))
     with pytest.raises(InputError, match=r"noise = 1 and 2 repeats: .* Give --spp"):
         picture_of("fig-8-9", (files[0], files[1]), noise=1.0)
