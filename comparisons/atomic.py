@@ -58,7 +58,7 @@ def explained(path: Path) -> Iterator[None]:
 def refusal(path: Path, error: OSError) -> OutputError:
     """Return the error that says why a place cannot be written to."""
     reason = os.strerror(error.errno) if error.errno else str(error)
-    advice = ADVICE.get(error.errno or 0, "Move away what is in the way")
+    advice = ADVICE.get(error.errno or 0, "Move away whatever is in the way")
     return OutputError(
         f"{printable(path)}: {reason}. {advice}, or choose another place (-o). Finished results"
         " are kept."

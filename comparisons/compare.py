@@ -38,6 +38,7 @@ from reference.planning.plan import Plan, plan, sampler
 from reference.rendering import memory
 from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
 from reference.rendering.guard import Guard, Verdict, examine_plan
+from reference.rendering.passes import Progress
 from reference.rendering.renderer import LARGEST_PASS, Renderer, physical_integrator, variant
 from reference.scene import messages
 from reference.scene.sampler import with_sampler
@@ -45,8 +46,6 @@ from reference.scene.source import Source
 
 if TYPE_CHECKING:
     from comparisons.pictures.registration import Registration
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class RuleRecord(Record):
 
 
 class Simulation(Record):
-    """What is simulated of a scene, and with how many samples."""
+    """The simulation of a scene: its plan, samples and passes."""
 
     kernel_terms: Annotated[
         tuple[str, ...], Meta(description="Coefficients whose terms the heuristic kernel holds.")
