@@ -1,1 +1,1 @@
-"""Paired scenes, metrics, and what follows from them: plain records, nothing printed."""
+"""Paired scenes, metrics, and their results as plain records; nothing is printed."""

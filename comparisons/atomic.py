@@ -1,8 +1,8 @@
-"""Replacing files as a whole: what is there is either the old file or the complete new one.
+"""Replacing files atomically: a path holds either the old file or the complete new one.
 
-What is half written has a name that says whose it is, ``.NAME.HOST.PID-START.fotismos-partial``:
-only what a process of this machine left that is no longer alive is ever cleared away. START tells
-the process from a later one of its number.
+A partial file's name identifies its writer, ``.NAME.HOST.PID-START.fotismos-partial``: only files
+of dead processes of this machine are ever cleared away. START distinguishes a process from later
+ones with the same number.
 """
 
 import errno
@@ -25,7 +25,7 @@ LEFT = re.compile(
 )
 
 LONGEST = 255
-"""Bytes of a name, which file systems have in common."""
+"""Bytes of the longest name that file systems commonly allow."""
 
 ADVICE = {
     errno.ENOSPC: "Free some space",
@@ -37,17 +37,17 @@ ADVICE = {
     errno.ENAMETOOLONG: "Give it a shorter name",
     errno.ENOENT: "Make its folder",
 }
-"""What to do about an error of the system; the alternative is always another place."""
+"""What to do about a system error; the alternative is always another place."""
 
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turn the system's errors of a block that writes into ones for people.
+    """Turn system errors of a block that writes into readable ones.
 
     Raises
     ------
     OutputError
-        Naming the path, the reason, and what to do.
+        Naming the path, the reason and the remedy.
     """
     try:
         yield
@@ -58,21 +58,21 @@ def explained(path: Path) -> Iterator[None]:
 def refusal(path: Path, error: OSError) -> OutputError:
     """Return the error that says why a place cannot be written to."""
     reason = os.strerror(error.errno) if error.errno else str(error)
-    advice = ADVICE.get(error.errno or 0, "Move away what is in the way")
+    advice = ADVICE.get(error.errno or 0, "Move away whatever is in the way")
     return OutputError(
-        f"{printable(path)}: {reason}. {advice}, or choose another place (-o); results that were"
-        " finished are kept."
+        f"{printable(path)}: {reason}. {advice}, or choose another place (-o). Finished results"
+        " are kept."
     )
 
 
 def printable(path: str | Path) -> str:
-    """Return a path as it is, or with escapes where it holds what is no plain text."""
+    """Return a path as text, escaped if it is not printable."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
 
 def beside(path: Path, kind: str = "partial") -> Path:
-    """Return where this process keeps something that is about to stand at ``path``, or stood."""
+    """Return where this process keeps what is about to replace ``path``, or what was there."""
     pid = os.getpid()
     end = f".{HOST}.{'-'.join(filter(None, (str(pid), _start(pid))))}.fotismos-{kind}"
     room = LONGEST - 1 - len(end)
@@ -84,12 +84,12 @@ def beside(path: Path, kind: str = "partial") -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a file to write to, and put it in the place of ``path`` if the block succeeds.
+    """Yield a file to write to, and replace ``path`` with it if the block succeeds.
 
     Raises
     ------
     OutputError
-        Where the place cannot be written to; nothing half written is left.
+        When the place cannot be written to; no partial file is left.
     """
     partial = beside(path)
     with explained(path):
@@ -97,7 +97,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield partial
             partial.replace(path)
         finally:
-            with suppress(OSError):  # what stays is cleared away by the next run
+            with suppress(OSError):  # the next run clears away the rest
                 partial.unlink(missing_ok=True)
 
 
@@ -107,31 +107,31 @@ def write(path: Path, content: str | bytes) -> None:
     Raises
     ------
     OutputError
-        As for :func:`replacing`.
+        See :func:`replacing`.
     """
     with replacing(path) as partial:
         partial.write_bytes(encoded(content))
 
 
 def encoded(content: str | bytes) -> bytes:
-    """Return text as UTF-8, with names that are not in UTF-8 escaped as JSON does it."""
+    """Return text as UTF-8; names that are not UTF-8 are escaped as in JSON."""
     return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
 
 def put(path: Path, content: str | bytes) -> None:
-    """Write to what a user named: in place of a file, into a device, or a pipe that is read.
+    """Write to a path that a user named: replace a file, or write into a device or a pipe.
 
     Raises
     ------
     OutputError
-        As for :func:`replacing`.
+        See :func:`replacing`.
     """
     content = content.encode() if isinstance(content, str) else content
     with explained(path):
         if not path.exists() or path.is_file():
             write(Path(os.path.realpath(path)), content)  # a link stays one
             return
-        # Opening a pipe that nobody reads would wait for ever.
+        # Opening a pipe without a reader would wait forever.
         descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
         os.set_blocking(descriptor, True)
         with open(descriptor, "wb") as file:
@@ -139,28 +139,28 @@ def put(path: Path, content: str | bytes) -> None:
 
 
 def abandoned(folder: Path, kind: str = "partial") -> Iterator[tuple[Path, Path]]:
-    """Yield what was left in a folder, and what it was to stand at.
+    """Yield each path left behind in a folder, and the path that it was to replace.
 
-    That is by dead processes of this machine, and by earlier writings of this one that failed.
+    They are from dead processes of this machine, and from failed attempts of this process.
     """
     for path in sorted(folder.iterdir()):
         found = LEFT.fullmatch(path.name)
         if found is None or (found["kind"], found["host"]) != (kind, HOST):
             continue
-        if not _may_go_on(int(found["pid"]), found["start"]):
+        if not _may_be_alive(int(found["pid"]), found["start"]):
             yield path, folder / found["name"]
 
 
 def remove(path: Path) -> None:
-    """Delete a file, a link or a folder that is known to be the project's."""
+    """Delete a file, link or folder that is known to be the project's."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
 
 
-def _may_go_on(pid: int, start: str | None) -> bool:
-    """Tell whether another process is alive that has this number, and started then if known."""
+def _may_be_alive(pid: int, start: str | None) -> bool:
+    """Return whether another process with this number, and start if known, may be alive."""
     if start and (pid, start) == (os.getpid(), _start(pid)):
         return False
     try:
@@ -173,7 +173,7 @@ def _may_go_on(pid: int, start: str | None) -> bool:
 
 
 def _start(pid: int) -> str:
-    """Return when a process started, in ticks of the system's clock; empty where nobody says."""
+    """Return when a process started, in ticks of the system's clock; empty if unknown."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:

@@ -1,4 +1,4 @@
-"""What the user gave: the one door through which every command, test and notebook opens a scene."""
+"""A scene as the user gave it: every command, test and notebook opens scenes here."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -24,25 +24,25 @@ from reference.scene.source import Source
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
 
 SUFFIXES = (".xml", ".py")
-"""Of the files that a scene is in: Mitsuba's, and Python's."""
+"""Suffixes of scene files: Mitsuba's, and Python's."""
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
 class Request:
-    """What can be asked for about the rendering of a scene, by the names of the command line.
+    """The options for rendering a scene, named as on the command line.
 
-    What is None is the scene's own, or else what :class:`comparisons.options.Options` has.
+    None means the scene's own value, or else the default of :class:`comparisons.options.Options`.
 
     Parameters
     ----------
     heuristic
         A name, ``FILE.py:function``, ``FILE.glsl``, a function of a point, or a
-        :class:`heuristic.Heuristic`; the latter two are declared in this process, and their name is
-        kept.
+        :class:`heuristic.Heuristic`; the latter two are declared in this process, and stored by
+        name.
     define
-        Values for the placeholders of a scene file, by name.
+        Values of a scene file's placeholders.
     """
 
     variant: str | None = None
@@ -84,17 +84,17 @@ class Request:
 
     @classmethod
     def of(cls, words: Mapping[str, Any]) -> "Request":
-        """Return the request that some words make, by name.
+        """Return the request that a mapping of options describes.
 
         Raises
         ------
         InputError
-            For a name that is not known, or a value that is not allowed.
+            For an unknown name, or a value that is not allowed.
         """
         known = {each.name for each in fields(cls)}
         if unknown := sorted(set(words) - known):
             raise InputError(
-                f"options {', '.join(unknown)} are not known: choose of {', '.join(sorted(known))}."
+                f"unknown options {', '.join(unknown)}: choose from {', '.join(sorted(known))}."
             )
         return cls(**words)
 
@@ -105,29 +105,29 @@ class Request:
         Raises
         ------
         InputError
-            For one that is not allowed.
+            If they are not allowed.
         """
         given = self.pixels_per_degree
         return DEFAULT_VIEWING if given is None else Viewing(pixels_per_degree=given)
 
     def stated(self) -> dict[str, Any]:
-        """Return what is asked for as plain data, without what is None, False or empty."""
+        """Return the options as plain data, without those that are None, False or empty."""
         plain = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
         return {k: v for k, v in plain.items() if v not in (None, {}, []) and v is not False}
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene that was opened, with all that was asked for.
+    """An opened scene, with its options.
 
     Attributes
     ----------
     source
         The scene, read once.
     request
-        What was asked for, completed with what the scene itself says.
+        The options, completed from the scene itself.
     word
-        What names the scene in a command.
+        The scene's name in a command.
     """
 
     source: Source
@@ -167,11 +167,11 @@ class Case:
         )
 
     def asking(self, **changes: Any) -> "Case":
-        """Return the same scene, not opened again, with something else asked for."""
+        """Return the same scene, not opened again, with other options."""
         return replace(self, request=replace(self.request, **changes))
 
     def command(self, verb: str = "compare", **more: Any) -> str:
-        """Return the command that repeats what is done with the scene."""
+        """Return the command that does the same with the scene again."""
         words = [verb, self.word]
         for name, value in self.request.define.items():
             words += ["-D", f"{name}={value}"]
@@ -190,7 +190,7 @@ class Case:
 
 
 def open_case(scene: Scene, request: Request | None = None, name: str | None = None) -> Case:
-    """Open a scene: read it, run its script, choose its variant, and switch Mitsuba to that.
+    """Open a scene: read it, run its script, choose its variant, and switch Mitsuba to it.
 
     Parameters
     ----------
@@ -199,9 +199,9 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
         ``scene`` is a dictionary or returns one, a dictionary as ``mitsuba.load_dict`` takes it,
         or a function that returns one.
     request
-        What is asked for.
+        The options.
     name
-        The scene's name, in place of the file's or function's.
+        The scene's name, instead of the file's or function's.
 
     Raises
     ------
@@ -210,39 +210,39 @@ def open_case(scene: Scene, request: Request | None = None, name: str | None = N
     """
     asked = request or Request()
     if isinstance(scene, Mapping) or callable(scene):
-        own = name or getattr(scene, "__name__", "scene")
+        own = name or str(getattr(scene, "__name__", "scene"))
         return _opened(Source(own, scene), asked, own)
     path = file_of(scene)
     if path is not None:
-        content = path
+        content: Any = path
         if path.suffix == ".py":
             from reference.scene.script import Script
 
-            end_after_task()  # whatever the script does to this process
-
+            end_after_task()  # the script may change this process
             content = Script(path)
         return _opened(Source(name or path.stem, content, asked.define), asked, str(path))
     known = builtin(str(scene))
-    # Who names the variant means both halves.
+    # A requested variant is meant for both halves.
+    variant = asked.variant or known.variant
     both = known.heuristic_variant if asked.variant is None else None
     completed = replace(
         asked,
-        variant=asked.variant or known.variant,
+        variant=variant,
         heuristic_variant=asked.heuristic_variant or both,
         interpolation=asked.interpolation or known.interpolation,
         tessellation=asked.tessellation or known.tessellation,
     )
-    set_variant(completed.variant)
+    set_variant(variant)
     return Case(known.source(), completed, known.name)
 
 
 def file_of(scene: str | Path) -> Path | None:
-    """Return the path of a scene that is a file, None for a built-in one.
+    """Return the path of a scene file, None for a built-in scene.
 
     Raises
     ------
     InputError
-        When the file is not there, or Mitsuba cannot open a file of its name.
+        When there is no such file, or Mitsuba cannot open a file with its name.
     """
     path = Path(scene)
     if path.suffix not in SUFFIXES and not path.exists():
@@ -250,27 +250,27 @@ def file_of(scene: str | Path) -> Path | None:
     if not path.is_file():
         raise InputError(
             f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
-            " that makes one (.py), a folder of such, or the name of a built-in scene;"
-            f" `{program.command('scenes')}` lists them."
+            " that makes one (.py), a folder of them, or the name of a built-in scene"
+            f" (listed by `{program.command('scenes')}`)."
         )
     try:
         str(path.resolve()).encode()
     except UnicodeEncodeError as error:
         raise InputError(
-            f"{atomic.printable(path.resolve())}: this name is not in UTF-8, and Mitsuba cannot"
-            " open it. Rename the file, or the folder that it is in."
+            f"{atomic.printable(path.resolve())}: Mitsuba cannot open this name, which is not in"
+            " UTF-8. Rename the file, or its folder."
         ) from error
     return path
 
 
 def name_of(scene: str | Path) -> str:
-    """Return the name that a scene goes by, without reading it."""
+    """Return a scene's name, without reading the scene."""
     path = file_of(scene)
     return builtin(str(scene)).name if path is None else path.stem
 
 
 def _opened(source: Source, asked: Request, word: str) -> Case:
-    """Complete a request with what a scene of the user's own wants."""
+    """Open a user's scene, and complete the request from it."""
     variant = asked.variant
     set_variant(variant or RGB)
     if variant is None:

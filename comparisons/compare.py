@@ -1,10 +1,13 @@
-"""Comparing the halves of a scene: both rendered pass by pass, and the difference measured."""
+"""Comparing the halves of a scene: render both pass by pass, and measure the difference."""
+
+from __future__ import annotations
 
 import gc
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
@@ -20,23 +23,29 @@ from comparisons.comparison import (
 )
 from comparisons.departure import limits, marks, objects, regions, statistics
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
+from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import histogram
 from comparisons.options import Options
 from comparisons.record import Comparison, Images
 from comparisons.records import Pixels
+from comparisons.render import Kept
 from comparisons.terms import tracing
 from heuristic import heuristics
+from heuristic.arrays import Array, Scene
 from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.plan import Plan, plan, sampler
 from reference.rendering import memory
 from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
 from reference.rendering.guard import Guard, Verdict, examine_plan
+from reference.rendering.passes import Progress
 from reference.rendering.renderer import LARGEST_PASS, Renderer, physical_integrator, variant
 from reference.scene import messages
 from reference.scene.sampler import with_sampler
+from reference.scene.source import Source
 
-Progress = Callable[[str, int, int], None]
+if TYPE_CHECKING:
+    from comparisons.pictures.registration import Registration
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,7 @@ class Prepared:
 
     pair: Pair
     plan: Plan
-    scene: object
+    scene: Scene
     heuristic: Renderer
     reference: Renderer
     passes: int
@@ -54,19 +63,25 @@ class Prepared:
 
     @property
     def surface(self) -> GBuffer:
-        """What each pixel sees, traced each time: it is large beside the sums of the passes."""
+        """What each pixel sees. It is traced each time: cached, it would take much memory."""
         found = gbuffer(self.scene, *image_size(self.scene))
         dr.flush_malloc_cache()
         return found
 
     @cached_property
     def counted(self) -> np.ndarray:
-        """The pixels (H, W) that count, which are those that see a surface."""
+        """The pixels (H, W) that count: those that see a surface."""
         return self.surface.hit
 
 
-def prepare(source, options=None):
-    """Pair and plan a scene in the current variant, and make both halves ready to render."""
+def prepare(source: Source, options: Options | None = None) -> Prepared:
+    """Pair and plan a scene in the current variant, and make both halves ready to render.
+
+    Raises
+    ------
+    InputError
+        When the scene cannot be read or paired, or its image is too large.
+    """
     options = options or Options()
     if options.image:
         from comparisons.pictures import pictured
@@ -77,15 +92,15 @@ def prepare(source, options=None):
     width, height = image_size(physical)
     if width * height > LARGEST_PASS:
         raise InputError(
-            f"{source.name}: an image of {width}x{height} pixels is too large:"
-            f" {LARGEST_PASS} pixels are allowed. Give a smaller one with --resolution."
+            f"{source.name}: an image of {width}x{height} pixels is too large: at most"
+            f" {LARGEST_PASS} pixels are allowed. Give a smaller --resolution."
         )
     memory.require(source.name, width, height)
     begin = perf_counter()
     chosen = plan(pair, physical, options.interpolation, options.everything)
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
     planning = perf_counter() - begin
-    # Dr.Jit traces every BSDF that is alive: those of scenes that are done with slow this one.
+    # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
     gc.collect()
     planned = render.schedule(chosen, width * height, options.spp, options.noise)
     if len(options.image) > 1:
@@ -101,15 +116,15 @@ def prepare(source, options=None):
     )
 
 
-def guarded(source, options=None):
-    """Prepare a scene as :func:`prepare` does, and probe it before anything relies on its plan.
+def guarded(source: Source, options: Options | None = None) -> Prepared:
+    """Prepare a scene with :func:`prepare`, and probe it before anything relies on its plan.
 
-    Where the probe disagrees with the plan, everything is simulated.
+    If the probe disagrees with the plan, everything is simulated.
 
     Raises
     ------
     InputError
-        As :func:`prepare`, and where no pixel sees a surface, unless the options allow that.
+        See :func:`prepare`; also when no pixel sees a surface, unless the options allow it.
     """
     options = options or Options()
     ready = _probed(source, options)
@@ -118,7 +133,7 @@ def guarded(source, options=None):
     return ready
 
 
-def _probed(source, options):
+def _probed(source: Source, options: Options) -> Prepared:
     ready = prepare(source, options)
     width, height = image_size(ready.scene)
     samples = ready.reference.spp * ready.passes * width * height
@@ -130,21 +145,27 @@ def _probed(source, options):
     return replace(whole, plan=whole.plan.unpruned("guard", found.words), guard=found)
 
 
-def compare(source, options=None, progress=None, command="", kept=None):
-    """Compare the heuristic with the physical half of a scene, in the current variant.
+def compare(
+    source: Source,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+    kept: Kept | None = None,
+) -> Comparison:
+    """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     Parameters
     ----------
     source : reference.scene.source.Source
         The scene.
     options : Options, optional
-        What is rendered, and how it is judged.
+        What to render, and how to judge it.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` after each pass.
     command
         How to repeat the comparison, for the record.
     kept : optional
-        Where the passes of an interrupted run are, and those of this one go
+        Holds the passes of an interrupted run, and takes those of this one
         (:func:`comparisons.render.render`).
 
     Returns
@@ -154,7 +175,7 @@ def compare(source, options=None, progress=None, command="", kept=None):
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel of it sees a surface.
+        When the scene cannot be read or paired, or no pixel sees a surface.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
@@ -167,17 +188,25 @@ def compare(source, options=None, progress=None, command="", kept=None):
     return replace(comparison, record=made)
 
 
-def _compare(source, options, progress, command, kept):
+def _compare(
+    source: Source,
+    options: Options,
+    progress: Progress | None,
+    command: str,
+    kept: Kept | None,
+) -> Comparison:
     stages = _Stages()
     ready = guarded(source, options)
-    heuristic, reference = ready.heuristic, ready.reference
-    stages.done("scene and pairing", ready.planning_seconds + ready.guard.seconds)
-    stages.seconds |= {"planning": ready.planning_seconds, "guard": ready.guard.seconds}
+    heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
+    reference, guard = ready.reference, ready.guard
+    assert guard is not None
+    stages.done("scene and pairing", ready.planning_seconds + guard.seconds)
+    stages.seconds |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     width, height = image_size(ready.scene)
-    # Before anything is rendered that takes long: a picture may be turned over.
-    place = ready.heuristic.located(ready.scene) if options.image else None
+    # Before any long rendering: a picture may be flipped.
+    place = heuristic.located(ready.scene) if options.image else None
     estimates = render.render(ready, options, ready.counted, progress, kept)
-    # Passes of an earlier run took their time then, not now.
+    # Passes of an earlier run took no time in this one.
     rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
     stages.done("sums of passes", rendering if estimates.new else 0.0)
     numbers, images = _measure(
@@ -220,7 +249,7 @@ def _compare(source, options, progress, command, kept):
         warnings=(
             *(picture.odd if picture else ()),
             *ready.pair.warnings,
-            *record.guard_warnings(ready.guard),
+            *record.guard_warnings(guard),
             *record.path_warnings(ready),
         ),
         versions=record.versions(),
@@ -233,7 +262,9 @@ def _compare(source, options, progress, command, kept):
     return Comparison(made, images, terms, no_terms)
 
 
-def _heuristic_renderer(source, pair, chosen, spp, options):
+def _heuristic_renderer(
+    source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
+) -> Any:
     """Make the heuristic half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
@@ -247,7 +278,7 @@ def _heuristic_renderer(source, pair, chosen, spp, options):
         return pictured.Pictured(pictured.read(options), made)
 
 
-def _picture(place, options, images):
+def _picture(place: Registration, options: Options, images: Images) -> PictureRecord:
     """Return the record of the pictures, and what is odd about them."""
     from comparisons.pictures import suspicions
 
@@ -256,7 +287,7 @@ def _picture(place, options, images):
         files=options.image,
         transfer=options.transfer,
         repeats=len(options.image),
-        shift=None if place.x is None else (place.x, place.y),
+        shift=None if place.x is None or place.y is None else (place.x, place.y),
         edges=place.correlation,
         ratio=suspicions.ratios(shown, reference),
     )
@@ -264,8 +295,8 @@ def _picture(place, options, images):
     return structs.replace(found, odd=tuple(suspicions.told(found, *given)))
 
 
-def _suspicions(options):
-    """Return what seems to be wrong with a user's own heuristic."""
+def _suspicions(options: Options) -> tuple[str, ...]:
+    """Return what seems to be wrong with a user's heuristic."""
     if options.image or heuristics.named(options.heuristic).is_own:
         return ()
     from comparisons.audit import diagnosis
@@ -273,10 +304,12 @@ def _suspicions(options):
     return diagnosis.told(options.heuristic)
 
 
-def _measure(estimates, surface, options, exact):
-    """Compute numbers, as fields of the record, and maps over the pixels that see a surface.
+def _measure(
+    estimates: render.Rendered, surface: GBuffer, options: Options, exact: bool
+) -> tuple[dict[str, Any], Images]:
+    """Compute fields of the record, and maps over the pixels that see a surface.
 
-    The doubt in question is that of the difference: what both halves share cancels in it.
+    The relevant uncertainty is that of the difference, in which shared noise cancels.
     """
     test, reference = estimates.heuristic, estimates.reference
     noise = estimates.difference.noise
@@ -327,19 +360,19 @@ def _measure(estimates, surface, options, exact):
     return numbers, images
 
 
-def leading_distance(viewing):
-    """Return ``(test, reference) -> (N,)``: distances of colours (N, 3) in the leading metric."""
+def leading_distance(viewing: Viewing) -> Callable[[Array, Array], Array]:
+    """Return the leading metric, ``(test, reference) -> (N,)``, for colours (N, 3)."""
     return lambda test, reference: LEADING.against(reference, ..., viewing)(test)
 
 
 class _Stages:
-    """Wall time by stage, without that of the two renderings."""
+    """Wall time by stage, without the two renderings."""
 
-    def __init__(self):
-        self.seconds = {}
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
         self._begin = perf_counter()
 
-    def done(self, name, rendering=0.0):
+    def done(self, name: str, rendering: float = 0.0) -> None:
         now = perf_counter()
         self.seconds[name] = now - self._begin - rendering
         self._begin = now

@@ -1,4 +1,4 @@
-"""The record of a comparison, ``comparison.json``, as types."""
+"""The types of a comparison's record, ``comparison.json``."""
 
 from typing import Annotated, Any, Literal
 
@@ -33,9 +33,9 @@ class Decision(Record):
     Attributes
     ----------
     rule
-        Of what kind the reason is, and the reason: ``structural`` follows from what the scene is
-        made of, ``simulated`` means that a premise of leaving it out is not known to hold,
-        ``asked`` that pruning is switched off, ``guard`` that a probe disagreed with the plan.
+        The kind of reason, and the reason: ``structural`` follows from the scene's structure,
+        ``simulated`` means that a premise of leaving it out is not known to hold, ``asked`` that
+        pruning is off, ``guard`` that a probe disagreed with the plan.
     """
 
     name: str
@@ -49,13 +49,13 @@ class RuleRecord(Record):
     Attributes
     ----------
     name
-        What is done where it applies.
+        What is done when it applies.
     applies
         Whether all its premises are known to hold.
     premise
-        The first that is not; empty where it applies.
+        The first premise not known to hold; empty if it applies.
     evidence
-        What is not there, or what speaks against the premise.
+        What is absent, or what contradicts the premise.
     """
 
     name: str
@@ -65,7 +65,7 @@ class RuleRecord(Record):
 
 
 class Simulation(Record):
-    """What is simulated of a scene, and with how many samples."""
+    """The simulation of a scene: its plan, samples and passes."""
 
     kernel_terms: Annotated[
         tuple[str, ...], Meta(description="Coefficients whose terms the heuristic kernel holds.")
@@ -83,28 +83,28 @@ class Simulation(Record):
     light_samples: Annotated[
         Count,
         Meta(
-            description="Lights that the reference picks for each sample, in proportion to what"
-            " they give; 0 where it asks each."
+            description="Lights that the reference picks for each sample, in proportion to their"
+            " contribution; 0 if it samples all."
         ),
     ] = 0
     heuristic_reads: Annotated[
-        tuple[str, ...], Meta(description="What the heuristic reads of the points that it shades.")
+        tuple[str, ...], Meta(description="What the heuristic reads of each point that it shades.")
     ] = ()
 
 
 class GuardRecord(Record):
-    """What a probe of everything found, beside a plan that leaves something out.
+    """The result of probing a plan that leaves something out, against everything.
 
     Attributes
     ----------
     state
-        Where it disagreed, everything was simulated; it is not needed where nothing is left out.
+        If it disagreed, everything was simulated; not needed if nothing is left out.
     rays
-        Camera rays that were followed both ways.
+        Camera rays that were traced both ways.
     departure, error
-        Mean of the plan less that of everything, as a share of it, and its standard error.
+        Relative difference of the plan's mean from the full one, and its standard error.
     seconds
-        Time of the probe, which is in no other time.
+        Time of the probe, which no other time includes.
     """
 
     state: Literal["agreed", "disagreed", "not needed"]
@@ -115,14 +115,14 @@ class GuardRecord(Record):
 
 
 class PlanRecord(Simulation, kw_only=True):
-    """Which effects the scene calls for, and what was simulated."""
+    """The effects that the scene calls for, and what was simulated."""
 
     effects: tuple[Decision, ...]
     guard: GuardRecord | None = None
 
 
 class Significant(Record):
-    """Pixels that are shown to differ, of the counted ones. It grows with the samples."""
+    """Share of the counted pixels that are shown to differ; it grows with the samples."""
 
     fraction: Share
     undetermined: Annotated[
@@ -133,14 +133,14 @@ class Significant(Record):
         Meta(
             gt=0,
             lt=1,
-            description="Expected share of wrong ones among them; where the images do not differ,"
-            " the chance of any.",
+            description="Expected share of false ones among them; if the images do not differ, the"
+            " chance of any.",
         ),
     ]
 
 
 class BsdfPair(Record):
-    """A BSDF and its partner; colours of one value are that value. The note says what is odd."""
+    """A BSDF and its partner; grey colours are one value. The note says what is odd."""
 
     name: str
     given: str
@@ -180,7 +180,7 @@ class Pairing(Record):
 class Times(Record):
     """Wall times of one rendering in seconds, evaluated and synchronised."""
 
-    median_s: Annotated[Amount, Meta(description="Median of a pass, once compiled.")]
+    median_s: Annotated[Amount, Meta(description="Median time per pass, once compiled.")]
     passes: Size
     first_s: Annotated[Amount, Meta(description="The first pass, with compilation.")]
     total_s: Amount
@@ -188,11 +188,11 @@ class Times(Record):
 
 
 CAUSES = "causes"
-"""The stage in which causes are found."""
+"""The stage that finds causes."""
 
 
 class TimeSpent(Record):
-    """Times of both renderings, and of other work by its name."""
+    """Times of both renderings, and of other work by stage."""
 
     heuristic: Times
     reference: Times
@@ -200,22 +200,22 @@ class TimeSpent(Record):
 
     @property
     def share_of_causes(self) -> float:
-        """Of the whole, what finding causes took."""
+        """The share of the whole time that finding causes took."""
         whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
         return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
 
 
 class Unrepresentable(Record):
-    """What the heuristic model has no form for; compared nevertheless."""
+    """Something that the heuristic model cannot represent; compared nevertheless."""
 
     name: Annotated[str, Meta(description="Id, or place in the file.")]
     plugin: str
     lost: str
-    nearest: Annotated[str, Meta(description="What is taken in its place, and by which rule.")]
+    nearest: Annotated[str, Meta(description="What replaces it, and by which rule.")]
 
 
 class Override(Record):
-    """What the scene asks for and does not get, and what it gets instead."""
+    """A setting of the scene that is not used, and what is used instead."""
 
     what: str
     given: str
@@ -225,7 +225,7 @@ class Override(Record):
 class NoiseTarget(Record):
     """Where a run with a noise target ended.
 
-    Both are 95th percentiles of the noise in ΔE2000 over the counted pixels: as asked for, and
+    Both are 95th percentiles of the noise in ΔE2000 over the counted pixels: as requested, and as
     predicted from the spread of the passes.
     """
 
@@ -236,25 +236,25 @@ class NoiseTarget(Record):
 
 
 class PictureRecord(Record):
-    """The pictures that stand in the place of the heuristic half.
+    """The pictures that replace the heuristic half.
 
     Attributes
     ----------
     files
-        As they were given.
+        The files as given.
     transfer
-        Transfer function of their values, as stated; null for an EXR's own, linear.
+        Transfer function of their values, as stated; null for EXR's own, which is linear.
     repeats
         Number of the pictures.
     shift
-        Pixels that their content lies to the right and below of where the camera sees it; null
-        where their edges do not tell.
+        Pixels by which their content is too far right and too low; null if their edges are
+        uninformative.
     edges
-        Correlation of their edges with those that were expected.
+        Correlation of their edges with the expected ones.
     ratio
         Means of red, green and blue over those of the reference.
     odd
-        What is odd about them, in words; where they lie comes first.
+        What is odd about them, in words, their position first.
     """
 
     files: tuple[str, ...]
@@ -277,12 +277,12 @@ class ComparisonRecord(Record, kw_only=True):
     heuristic_variant: str
     heuristic: str
     interpolation: Literal["flat", "gouraud", "phong"]
-    seed: Annotated[Count, Meta(description="From which the seed of each pass is hashed.")]
+    seed: Annotated[Count, Meta(description="Seed of the run; each pass hashes its own from it.")]
     resolution: Resolution
     plan: PlanRecord
     viewing: Viewing
     metrics: Annotated[
-        dict[str, Summary], Meta(description="By the name of each metric that was declared.")
+        dict[str, Summary], Meta(description="Summaries by name of the declared metric.")
     ]
     log2_luminance: RatioSummary
     significant: Significant
@@ -290,15 +290,15 @@ class ComparisonRecord(Record, kw_only=True):
     limits: LimitCounts
     regions: Annotated[
         tuple[Region, ...],
-        Meta(description="Boxes that hold most of dE2000, of greatest worth first."),
+        Meta(description="Boxes that hold most of dE2000, the most valuable first."),
     ]
     objects: Annotated[
         tuple[Carrier, ...],
-        Meta(description="Shapes by their share of dE2000; the last may hold all others."),
+        Meta(description="Shapes by share of dE2000; the last may hold all others."),
     ] = ()
     materials: Annotated[tuple[Carrier, ...], Meta(description="The same for their BSDFs.")] = ()
     histograms: Annotated[
-        dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratio.")
+        dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratios.")
     ]
     pairing: Pairing
     time: TimeSpent
@@ -307,10 +307,10 @@ class ComparisonRecord(Record, kw_only=True):
     overridden: tuple[Override, ...]
     warnings: tuple[str, ...]
     versions: Versions
-    command: Annotated[str, Meta(description="What repeats this comparison.")]
+    command: Annotated[str, Meta(description="Repeats this comparison.")]
     noise_target: NoiseTarget | None = None
     picture: PictureRecord | None = None
     suspicions: Annotated[
-        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to have, in words.")
+        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
     record_version: int = VERSION

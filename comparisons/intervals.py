@@ -11,17 +11,17 @@ LEVEL = 0.95
 
 
 def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
-    """Return the standard error of a statistic, from its values (n, ...) without one of n repeats.
+    """Return the standard error of a statistic from its values (n, ...), each without one repeat.
 
-    It holds for statistics that are not linear: those of single repeats, which are noisier than
-    their mean, would not average to its own.
+    It holds for nonlinear statistics too, whose values for single, noisier repeats would not
+    average to their value for the mean.
     """
     left_out = np.asarray(left_out, float)
     return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
 
 
 def student(value: float, error: float, count: int) -> Estimated:
-    """Return the interval around a value whose standard error is known from ``count`` repeats."""
+    """Return the interval around a value whose standard error comes from ``count`` repeats."""
     from scipy.special import stdtrit  # scipy.stats takes a second to import
 
     half = float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error
@@ -36,11 +36,11 @@ def of_mean(values: ArrayLike) -> Estimated:
 
 
 def median_ranks(count: int) -> tuple[int, int, float]:
-    """Return the places, from 0, of the ordered values that enclose a median, and their coverage.
+    """Return the indices of the sorted values that enclose a median, and their coverage.
 
     Each of ``count`` values is below the median with chance 1/2, whatever the distribution. The
-    enclosing values are the closest whose coverage is :data:`LEVEL`; with fewer than six values not
-    even the extremes reach it.
+    enclosing values are the closest that reach the coverage :data:`LEVEL`; with fewer than six
+    values, not even the extremes do.
     """
     from scipy.stats import binom
 

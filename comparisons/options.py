@@ -1,8 +1,9 @@
-"""What can be chosen about a comparison."""
+"""The options of a comparison."""
 
 from dataclasses import dataclass
 from math import inf
 from numbers import Integral, Real
+from typing import Any
 
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from heuristic import heuristics
@@ -13,7 +14,7 @@ from reference.pairing.halves import Pair, pair
 from reference.scene.source import Source
 
 LARGEST_SPP = 2**20
-"""Samples a pixel: the noise is a thousandth of that of one, and an image takes days."""
+"""Samples per pixel: the noise is a thousandth of one sample's, and an image takes days."""
 
 WHOLE = {
     "seed": (0, 2**64 - 1),
@@ -21,51 +22,50 @@ WHOLE = {
     "tessellation": (1, FINEST),
     "sensor": (0, 2**31 - 1),
 }
-"""Bounds of the options that are whole numbers, both allowed."""
+"""Inclusive bounds of the options that are whole numbers."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """What can be chosen about a comparison.
+    """The options of a comparison.
 
     Parameters
     ----------
     seed
         Of the run; each pass hashes its own from it (`pass_seed`).
     spp
-        Samples a pixel in all, in place of the plan's. They are split into the plan's number of
-        passes, or fewer where that leaves less than 4 a pass, at least 2. With ``noise``, the
-        most that are taken.
+        Total samples per pixel, instead of the plan's. They are split into the plan's number of
+        passes, or fewer (at least 2) to keep 4 per pass. With ``noise``, the limit.
     noise
-        Go on until the 95th percentile of the noise in ΔE2000 is no more than this
+        Render until the 95th percentile of the noise in ΔE2000 is at most this
         (:mod:`comparisons.render`).
     resolution
-        ``(width, height)`` in place of the film's own.
+        ``(width, height)`` instead of the film's own.
     convention
         How roughplastic and phong are paired.
     heuristic
         Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
     interpolation, tessellation
-        How the heuristic half shades its surfaces, and how fine the meshes for it are.
+        How the heuristic half shades its surfaces, and how fine its meshes are.
     viewing
-        How linear values are looked at.
+        The viewing conditions.
     heuristic_variant
-        Variant of the heuristic half where it is not the current one, as for RGB shading against a
+        Variant of the heuristic half if not the current one, as for RGB shading against a
         spectral reference.
     everything
         Switch off all pruning, in the kernel and in the reference.
     sensor
-        Number of the sensor, of several, from 0.
+        Number of the sensor, from 0.
     image, transfer
-        Pictures in the place of the heuristic half, several as repeats, and the transfer function
+        Pictures instead of the heuristic half, several being repeats, and the transfer function
         of their values (:mod:`comparisons.pictures.picture_files`).
     allow_empty
-        Take a picture in which no pixel sees a surface, which is refused otherwise.
+        Accept a scene in which no pixel sees a surface.
 
     Raises
     ------
     InputError
-        For a number beyond its bounds in :data:`WHOLE`, a noise target that is not positive and
+        For a number outside its bounds in :data:`WHOLE`, a noise target that is not positive and
         finite, a resolution below 1, or a heuristic that is not declared.
     """
 
@@ -85,7 +85,7 @@ class Options:
     image: tuple[str, ...] = ()
     transfer: str | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         heuristics.named(self.heuristic)
         if self.image and self.heuristic != heuristics.PHONG.name:
             raise InputError(
@@ -104,11 +104,11 @@ class Options:
             )
 
     def require_model(self, what: str) -> None:
-        """Raise InputError where a picture is in the place of what has to be rendered again."""
+        """Raise InputError if a picture replaces the heuristic half, which ``what`` renders."""
         if self.image:
             raise InputError(
-                f"{what} needs a heuristic that can be rendered, and {self.image[0]} is a picture."
-                " Leave the image out."
+                f"{what} needs a heuristic to render, and {self.image[0]} is a picture. Omit the"
+                " image."
             )
 
     def pair(self, source: Source) -> Pair:
@@ -125,9 +125,9 @@ class Options:
         )
 
 
-def _require_whole(name: str, value: object, low: int, high: int) -> None:
+def _require_whole(name: str, value: Any, low: int, high: int) -> None:
     is_whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if value is not None and not (is_whole and low <= value <= high):
+    if value is not None and not (is_whole and low <= int(value) <= high):
         raise InputError(
             f"{name} = {value!r} is not allowed: give a whole number from {low} to {high}."
         )
@@ -136,5 +136,5 @@ def _require_whole(name: str, value: object, low: int, high: int) -> None:
 def _is_size(resolution: object) -> bool:
     if not isinstance(resolution, (tuple, list)):
         return False
-    sides = [side for side in resolution if isinstance(side, Integral) and side >= 1]
+    sides = [side for side in resolution if isinstance(side, Integral) and int(side) >= 1]
     return len(sides) == len(resolution) == 2

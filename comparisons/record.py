@@ -1,9 +1,13 @@
-"""What a comparison returns, and how its record is made of a pair, a plan and times."""
+"""What a comparison returns, and how its record is made from a pair, a plan and times."""
+
+from __future__ import annotations
 
 import platform
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -24,11 +28,21 @@ from comparisons.comparison import (
     Unrepresentable,
 )
 from comparisons.processes.pool import cores
+from comparisons.records import Record
 from comparisons.terms.term_grid import TermGrid
 from heuristic import __version__
 from heuristic.heuristics import named
+from reference.pairing.halves import Pair
 from reference.planning.light_by_light import loses_light
-from reference.rendering.guard import Verdict
+from reference.planning.plan import Plan
+from reference.planning.premises import Ruling
+from reference.rendering.guard import Guard, Verdict
+from reference.rendering.renderer import PassTimes
+
+if TYPE_CHECKING:
+    from comparisons.compare import Prepared
+
+Copied = TypeVar("Copied", bound=Record)
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "flip-evaluator", "OpenEXR")
 
@@ -37,8 +51,8 @@ LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "flip-evaluator", "O
 class Images:
     """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
 
-    ``maps`` holds the perceptual metrics by name and ``log2_luminance``; ``objects`` and
-    ``materials`` the place in the record of what each pixel sees, -1 where nothing counts.
+    ``maps`` holds the perceptual metrics by name, and ``log2_luminance``. ``objects`` and
+    ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
     """
 
     heuristic: np.ndarray
@@ -57,7 +71,7 @@ class Images:
 class Comparison:
     """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
 
-    ``no_terms`` says why there are no terms.
+    ``no_terms`` gives the reason if there are no terms.
     """
 
     record: ComparisonRecord
@@ -66,7 +80,7 @@ class Comparison:
     no_terms: str = ""
 
 
-def versions():
+def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
     found = {"fotismos": __version__, "python": platform.python_version()}
     found |= {library: metadata.version(library) for library in LIBRARIES}
@@ -74,8 +88,8 @@ def versions():
     return found
 
 
-def machine():
-    """Return what times depend on: processor, cores that may be used, system."""
+def machine() -> dict[str, Any]:
+    """Return what times depend on."""
     return {
         "processor": _processor(),
         "cores": cores(),
@@ -83,7 +97,7 @@ def machine():
     }
 
 
-def _processor():
+def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -92,7 +106,7 @@ def _processor():
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def pairing(pair):
+def pairing(pair: Pair) -> Pairing:
     """Return how a pair was derived."""
     return Pairing(
         convention=pair.convention.value,
@@ -111,8 +125,8 @@ def pairing(pair):
     )
 
 
-def unrepresentable(pair):
-    """Return what the heuristic model has no form for: where it is, and what is taken instead."""
+def unrepresentable(pair: Pair) -> tuple[Unrepresentable, ...]:
+    """Return what the heuristic model cannot represent: where it is, and what replaces it."""
     found = [
         (paired.name, paired.given, lost, nearest)
         for paired in pair.bsdfs
@@ -130,10 +144,10 @@ def unrepresentable(pair):
     )
 
 
-def overridden(pair, plan, spp):
-    """Return what the scene asks for and does not get, and what it gets instead."""
+def overridden(pair: Pair, plan: Plan, spp: int) -> tuple[Override, ...]:
+    """Return the settings of the scene that are not used, and what is used instead."""
     found = [copied(Override, entry) for entry in pair.overridden]
-    used = f"{plan.sampler}, {spp} samples a pixel"
+    used = f"{plan.sampler}, {spp} samples per pixel"
     found = [replace(entry, used=used) if entry.what == "sampler" else entry for entry in found]
     if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
         depths = {"given": str(pair.rr_depth), "used": str(plan.rr_depth)}
@@ -141,8 +155,8 @@ def overridden(pair, plan, spp):
     return tuple(found)
 
 
-def simulation(ready, spp, passes):
-    """Return what is simulated, with the samples and passes that were rendered, by field."""
+def simulation(ready: Prepared, spp: int, passes: int) -> dict[str, Any]:
+    """Return the fields on what is simulated, given the samples and passes rendered."""
     plan = ready.plan
     return {
         "kernel_terms": tuple(plan.kernel_terms),
@@ -159,17 +173,17 @@ def simulation(ready, spp, passes):
     }
 
 
-def _ruling(ruling):
+def _ruling(ruling: Ruling) -> RuleRecord:
     return RuleRecord(
         name=ruling.rule.name,
         applies=ruling.holds,
-        premise="" if ruling.holds else ruling.failed.sentence,
+        premise="" if ruling.failed is None else ruling.failed.sentence,
         evidence=ruling.words,
     )
 
 
-def plan_record(ready, passes):
-    """Return the record of a scene's plan, with the samples and passes that were rendered."""
+def plan_record(ready: Prepared, passes: int) -> PlanRecord:
+    """Return the record of a scene's plan, given the passes rendered."""
     plan = ready.plan
     effects = tuple(
         Decision(
@@ -184,8 +198,8 @@ def plan_record(ready, passes):
     return PlanRecord(effects=effects, guard=guard, **simulation(ready, samples, passes))
 
 
-def guard_record(guard):
-    """Return the record of what the probe of a plan found."""
+def guard_record(guard: Guard) -> GuardRecord:
+    """Return the record of the probe of a plan."""
     return GuardRecord(
         state=guard.state.value,
         rays=guard.rays,
@@ -195,26 +209,26 @@ def guard_record(guard):
     )
 
 
-def guard_warnings(guard):
-    """Yield what is to be said where the probe disagreed with the plan."""
+def guard_warnings(guard: Guard) -> Iterator[str]:
+    """Yield a warning if the probe disagreed with the plan."""
     if guard.state is Verdict.DISAGREED:
         yield (
-            f"The plan leaves out light that is there, or adds some: {guard.words}. So everything"
-            " was simulated. A rule of pruning is wrong for this scene: please report it."
+            f"The plan changes the light: {guard.words}. So everything was simulated. A rule of"
+            " pruning is wrong for this scene: please report it."
         )
 
 
-def path_warnings(ready):
-    """Yield what is to be said where Mitsuba's ``path`` loses light."""
+def path_warnings(ready: Prepared) -> Iterator[str]:
+    """Yield a warning if Mitsuba's ``path`` loses light."""
     if loses_light(ready.plan.integrator, ready.pair):
         yield (
-            "Mitsuba's path counts a ray as black that passes straight through masks into the"
-            " background, with the light that the masks reflect: the reference is too dark there."
-            " With the integrator volpath it is not."
+            "Mitsuba's path returns black for rays that pass straight through masks into the"
+            " background, and drops the light that the masks reflect: the reference is too dark"
+            " there. The integrator volpath is right."
         )
 
 
-def times(of_passes):
+def times(of_passes: PassTimes) -> Times:
     """Return the times of one half, in seconds."""
     return Times(
         median_s=of_passes.median,
@@ -225,13 +239,13 @@ def times(of_passes):
     )
 
 
-def copied(kind, source):
-    """Make a record of an object that has its fields."""
+def copied(kind: type[Copied], source: object) -> Copied:
+    """Make a record from an object that has its fields."""
     return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
 
 
-def _short(value):
-    """Turn tuples of equal components into one number, for reading."""
+def _short(value: Any) -> Any:
+    """Turn tuples of equal components into one number, for readability."""
     if isinstance(value, dict):
         return {key: _short(item) for key, item in value.items()}
     if isinstance(value, tuple):

@@ -1,8 +1,8 @@
-"""Records: frozen types from which JSON files and their published schemas are made.
+"""Records: frozen types that define JSON files and their published schemas.
 
-A record is a :class:`Record` whose fields are the keys of a JSON object. What a field means stands
+A record is a :class:`Record` whose fields are the keys of a JSON object. The meaning of a field is
 in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, or in the section
-*Attributes* of the docstring, and the schema says it too.
+*Attributes* of the docstring, and both go into the schema.
 """
 
 import inspect
@@ -17,7 +17,7 @@ from msgspec import Meta
 from heuristic.errors import InputError
 
 VERSION = 2
-"""Of all records: 2 since their types make them. Records of fotismos 0.1 have none."""
+"""Version of all records. Records of fotismos 0.1 have none."""
 
 Kind = TypeVar("Kind")
 
@@ -31,20 +31,20 @@ Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in 
 Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
 
 
-@dataclass_transform(frozen_default=True)  # checkers do not see that msgspec inherits it
+@dataclass_transform(frozen_default=True)  # mypy does not know that `frozen` is inherited
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Something that is written as a JSON object."""
+    """A type that is written as a JSON object."""
 
 
 class Pixels(Record):
-    """Pixels whose centre sees a surface, and all."""
+    """The number of pixels whose centre sees a surface, and of all."""
 
     counted: Count
     total: Size
 
 
 class Machine(Record):
-    """What times depend on: model of the processor, cores that may be used, system."""
+    """What times depend on: model of the processor, number of usable cores, system."""
 
     processor: str
     cores: Size
@@ -92,7 +92,7 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
     Raises
     ------
     InputError
-        When the text is not such a record, or one of another version.
+        When the text is not such a record, or is of another version.
     """
     try:
         content = json.loads(text)
@@ -100,7 +100,7 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
         if isinstance(content, dict) and version != VERSION:
             found = "of fotismos 0.1" if version is None else f"version {version}"
             raise InputError(
-                f"{where}: this record is {found}, and version {VERSION} is read. Make it again."
+                f"{where}: this record is {found}, not version {VERSION}. Make it again."
             )
         return msgspec.convert(content, kind)
     except json.JSONDecodeError as error:
@@ -110,7 +110,7 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
 
 
 def _describe(definition: dict[str, Any]) -> None:
-    """Hand what the docstring of a type says of its attributes to these."""
+    """Move the meanings of attributes from a type's docstring to the attributes."""
     docstring = inspect.cleandoc(
         re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
     )
@@ -125,17 +125,17 @@ def _describe(definition: dict[str, Any]) -> None:
 def _numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise NotImplementedError(f"{type(value).__name__} has no place in a record")
+    raise NotImplementedError(f"{type(value).__name__} cannot be in a record")
 
 
 WIDTH = 110
-"""Columns: enough for the colours of a block of pixels, with their errors."""
+"""Columns: enough for the colours of a block of pixels with their errors."""
 
 
 def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
-    """Return JSON: entries of the outer two levels on lines of their own, others where they fit.
+    """Return JSON with one line per entry of the outer two levels, and of others if too long.
 
-    ``before`` is what stands on the line already; ``ValueError`` for a NaN or an infinity.
+    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
     """
     line = json.dumps(value, ensure_ascii=False, allow_nan=False)
     is_empty = not isinstance(value, (dict, list, tuple)) or not value

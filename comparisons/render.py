@@ -1,63 +1,79 @@
-"""Rendering both halves of a comparison pass by pass, until it is enough.
+"""Rendering both halves of a comparison pass by pass, until the result is good enough.
 
-Passes are bounded in two ways. A wavefront, the samples that are under way at once, stays under
-:data:`WAVEFRONT`, which bounds the memory of large images. And with a noise target, passes go on
-until the noise is under it, or a limit on samples stops them.
+Passes are bounded in two ways. A wavefront, the samples in flight at once, stays under
+:data:`WAVEFRONT`, which bounds the memory of large images. With a noise target, passes continue
+until the noise reaches it, or a limit on samples stops them.
 
-The state after each pass can be kept, so that an interrupted run goes on where it stopped. The seed
-of pass ``i`` is hashed from the run's seed and ``i``, and passes are added to the same sums in the
-same order, interrupted or not: the result is the same bit for bit.
+The state after each pass can be kept, and an interrupted run resumes from it. The seed of pass
+``i`` is hashed from the run's seed and ``i``, and passes are added to the same sums in the same
+order, interrupted or not: the result is the same bit for bit.
 """
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from comparisons.comparison import NoiseTarget
 from comparisons.departure.blocks import bands
+from comparisons.departure.metric import Pixelwise
 from comparisons.departure.metrics import LEADING
+from comparisons.departure.spaces import Viewing
+from comparisons.options import Options
 from comparisons.store import Lazy
+from reference.planning.plan import Plan
 from reference.rendering.moments import DifferenceEstimate, SumsOfHalves
-from reference.rendering.passes import passes
+from reference.rendering.passes import Progress, passes
+from reference.rendering.renderer import Renderer
 from reference.rendering.sums import Deviations, Mean, add_difference
 
+if TYPE_CHECKING:
+    from comparisons.compare import Prepared
+
 WAVEFRONT = 2**24
-"""Samples of one pass, at most, unless the image has more pixels: then one sample for each."""
+"""Most samples of one pass, unless the image has more pixels: then one sample per pixel."""
 
 LIMIT_SPP = 4096
-"""Samples a pixel at which a run with a noise target stops, unless another limit is given."""
+"""Samples per pixel at which a run with a noise target stops, unless another limit is given."""
 
 PERCENTILE = 95
-"""Of the noise over the counted pixels, which the target is for."""
+"""The target is for this percentile of the noise over the counted pixels."""
+
+
+Sums: TypeAlias = tuple[Mean, Deviations, SumsOfHalves]
+"""Sums of the heuristic half, of the reference, and of their difference."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Samples a pixel of each pass, and the number of passes, which is even and at least 2."""
+    """Samples per pixel and pass, and the number of passes, which is even and at least 2."""
 
     spp: int
     passes: int
 
     @classmethod
-    def of(cls, spp, passes):
-        """Split so many samples a pixel into so many passes."""
+    def of(cls, spp: int, passes: int) -> "Schedule":
+        """Split ``spp`` samples per pixel into ``passes`` passes."""
         return cls(max(1, spp // passes), passes)
 
 
-def schedule(plan, pixels, spp=None, noise=None):
+def schedule(
+    plan: Plan, pixels: int, spp: int | None = None, noise: float | None = None
+) -> Schedule:
     """Return the :class:`Schedule` of a plan.
 
     Parameters
     ----------
     plan : reference.planning.plan.Plan
-        Its samples and passes, which hold where nothing else is asked for.
+        Its samples and passes are the defaults.
     pixels
-        Of the image.
+        Number of pixels of the image.
     spp
-        Samples a pixel in all. With a noise target, the most of them.
+        Total samples per pixel; with a noise target, their limit.
     noise
-        The target, None where there is none.
+        The noise target, if any.
     """
     largest = max(1, WAVEFRONT // pixels)
     if noise is not None:
@@ -76,9 +92,8 @@ def schedule(plan, pixels, spp=None, noise=None):
 class Rendered:
     """The passes of both halves and of their difference, and where they stopped (or None).
 
-    Of the halves there are means (H, W, 3) and the reference's standard error alone, since the
-    doubt in question is the difference's.
-    ``passes`` counts all of them, ``new`` those that were rendered now and not kept before.
+    The halves have only means (H, W, 3) and the reference's standard error: the relevant
+    uncertainty is the difference's. ``passes`` counts all passes, ``new`` those of this run.
     """
 
     heuristic: np.ndarray
@@ -90,8 +105,24 @@ class Rendered:
     stop: NoiseTarget | None
 
 
-def render(ready, options, counted, progress, kept=None):
-    """Render the passes of both halves in turn, so that a drift of the machine hits both.
+class Kept(Protocol):
+    """Holds the state of an interrupted run."""
+
+    def load(self) -> dict[str, Any] | None:
+        """Return the state as arrays by name, None if there is none."""
+
+    def offer(self, count: int, state: Callable[[], Mapping[str, Any]]) -> None:
+        """Take the state after ``count`` passes, which ``state()`` returns."""
+
+
+def render(
+    ready: "Prepared",
+    options: Options,
+    counted: np.ndarray,
+    progress: Progress | None,
+    kept: Kept | None = None,
+) -> Rendered:
+    """Render the passes of both halves in turn: a drift of the machine then affects both.
 
     Parameters
     ----------
@@ -102,18 +133,17 @@ def render(ready, options, counted, progress, kept=None):
     counted
         (H, W): the pixels whose noise counts.
     progress : callable, optional
-        ``progress(stage, done, total)``; of a run with a target, ``total`` is the limit.
+        ``progress(stage, done, total)``; with a noise target, ``total`` is the limit.
     kept : optional
-        What holds the state of an interrupted run: ``load()`` returns a dictionary of arrays or
-        None, ``offer(count, state)`` is called after each pass with a function that returns one.
+        Holds the state of an interrupted run, and is offered the new one after each pass.
 
     Returns
     -------
     Rendered
     """
     halves = (ready.heuristic, ready.reference)
-    sums = [Mean(), Deviations(compact=True)]
-    sums.append(SumsOfHalves(counted, tuple(sums), compact=True))
+    test, truth = Mean(), Deviations(compact=True)
+    sums = test, truth, SumsOfHalves(counted, (test, truth), compact=True)
     state = kept.load() if kept else None
     if not _fits(state or {}, sums, halves, counted.shape, ready.passes):
         state = None
@@ -135,36 +165,36 @@ def render(ready, options, counted, progress, kept=None):
     if options.noise is not None:
         if reached is None:
             reached = noise_percentile(sums, counted, options.viewing)
-        by = "target" if reached <= options.noise else "samples"
         stop = NoiseTarget(
             target=options.noise,
             reached=reached,
-            stopped_by=by,
+            stopped_by="target" if reached <= options.noise else "samples",
             limit_spp=ready.passes * ready.reference.spp,
         )
-    # Images are single precision from here on, as the files are; each sum goes as it becomes one.
+    # From here on images have single precision, like the files. Each sum is freed as it is read.
     difference = sums[2].estimate(np.float32, last=True)
     error = sums[1].standard_error(np.float32, last=True)
     heuristic, reference = (total.mean(np.float32, last=True) for total in sums[:2])
     return Rendered(heuristic, reference, error, difference, done, done - before, stop)
 
 
-def is_checked(done, passes):
-    """Tell whether the noise is looked at after so many passes: 4, 6, 8, 12, 16, 24, …, and last.
+def is_checked(done: int, passes: int) -> bool:
+    """Return whether the noise is checked after ``done`` passes: 4, 6, 8, 12, 16, 24, …, and last.
 
-    Each look takes as long as a pass or two; the steps cost at most half as many passes again as
-    are needed. They do not depend on the images, so that resuming changes nothing.
+    A check takes as long as a pass or two; the steps cost at most half as many passes again as are
+    needed. They do not depend on the images, so resuming changes nothing.
     """
     power = 1 << (done.bit_length() - 1)
     return done >= passes or (done >= 4 and done in (power, power + power // 2))
 
 
-def noise_percentile(sums, counted, viewing):
+def noise_percentile(sums: Sums, counted: np.ndarray, viewing: Viewing) -> float:
     """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
 
-    The noise image is that of the difference of the halves, what both share cancelled.
+    The noise is that of the difference of the halves, in which shared noise cancels.
     """
     metric = LEADING
+    assert isinstance(metric, Pixelwise)
     reference, noise = sums[1].mean(np.float32), sums[2].noise(np.float32)
     if not noise[counted].any():
         return 0.0
@@ -176,9 +206,9 @@ def noise_percentile(sums, counted, viewing):
     return float(np.percentile(np.concatenate(distances), PERCENTILE))
 
 
-def _state(sums, halves):
-    """Return all that later passes build upon, as arrays that are made one at a time."""
-    state = {}
+def _state(sums: Sums, halves: Sequence[Renderer]) -> Lazy:
+    """Return all that later passes need, as arrays that are made one at a time."""
+    state: dict[str, Callable[[], Any]] = {}
     for number, total in enumerate(sums):
         state |= {f"sum{number}_{name}": made for name, made in total.state().items()}
     for number, half in enumerate(halves):
@@ -187,12 +217,18 @@ def _state(sums, halves):
     return Lazy(state)
 
 
-def _fits(state, sums, halves, size, passes):
-    """Tell whether a state is one of these sums of images (H, W), of at most so many passes."""
+def _fits(
+    state: Mapping[str, Any],
+    sums: Sums,
+    halves: Sequence[Renderer],
+    size: tuple[int, int],
+    passes: int,
+) -> bool:
+    """Return whether a state is of these sums of images (H, W), with at most ``passes`` passes."""
     count = state.get("sum0_count")
     if count is None or count.shape or count.dtype.kind != "i" or not 1 <= count <= passes:
         return False
-    shapes = {}
+    shapes: dict[str, tuple[int, ...]] = {}
     for number, total in enumerate(sums):
         shapes |= {f"sum{number}_{name}": shape for name, shape in total.shapes(size).items()}
     for number in range(len(halves)):
@@ -206,8 +242,8 @@ def _fits(state, sums, halves, size, passes):
     return all(array.dtype == float and np.isfinite(array).all() for array in doubles)
 
 
-def _restore(state, sums, halves):
-    """Put a state back in place; returns the number of passes that it holds."""
+def _restore(state: dict[str, Any] | None, sums: Sums, halves: Sequence[Renderer]) -> int:
+    """Restore a state; return the number of passes that it holds."""
     if state is None:
         return 0
     for number, total in enumerate(sums):

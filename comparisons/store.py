@@ -1,8 +1,8 @@
-"""What was computed once, kept in a file, and found again by a key of all that it depends on.
+"""Results kept in files, under a key of everything that they depend on.
 
-A file holds a mapping: as JSON, or as arrays where its name ends in ``.npz``. The key stands in it
-as well, so that what belongs to another scene, other options or another version is not used. A
-checksum (that of ZIP for arrays) tells what was damaged, which is computed again.
+A file holds a mapping: as JSON, or as arrays if its name ends in ``.npz``. It also holds the key,
+so results of another scene, other options or another version are not used. A checksum (ZIP's own
+for arrays) detects damaged results, which are computed again.
 """
 
 import json
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from hashlib import sha256
 from math import prod
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
@@ -21,17 +21,17 @@ from comparisons import atomic
 from heuristic.errors import InputError
 
 KEY = "key"
-"""What the file calls the key."""
+"""Name of the key in the file."""
 
 LARGEST = 2**30
-"""Bytes of the largest file that is read at once: far beyond any that is written."""
+"""Bytes of the largest file that is read at once: far more than any that is written."""
 
 
 def content(path: str | Path, largest: int = LARGEST) -> bytes:
-    """Return what is in a regular file.
+    """Return the content of a regular file.
 
-    Raises ``OSError``, without opening it, for what is not a regular file (opening a FIFO waits for
-    ever) or has more than ``largest`` bytes.
+    Raises ``OSError``, without opening it, for anything but a regular file (opening a FIFO waits
+    forever) or for more than ``largest`` bytes.
     """
     require_regular(path, largest)
     with Path(path).open("rb") as file:
@@ -39,7 +39,7 @@ def content(path: str | Path, largest: int = LARGEST) -> bytes:
 
 
 class Lazy(Mapping[str, Any]):
-    """A mapping whose values are made by functions without arguments, each time they are asked for.
+    """A mapping whose values are made by functions without arguments, at each access.
 
     So the arrays of a large content need not be in memory together.
     """
@@ -72,24 +72,23 @@ class Entry:
         self.path, self.key = Path(path), key
 
     def load(self) -> dict[str, Any] | None:
-        """Return the result; None where there is none, a damaged one, or one of another key.
+        """Return the result; None if there is none, it is damaged, or it has another key.
 
-        Arrays are never of objects. Whether the mapping holds what it should is the caller's to
-        check.
+        Arrays never hold objects. The caller must check that the mapping holds what it should.
         """
         try:
             return self._arrays() if self._is_arrays() else self._json()
-        # What is wrong with a damaged file shows in many ways; the answer to all is the same.
+        # A damaged file can raise anything, and the answer is always the same.
         except Exception:
             return None
 
     def save(self, content: Mapping[str, Any]) -> None:
-        """Put a result in place of what is there.
+        """Save a result, replacing the old one.
 
         Raises
         ------
         InputError
-            When the place cannot be written to, or holds something other than a file.
+            When the path cannot be written to, or is not a regular file.
         """
         try:
             if self.path.exists():
@@ -108,7 +107,7 @@ class Entry:
             ) from error
 
     def remove(self) -> None:
-        """Delete the file; what is not a file stays."""
+        """Delete the file; anything but a file stays."""
         if self.path.is_file():
             self.path.unlink(missing_ok=True)
 
@@ -116,7 +115,7 @@ class Entry:
         return self.path.suffix == ".npz"
 
     def _head(self, body: bytes) -> bytes:
-        """Return what stands before the content: the key, and the content's checksum."""
+        """Return the text before the content: the key, and the content's checksum."""
         key = json.dumps(self.key, ensure_ascii=False)
         return f'{{"{KEY}": {key}, "sha256": "{sha256(body).hexdigest()}", "content": '.encode()
 
@@ -131,7 +130,7 @@ class Entry:
         with self.path.open("rb") as stream, ZipFile(stream) as archive:
             members = archive.infolist()
             size = sum(member.file_size for member in members)
-            # Only what is not compressed is bounded by the size of the file.
+            # Only uncompressed members are bounded by the size of the file.
             stored = all(member.compress_type == ZIP_STORED for member in members)
             if not stored or size > self.path.stat().st_size:
                 return None
@@ -151,8 +150,8 @@ def _write_arrays(file: BinaryIO, content: Mapping[str, Any], key: str) -> None:
                 np.lib.format.write_array(member, np.asanyarray(value), allow_pickle=False)
 
 
-def _array(file: BinaryIO) -> np.ndarray:
-    """Read one array in NumPy's format, whose header must tell the size of what follows."""
+def _array(file: IO[bytes]) -> np.ndarray:
+    """Read one array in NumPy's format, whose header must match its size."""
     version = np.lib.format.read_magic(file)
     if version != (1, 0):
         raise ValueError("another version of the format")
@@ -166,7 +165,7 @@ def _array(file: BinaryIO) -> np.ndarray:
 
 
 def require_regular(path: str | Path, largest: int | None = None) -> None:
-    """Raise ``OSError`` for what is not a regular file, or has more than ``largest`` bytes."""
+    """Raise ``OSError`` for anything but a regular file of at most ``largest`` bytes."""
     found = os.stat(path)
     if not stat.S_ISREG(found.st_mode):
         raise OSError(None, "it is not a regular file")

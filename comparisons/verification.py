@@ -1,46 +1,49 @@
-"""Pruning shown to be right, and what it saves: a scene as planned against everything simulated.
+"""Verifying that pruning is right, and what it saves: a planned scene against everything.
 
-Both references are rendered in turn, pass by pass. The difference is held against the noise of both
-sides, and the times are compared at equal noise: the variance of an independent mean falls with the
-time spent, so that ``variance x time`` is what a method costs.
+Both references are rendered in turn, pass by pass. The difference is compared with the noise of
+both, and the times at equal noise: the variance of an independent mean falls with the time spent,
+so a method costs ``variance x time``.
 
-From everything to the plan there are three steps, each with its own factor: the plan's sampler,
-then its integrator with nothing left out, then what it leaves out.
+Three steps lead from everything to the plan, each with its own factor: the plan's sampler, then its
+integrator with nothing left out, then what it leaves out.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from comparisons.compare import leading_distance, prepare
+from comparisons.compare import Prepared, leading_distance, prepare
 from comparisons.departure import marks
 from comparisons.options import Options
 from comparisons.records import VERSION, Record
+from heuristic.arrays import Array
+from reference.planning.plan import Plan
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.moments import DifferenceSums
-from reference.rendering.passes import Stream, pass_seed, passes
+from reference.rendering.passes import Progress, Stream, pass_seed, passes
 from reference.rendering.renderer import Renderer, physical_integrator
 from reference.rendering.sums import Accumulator
 from reference.scene.sampler import with_sampler
+from reference.scene.source import Source
 
 LEVEL = 0.01
 """Chance that any pixel is marked though nothing differs."""
 
 PASSES_WITH_PATHS = 4
-"""Times as many passes where paths are sampled: their variance is itself hard to measure, since few
-paths carry most of it."""
-
+"""Factor on the passes if paths are sampled: few paths carry most of the variance, which is hard to
+measure itself."""
 
 FEWEST_PASSES = 32
-"""Of each side: intervals come from pairs of passes."""
+"""Fewest passes of each side: intervals come from pairs of passes."""
 
 RESAMPLES = 2000
-"""Of the bootstrap."""
+"""Resamples of the bootstrap."""
 
 
 class Factor(Record):
-    """How many times sooner a step reaches the same noise; 95 % interval, all 1 for no step."""
+    """How many times sooner a step reaches the same noise, with a 95 % interval; 1 for no step."""
 
     name: str
     value: float
@@ -54,7 +57,7 @@ class Verification(Record, kw_only=True):
     Attributes
     ----------
     scene, planned, everything
-        Name, and a word on each reference.
+        Name, and a short description of each reference.
     resolution
         Width and height in pixels.
     significant
@@ -64,22 +67,22 @@ class Verification(Record, kw_only=True):
     largest
         Largest difference of the two means, linear.
     heuristic_largest
-        Largest difference of the two heuristic images; the kernels differ in terms that are 0.
+        Largest difference of the two heuristic images, whose kernels differ in terms that are 0.
     planned_s, everything_s
-        Time of a pass, median.
+        Median time per pass.
     planned_noise, everything_noise
-        Root mean square standard error of one pass over the pixels.
+        Root mean square over the pixels of the standard error of one pass.
     gain
         ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
         planned reference reaches the same noise.
     factors
-        The steps of the gain, whose product it is: sampler, integrator, pruning; and the gain
-        itself, with its interval.
+        The steps, whose product is the gain: sampler, integrator, pruning; and the gain itself,
+        with its interval.
     planning_s
-        Time that planning took, tables included.
+        Time of planning, tables included.
     saved_s
-        Time that the plan saves at the noise of all its own passes: what everything would take for
-        that noise, less what the plan takes.
+        Time that the plan saves at the noise of all its passes: the time of everything for that
+        noise, less the plan's.
     """
 
     scene: str
@@ -101,18 +104,24 @@ class Verification(Record, kw_only=True):
     record_version: int = VERSION
 
 
-def verify(source, options=None, progress=None, level=LEVEL, steps=True):
-    """Render a scene as planned and with everything, and compare.
+def verify(
+    source: Source,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    level: float = LEVEL,
+    steps: bool = True,
+) -> Verification:
+    """Render a scene as planned and with everything, and compare both.
 
     Parameters
     ----------
     source, options, progress
-        As of :func:`comparisons.compare.compare`. Samples are those of the everything-on side where
-        they are given; the plan's own otherwise.
+        See :func:`comparisons.compare.compare`. Given samples apply to everything; if omitted, the
+        plan's are used.
     level
         Chance that any pixel is marked though nothing differs.
     steps
-        Whether to measure what each step gives; without it, only the two ends are rendered.
+        Whether to measure each step; otherwise only the two ends are rendered.
 
     Returns
     -------
@@ -128,7 +137,7 @@ def verify(source, options=None, progress=None, level=LEVEL, steps=True):
     width, height = image_size(sides[0].scene)
     counted = gbuffer(sides[0].scene, width, height).hit
     measured = {renderer: _Measured(renderer, counted) for renderer in stages}
-    # Other seeds for the other side: equal ones would hide noise that both share.
+    # The other side has other seeds: equal ones would hide shared noise.
     others = passes(stages[:1], options.seed, count, stream=Stream.OTHER_SIDE)
     distinct, apart = list(measured), DifferenceSums(counted)
     own = passes(distinct[1:], options.seed, count, progress=progress, stage="verifying")
@@ -152,10 +161,10 @@ def verify(source, options=None, progress=None, level=LEVEL, steps=True):
     )
 
 
-def _stages(planned, everything):
+def _stages(planned: Prepared, everything: Prepared) -> list[Renderer]:
     """Return the renderers from everything to the plan; equal ones are the same.
 
-    The second has the plan's sampler, the third its integrator too, with nothing left out.
+    The second has the plan's sampler, the third also its integrator, with nothing left out.
     """
     plan, scene, spp = planned.plan, planned.scene, planned.reference.spp
     whole = plan
@@ -174,42 +183,43 @@ def _stages(planned, everything):
 class _Measured:
     """The passes of one renderer: their sum, their times, and the variance of a pass.
 
-    Each pair of passes gives an estimate of the variance that depends on no other pair.
+    Each pair of passes gives an independent estimate of the variance.
     """
 
-    def __init__(self, renderer, counted):
-        self.renderer, self.counted = renderer, counted
-        self.total, self.variances, self._before = Accumulator(), [], None
+    def __init__(self, renderer: Renderer, counted: np.ndarray) -> None:
+        self.renderer, self.counted, self.total = renderer, counted, Accumulator()
+        self.variances: list[float] = []
+        self._before: np.ndarray | None = None
 
-    def add(self, image):
+    def add(self, image: Array) -> None:
         self.total.add(image)
         image = np.array(image, float)[self.counted]
         if self._before is None:
             self._before = image
             return
         spread = np.mean((image - self._before) ** 2) / 2 if image.size else 0.0
-        # A plan without any noise left would divide by zero; below rounding nothing is gained.
+        # A plan without noise would divide by zero; noise below rounding does not matter.
         self.variances.append(max(float(spread), 1e-14))
         self._before = None
 
-    def seconds(self):
+    def seconds(self) -> float:
         return self.renderer.pass_times().median
 
-    def noise(self):
+    def noise(self) -> float:
         return float(np.sqrt(np.mean(self.variances)))
 
-    def cost(self):
+    def cost(self) -> float:
         return self.seconds() * self.noise() ** 2
 
-    def resampled(self, rng):
-        """Return costs as they might have come out: bootstrap over pairs, and over times."""
+    def resampled(self, rng: np.random.Generator) -> np.ndarray:
+        """Return costs resampled by a bootstrap over pairs, and over times."""
         times = np.array(self.renderer.times[1:] or self.renderer.times)
         shape = RESAMPLES, len(self.variances)
         variances = rng.choice(self.variances, shape).mean(axis=1)
         return variances * np.median(rng.choice(times, (RESAMPLES, len(times))), axis=1)
 
 
-def _factor(name, slow, fast, rng):
+def _factor(name: str, slow: _Measured, fast: _Measured, rng: np.random.Generator) -> Factor:
     if slow is fast:
         return Factor(name=name, value=1.0, low=1.0, high=1.0)
     ratios = slow.resampled(rng) / fast.resampled(rng)
@@ -217,8 +227,8 @@ def _factor(name, slow, fast, rng):
     return Factor(name=name, value=slow.cost() / fast.cost(), low=float(low), high=float(high))
 
 
-def _factors(measured):
-    """Return the factors of the three steps where they were measured, and of all."""
+def _factors(measured: list[_Measured]) -> tuple[Factor, ...]:
+    """Return the factors of the three steps, if measured, and of all."""
     rng = np.random.default_rng(0)
     names = ("sampler", "integrator", "pruning") if len(measured) > 2 else ()
     steps = zip(names, measured, measured[1:], strict=False)
@@ -226,8 +236,8 @@ def _factors(measured):
     return (*found, _factor("all", measured[0], measured[-1], rng))
 
 
-def _kernel_difference(sides, seed):
-    """Return the largest difference that the terms left out of the kernel make, with equal rays."""
+def _kernel_difference(sides: list[Prepared], seed: int) -> float:
+    """Return the largest effect of the terms left out of the kernel, with equal rays."""
     sampler, spp = sides[0].plan.sampler, sides[0].heuristic.spp
     images = []
     for side in sides:
@@ -238,7 +248,13 @@ def _kernel_difference(sides, seed):
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(name, sides, measured, counted, **found):
+def _summarise(
+    name: str,
+    sides: list[Prepared],
+    measured: list[_Measured],
+    counted: np.ndarray,
+    **found: Any,
+) -> Verification:
     everything, planned = measured[0], measured[-1]
     factors = _factors(measured)
     gain = factors[-1].value
@@ -261,9 +277,9 @@ def _summarise(name, sides, measured, counted, **found):
     )
 
 
-def _word(plan):
+def _word(plan: Plan) -> str:
     depth = "" if plan.max_depth == 2 else f" {plan.max_depth}"
     extra = "" if plan.shadows else ", no shadow rays"
     extra += ", tabulated environment" if plan.tabulate_environment else ""
-    extra += f", {plan.light_samples} lights a sample" if plan.light_samples else ""
+    extra += f", {plan.light_samples} lights per sample" if plan.light_samples else ""
     return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

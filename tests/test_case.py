@@ -98,7 +98,7 @@ def test_every_file_is_named_where_mitsuba_finds_it(rgb, tmp_path, monkeypatch):
 
 
 def test_options_that_are_not_known_are_refused_with_those_that_are():
-    with pytest.raises(InputError, match=r"samples are not known.*spp"):
+    with pytest.raises(InputError, match=r"unknown options samples: .*spp"):
         Request.of({"samples": 4})
     with pytest.raises(InputError, match=r"llvm_mono.*llvm_ad_rgb"):
         Request(variant="llvm_mono")

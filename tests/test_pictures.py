@@ -181,7 +181,7 @@ def test_edges_that_tell_nothing_are_said_to(cornell):
     assert (found.x, found.y) == (None, None)
     record = PictureRecord(files=("x",), transfer=None, repeats=2, shift=None, edges=0.0,
                            ratio=(1.0, 1.0, 1.0))  # fmt: skip
-    assert "do not tell whether it lies" in next(
+    assert "do not show whether it is aligned" in next(
         suspicions.told(record, cornell[0], cornell[0], np.ones((SIDE, SIDE), bool))
     )
 
@@ -198,7 +198,7 @@ def test_a_picture_that_is_turned_over_is_refused_by_its_edges(how):
         registration.measure(TURNED[how](image), expected)
         return
     # Turned by 180 degrees it is the same as upside down, for the same reason.
-    with pytest.raises(InputError, match="the picture is upside down: its edges then agree"):
+    with pytest.raises(InputError, match="the picture is upside down: corrected, its edges"):
         registration.measure(TURNED[how](image), expected)
 
 
@@ -209,7 +209,7 @@ ODD = {
     "pi twice": (lambda image: image / np.pi, "a division by pi too many"),
     "exposure": (lambda image: image * 5, "times as bright as the reference: another exposure"),
     "white": (lambda image: image * [1, 0.9, 0.8], "another white"),
-    "gamma": (picture_files.encoded, "sRGB-encoded: state --transfer srgb"),
+    "gamma": (picture_files.encoded, "sRGB-encoded: give --transfer srgb"),
     "gamma twice": (lambda image: image.clip(0) ** 2.2, "decoded twice"),
     "red and blue": (lambda image: image[..., ::-1], "channels look like blue, green, red"),
     "channels turned": (lambda image: np.roll(image, 1, 2), "channels look like green, blue, red"),
@@ -249,22 +249,22 @@ NAN = np.where(np.arange(8)[None, :, None] == 3, np.nan, GREY)
     ("make", "message"),
     [
         (lambda path: write(path, NAN), r"8 of 64 pixels, the first at .* = \(3, 0\), are NaN"),
-        (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours beyond"),
+        (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours outside"),
         (lambda path: write(path, GREY, alpha=np.full((8, 8), 0.5)), "alpha below 1"),
         (
             lambda path: write(path, GREY, {"chromaticities": (0.708, 0.292, 0.17, 0.797, 0.131,
                                                                0.046, 0.3127, 0.329)}),
-            r"its primaries and white are \(0.708.*BT.709's",
+            r"its primaries and white are \(0.708.*Convert it to BT.709",
         ),
         (
             lambda path: write(path, GREY, {"displayWindow": (np.array([0, 0], np.int32),
                                                               np.array([15, 15], np.int32))}),
             "it is cropped: its data window is 8x8 .* display window 16x16",
         ),
-        (lambda path: path.write_bytes(b"no picture") and str(path), "not an EXR file"),
+        (lambda path: path.write_bytes(b"no picture") and str(path), "not a readable EXR file"),
         (lambda path: f"{path}.tga", "pictures are .exr or .png files"),
         (lambda path: str(path), "there is no such file"),
-        (lambda path: write(path, GREY) + ":beauty", "it has no layer 'beauty', but R, G and B"),
+        (lambda path: write(path, GREY) + ":beauty", "it has R, G and B but no layer 'beauty'"),
     ],
 )  # fmt: skip
 def test_what_is_no_picture_is_refused(rgb, tmp_path, make, message):
@@ -275,7 +275,7 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path, make, message):
 def test_a_png_needs_its_transfer_function(rgb, tmp_path):
     Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(tmp_path / "x.png")
     with pytest.raises(
-        InputError, match=r"a PNG does not say what its values mean.*--transfer srgb"
+        InputError, match=r"a PNG does not state its transfer function.*--transfer srgb"
     ):
         picture_files.read(str(tmp_path / "x.png"))
     with pytest.raises(InputError, match="64 of 64 pixels have an alpha below 1"):
@@ -285,8 +285,8 @@ def test_a_png_needs_its_transfer_function(rgb, tmp_path):
 @pytest.mark.parametrize(
     ("shape", "more", "message"),
     [
-        ((8, 12, 3), {}, "12x8 pixels, an aspect of 1.5, and the scene's film .*x.*, 1"),
-        ((8, 8, 3), {"resolution": (16, 16)}, "8x8 pixels, and --resolution 16x16 is asked for"),
+        ((8, 12, 3), {}, "12x8 pixels, an aspect ratio of 1.5, and the scene's film .*x.*, 1"),
+        ((8, 8, 3), {"resolution": (16, 16)}, "8x8 pixels, and --resolution 16x16 is requested"),
     ],
 )
 def test_another_size_is_refused(rgb, tmp_path, shape, more, message):
@@ -297,9 +297,9 @@ def test_another_size_is_refused(rgb, tmp_path, shape, more, message):
 def test_repeats_are_alike_and_even(rgb, tmp_path):
     files = [write(tmp_path / f"{side}.exr", np.full((side, side, 3), 0.5)) for side in (8, 8, 9)]
     files[1] = write(tmp_path / "other.exr", GREY)
-    with pytest.raises(InputError, match="pictures of 8x8, 9x9: repeats have one size"):
+    with pytest.raises(InputError, match="pictures of 8x8, 9x9: give repeats of one size"):
         picture_of("fig-8-9", tuple(files))
-    with pytest.raises(InputError, match="3 repeats: give an even number"):
+    with pytest.raises(InputError, match="3 repeats: give one, or an even number"):
         picture_of("fig-8-9", (files[0], files[1], files[0]))
     with pytest.raises(InputError, match=r"noise = 1 and 2 repeats: .* Give --spp"):
         picture_of("fig-8-9", (files[0], files[1]), noise=1.0)

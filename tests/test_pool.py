@@ -216,7 +216,7 @@ def test_a_task_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
         pids = (tmp_path / "pids").read_text().split()
         assert ends(*pids)
     assert found["sum"] == 3
-    assert str(found["slow"]) == "slow: it took 3 s without any progress, and was ended."
+    assert str(found["slow"]) == "slow: it made no progress for 3 s, and was ended."
 
 
 def test_what_is_under_way_ends_with_the_pool(tmp_path):
@@ -287,7 +287,7 @@ def test_progress_is_a_sign_of_life():
             Task("silent", time.sleep, (1000,)),
         )
     assert found["slow"] == "alive"
-    assert str(found["silent"]) == "silent: it took 3 s without any progress, and was ended."
+    assert str(found["silent"]) == "silent: it made no progress for 3 s, and was ended."
 
 
 def fork_and(answer):

@@ -1,7 +1,7 @@
-"""Reading pictures from anywhere as linear values: EXR and PNG, and what cannot be one.
+"""Reading pictures (EXR and PNG) as linear values, and rejecting all others.
 
-Values are in units of display white, of BT.709's primaries, as all images here are. A PNG holds
-whatever its program put in it, so that its transfer function has to be stated:
+Values are in units of display white, with the primaries of BT.709, like all images here. A PNG
+does not state its transfer function, so the user must:
 
 ==========  ========================================================================
 Transfer    Linear value of a stored one, ``v`` in 0..1
@@ -30,7 +30,7 @@ SAME_PRIMARIES = 2e-3
 """Largest difference of chromaticities that are the same: some files round them."""
 
 MOST_NEGATIVE = -1e-3
-"""Below this a value is no rounding."""
+"""Below this, a negative value is more than rounding."""
 
 
 def read(word: str, transfer: str | None = None) -> np.ndarray:
@@ -39,15 +39,15 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     Parameters
     ----------
     word
-        Path of a file, ``FILE.exr:LAYER`` of one with layers.
+        Path of a file; ``FILE.exr:LAYER`` for a layer of an EXR file.
     transfer
-        One of :data:`TRANSFERS`; an EXR is linear where it is not given.
+        One of :data:`TRANSFERS`; if omitted, an EXR is linear.
 
     Raises
     ------
     InputError
-        When the file cannot be read, is no picture of opaque colours in BT.709, or is a PNG of
-        which the transfer function is not stated.
+        When the file cannot be read, is not a picture of opaque colours in BT.709, or is a PNG
+        without a stated transfer function.
     NonFiniteError
         When it holds a NaN or an infinity.
     """
@@ -55,7 +55,7 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
         raise unknown("transfer", transfer, TRANSFERS)
     path, layer = _parts(word)
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file. Give a picture, {' or '.join(SUFFIXES)}.")
+        raise InputError(f"{path}: there is no such file. Give a {' or '.join(SUFFIXES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
     _require_finite(image, word)
     if transfer == "srgb":
@@ -65,13 +65,13 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
 
 
 def decoded(image: np.ndarray) -> np.ndarray:
-    """Return the linear values of sRGB-encoded ones."""
+    """Return sRGB-encoded values as linear ones."""
     low = image <= 0.04045
     return np.where(low, image / 12.92, ((np.maximum(image, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def encoded(image: np.ndarray) -> np.ndarray:
-    """Return linear values sRGB-encoded."""
+    """Return linear values as sRGB-encoded ones."""
     image = np.maximum(image, 0)
     low = image <= 0.0031308
     return np.where(low, 12.92 * image, 1.055 * np.maximum(image, 0.0031308) ** (1 / 2.4) - 0.055)
@@ -98,18 +98,18 @@ def _exr(path: Path, layer: str) -> np.ndarray:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header = dict(file.header())
             channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
-    except Exception as error:  # the library says in many ways what is no EXR
-        raise InputError(f"{path}: this is not an EXR file that can be read: {error}.") from error
+    except Exception as error:  # the library raises many types for a file that is not EXR
+        raise InputError(f"{path}: not a readable EXR file: {error}.") from error
     _require_whole(path, header)
     _require_bt709(path, header)
     prefix = f"{layer}." if layer else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
         layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
         if layer and {*"RGB"} <= set(channels):
-            raise InputError(f"{path}: it has no layer {layer!r}, but R, G and B: give {path}.")
+            raise InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
         if not layers:
             raise InputError(
-                f"{path}: its channels are {', '.join(sorted(channels))}. R, G and B are needed."
+                f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
             )
         where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
         raise InputError(
@@ -124,7 +124,7 @@ def _require_whole(path: Path, header: Mapping[str, Any]) -> None:
     if data != display:
         raise InputError(
             f"{path}: it is cropped: its data window is {_box(data)}, its display window"
-            f" {_box(display)}. Write the whole picture."
+            f" {_box(display)}. Save the whole picture."
         )
 
 
@@ -139,21 +139,21 @@ def _require_bt709(path: Path, header: Mapping[str, Any]) -> None:
         return
     shown = ", ".join(f"{value:.4g}" for value in found)
     raise InputError(
-        f"{path}: its primaries and white are ({shown}); BT.709's (sRGB's) are needed:"
-        f" {', '.join(map(str, BT709))}. Convert it."
+        f"{path}: its primaries and white are ({shown}). Convert it to BT.709 (sRGB):"
+        f" {', '.join(map(str, BT709))}."
     )
 
 
 def _png(path: Path, transfer: str | None) -> np.ndarray:
     if transfer is None:
         raise InputError(
-            f"{path}: a PNG does not say what its values mean. Add --transfer srgb for values as"
-            " displays show them, or --transfer linear."
+            f"{path}: a PNG does not state its transfer function. Add --transfer srgb for values"
+            " encoded for displays, or --transfer linear."
         )
     try:
         pixels = np.array(mi.Bitmap(str(path)))
     except RuntimeError as error:
-        raise InputError(f"{path}: this is not a PNG file that can be read: {error}.") from error
+        raise InputError(f"{path}: not a readable PNG file: {error}.") from error
     image = pixels / float(np.iinfo(pixels.dtype).max)
     image = image[..., None] if image.ndim == 2 else image
     colours, rest = (3, image[..., 3:]) if image.shape[2] > 2 else (1, image[..., 1:])
@@ -166,8 +166,8 @@ def _require_opaque(path: Path, alpha: np.ndarray | None) -> None:
         return
     count = int(np.count_nonzero(alpha < 1 - 1 / 512))
     raise InputError(
-        f"{path}: {count} of {alpha.size} pixels have an alpha below 1, by which colours may or may"
-        " not be multiplied. Put the picture over its background, and write it without alpha."
+        f"{path}: {count} of {alpha.size} pixels have an alpha below 1, and their colours may or"
+        " may not be premultiplied. Composite the picture over its background, without alpha."
     )
 
 
@@ -175,17 +175,17 @@ def _require_finite(image: np.ndarray, word: str) -> None:
     wrong = ~np.isfinite(image).all(axis=-1)
     if wrong.any():
         raise NonFiniteError(
-            f"{word}: {_counted(wrong)} NaN or infinite. Mend the picture; such pixels are not"
-            " left out."
+            f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture; such pixels are not"
+            " skipped."
         )
 
 
 def _require_light(image: np.ndarray, word: str) -> None:
-    wrong = (image < MOST_NEGATIVE).any(axis=-1)
+    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
     if wrong.any():
         raise InputError(
-            f"{word}: {_counted(wrong)} negative. Colours beyond BT.709 are negative in it, and so"
-            " are overshoots of a sharpening filter: write linear BT.709 without either."
+            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"
+            " overshoots of a sharpening filter: write linear BT.709 without either."
         )
 
 

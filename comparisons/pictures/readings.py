@@ -1,4 +1,4 @@
-"""Ways in which colours can be read wrongly: each is one declaration, with what undoes it."""
+"""Ways in which colours can be misread: each is one declaration, with its inverse."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,21 +11,21 @@ import numpy as np
 from comparisons.pictures import picture_files
 
 NEAR_PI = 0.05
-"""Relative distance from a factor of pi that is taken for one."""
+"""Relative distance within which a level counts as a factor of pi."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A mistake in the making of colours.
+    """A mistake in encoding colours.
 
     Attributes
     ----------
     told
-        What they look like, in words.
+        The symptom, in words.
     undo
         Returns the right colours (..., 3).
     cure
-        What to do about a picture that is so.
+        What to do about such a picture.
     """
 
     told: str
@@ -35,7 +35,7 @@ class Reading:
 
 def _turned(order: tuple[int, ...]) -> Reading:
     shown = ", ".join(("red", "green", "blue")[place] for place in order)
-    return Reading(f"channels look like {shown}, in this order", partial(_ordered, order))
+    return Reading(f"channels look like {shown}", partial(_ordered, order))
 
 
 def _ordered(order: tuple[int, ...], image: np.ndarray) -> np.ndarray:
@@ -46,15 +46,15 @@ READINGS = (
     Reading(
         "values look sRGB-encoded",
         picture_files.decoded,
-        "state --transfer srgb, or write linear values",
+        "give --transfer srgb, or write linear values",
     ),
-    Reading("values look decoded twice", picture_files.encoded, "state --transfer linear"),
+    Reading("values look decoded twice", picture_files.encoded, "give --transfer linear"),
     *(_turned(order) for order in permutations(range(3)) if order != (0, 1, 2)),
 )
 
 
 def factor_of_pi(level: float) -> str:
-    """Say which factor of pi a level is; empty where it is none."""
+    """Name the factor of pi that a level is close to; empty if none."""
     for factor, mistake in (
         (pi, "a missing division by pi"),
         (1 / pi, "a division by pi too many"),

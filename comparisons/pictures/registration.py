@@ -1,10 +1,10 @@
-"""How far a picture is shifted against our camera, by edges: a shift looks like wrong shading.
+"""How far a picture is shifted from our camera, by its edges: a shift looks like wrong shading.
 
-Edges of the geometry, where the normal or the hit changes, are in any picture of the same scene,
-whatever shades it; so are, mostly, those of the heuristic half, which shows where light ends. The
-edges of the picture are correlated with both at all shifts up to :data:`REACH`, and the better
-agreement counts; a parabola through the highest values tells the part of a pixel. A picture that is
-turned over correlates better once it is turned back.
+Geometric edges, where the normal or the hit changes, are in any picture of the same scene, however
+it is shaded. The heuristic half mostly shares its edges too: it shows where light ends. The
+picture's edges are correlated with both at all shifts up to :data:`REACH`, and the better agreement
+counts; a parabola through the highest values gives the fraction of a pixel. A flipped picture
+correlates better once it is flipped back.
 """
 
 from collections.abc import Sequence
@@ -17,16 +17,16 @@ from heuristic.errors import InputError
 from reference.rendering.gbuffer import gbuffer
 
 REACH = 8
-"""Pixels of the largest shift that is looked for, or a quarter of the picture's smaller side."""
+"""Largest shift considered in pixels, at most a quarter of the picture's smaller side."""
 
 FINER = 4
 """Rays along each side of a pixel."""
 
 LEAST = 0.08
-"""Correlation below which edges tell nothing."""
+"""Correlation below which edges are uninformative."""
 
 CLEARLY = 1.5
-"""Times as high a correlation as upright tells that a picture is turned over."""
+"""A picture counts as flipped if flipping it raises the correlation by this factor."""
 
 TURNED = {
     "upside down": lambda image: image[::-1],
@@ -37,15 +37,15 @@ TURNED = {
 
 @dataclass(frozen=True)
 class Registration:
-    """Where a picture lies.
+    """The position of a picture.
 
     Attributes
     ----------
     x, y
-        Pixels that its content lies to the right and below of where it should; None where its edges
-        do not tell.
+        Pixels by which its content is too far right and too low; None if its edges are
+        uninformative.
     correlation
-        Of the edges, at the best shift, up to 1.
+        Correlation of the edges at the best shift, up to 1.
     """
 
     x: float | None
@@ -62,19 +62,19 @@ def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
 
 
 def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Registration:
-    """Return where an image (H, W, 3) lies against expected edges.
+    """Return the position of an image (H, W, 3) relative to expected edges.
 
     Parameters
     ----------
     image
         Linear, or encoded in any way.
     expected
-        Maps (H, W) of edges that may be in it; the one that agrees best counts.
+        Maps (H, W) of edges that it may contain; the best agreement counts.
 
     Raises
     ------
     InputError
-        When it is turned over.
+        When it is flipped or rotated.
     """
     seen = picture_edges(image)
     found = _best(seen, expected)
@@ -82,8 +82,8 @@ def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Registration:
         other = _best(turn(seen), expected)
         if other.correlation > max(CLEARLY * found.correlation, 2 * LEAST):
             raise InputError(
-                f"the picture is {how}: its edges then agree with the scene's by"
-                f" {other.correlation:.2f} instead of {found.correlation:.2f}. Turn it over, and"
+                f"the picture is {how}: corrected, its edges would correlate with the scene's by"
+                f" {other.correlation:.2f} instead of {found.correlation:.2f}. Correct it, and"
                 " compare again."
             )
     return found
@@ -111,7 +111,7 @@ def _of(seen: np.ndarray, edges: np.ndarray) -> Registration:
     height, width = edges.shape
     reach = max(1, min(REACH, min(height, width) // 4))
     table = _correlations(seen, edges, reach)
-    y, x = np.unravel_index(np.argmax(table), table.shape)
+    y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
     if highest < LEAST:
         return Registration(None, None, highest)
@@ -122,9 +122,9 @@ def _of(seen: np.ndarray, edges: np.ndarray) -> Registration:
 
 
 def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray:
-    """Return the correlation of two maps where they overlap, at each shift of one of them.
+    """Return the correlation of two maps where they overlap, for each shift of one of them.
 
-    (2 reach + 1, 2 reach + 1), of shifts up to ``reach`` pixels.
+    The shape is (2 reach + 1, 2 reach + 1): shifts of up to ``reach`` pixels.
     """
     shifts = range(-reach, reach + 1)
     return np.array(
@@ -142,7 +142,7 @@ def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray
 
 
 def _moved(values: np.ndarray, by: int, axis: int) -> np.ndarray:
-    """Return the part of a map that begins so many pixels later, or ends so many earlier."""
+    """Return a map without its first ``by`` pixels, or without its last ones if ``by`` < 0."""
     part = slice(by, None) if by >= 0 else slice(None, by)
     return values[part] if axis == 0 else values[:, part]
 
@@ -154,7 +154,7 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _vertex(values: np.ndarray, place: int) -> float:
-    """Return how far the top of a parabola through a maximum and its neighbours is from it."""
+    """Return the offset of the vertex of a parabola through a maximum and its neighbours."""
     if not 0 < place < len(values) - 1:
         return 0.0
     before, top, after = values[place - 1 : place + 2]

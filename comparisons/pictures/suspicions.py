@@ -9,35 +9,36 @@ from comparisons.pictures.readings import READINGS, factor_of_pi
 from comparisons.pictures.registration import TURNED
 
 SHIFT = 0.5
-"""Pixels from which a shift is told."""
+"""Smallest shift in pixels that is reported."""
 
 LEVEL = 2.0
-"""Factor of brightness from which the exposure is told."""
+"""Smallest factor of brightness that is reported."""
 
 TINT = 0.05
-"""Relative difference of the channels' factors from which the white is told."""
+"""Smallest relative difference of the channels' factors that is reported as a tint."""
 
 BLOCK = 8
-"""Pixels of the side of a block whose mean colour is looked at."""
+"""Side in pixels of the blocks whose mean colours are compared."""
 
 EVEN = 0.2
-"""Spread of a tint over the picture, as a share of it, up to which it is that of the white."""
+"""Largest spread of a tint over the picture, relative to it, for it to be the white's."""
 
 BETTER = 0.5
-"""Share of the difference that another reading of the values may leave to be believed."""
+"""Largest share of the difference that a credible other reading of the values leaves."""
 
 
 def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
     """Return the means of a picture's channels over those of the reference, both (N, 3)."""
     least = 1e-6
     found = (picture.mean(axis=0) + least) / (reference.mean(axis=0) + least)
-    return tuple(float(value) for value in found)
+    red, green, blue = map(float, found)
+    return red, green, blue
 
 
 def told(
     found: PictureRecord, picture: np.ndarray, reference: np.ndarray, counted: np.ndarray
 ) -> Iterator[str]:
-    """Yield what is odd; where the picture lies comes first.
+    """Yield what is odd, the picture's position first.
 
     Parameters
     ----------
@@ -46,13 +47,13 @@ def told(
     picture, reference
         (H, W, 3), linear.
     counted
-        (H, W), where the scene has a surface.
+        (H, W): True where the scene has a surface.
     """
     yield from _place(found)
     if found.repeats == 1:
         yield (
-            "The picture is one file, whose own noise is not known: it counts as departure. Give"
-            " repeats of other seeds to tell them apart."
+            "The picture is one file, so its noise is unknown and counts as departure. Give"
+            " repeats of other seeds to separate the two."
         )
     reading = _other_reading(picture, reference, counted)
     if reading:
@@ -63,7 +64,7 @@ def told(
 
 
 def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> Iterator[str]:
-    """Tell a white that is another one everywhere; wrong shading is so here and there."""
+    """Yield a tint that is the same everywhere; wrong shading varies over the picture."""
     shown, expected = (_blocks(each, counted) for each in (picture, reference))
     logs = np.log(shown / expected)
     logs -= logs.mean(axis=1, keepdims=True)
@@ -71,11 +72,11 @@ def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> I
     spread = np.median(np.abs(logs - tint), axis=0).max()
     if np.ptp(tint) > TINT and spread < EVEN * np.abs(tint).max():
         relative = ", ".join(f"{value:.3g}" for value in np.exp(tint))
-        yield f"Its red, green and blue are {relative} times as strong beside it: another white?"
+        yield f"Its red, green and blue are relatively {relative} times as strong: another white?"
 
 
 def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """Return means of blocks of pixels that count, (B, 3), where there is light."""
+    """Return the mean colours (B, 3) of blocks, over the pixels that count; never quite black."""
     height, width = (side // BLOCK * BLOCK for side in counted.shape)
     weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
     sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
@@ -85,15 +86,15 @@ def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
 
 def _place(found: PictureRecord) -> Iterator[str]:
     if found.shift is None:
-        yield "The picture's edges do not tell whether it lies where the camera sees the scene."
+        yield "The picture's edges do not show whether it is aligned with the scene's camera."
         return
     x, y = found.shift
     if max(abs(x), abs(y)) >= SHIFT:
         across = f"{abs(x):.1f} pixels to the {'right' if x > 0 else 'left'}"
         down = f"{abs(y):.1f} pixels {'down' if y > 0 else 'up'}"
         yield (
-            f"The picture is shifted by {across} and {down} (by its edges): edges look like wrong"
-            " shading. Check the camera, the crop and the pixel centres before anything else."
+            f"The picture's edges are shifted by {across} and {down}, which looks like wrong"
+            " shading. Check the camera, the crop and the pixel centres first."
         )
 
 
@@ -107,7 +108,7 @@ def _level(found: PictureRecord) -> Iterator[str]:
 
 
 def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> str:
-    """Say by which other reading of its values the picture comes near to the reference."""
+    """Describe the other reading of its values that brings the picture near the reference."""
     plain = _distance(picture[counted], reference[counted])
     if plain < 1e-3:
         return ""
@@ -119,16 +120,16 @@ def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarr
     distances = {
         words: _distance(image[counted], reference[counted]) for words, image in readings.items()
     }
-    words = min(distances, key=distances.get)
+    words = min(distances, key=distances.__getitem__)
     if distances[words] > BETTER * plain:
         return ""
-    return f"The picture is read wrongly. {words}"
+    return f"The picture is misread. {words}"
 
 
 def _distance(image: np.ndarray, reference: np.ndarray) -> float:
     """Return the relative RMS difference after the best factor on an image."""
     image, reference = np.asarray(image, float), np.asarray(reference, float)
-    # On the scale of a display, so that a highlight does not decide alone.
+    # Clipped near display white, or highlights alone would decide.
     image, reference = (np.minimum(each, 4 * each.mean() + 1e-9) for each in (image, reference))
     factor = np.sum(image * reference) / max(np.sum(image * image), 1e-30)
     return float(

@@ -1,9 +1,9 @@
-"""Spreading tasks over processes with Dask: a cluster that runs already, or one made for it.
+"""Spreading tasks over processes with Dask: on a running cluster, or on one made for the run.
 
-It stands in the place of a :class:`comparisons.processes.pool.Pool`. Dask gives the tasks of a lost
-worker to another. A scheduler that is lost ends the run, and the next run goes on where it ended.
-Dask knows neither progress nor a process for each task: a limit of time does not hold here, and
-what a script changes in its worker stays changed.
+It replaces a :class:`comparisons.processes.pool.Pool`. Dask gives the tasks of a lost worker to
+another. A lost scheduler ends the run, and the next run resumes there. Dask offers neither progress
+nor one process per task: time limits do not apply here, and changes that a script makes in its
+worker persist.
 """
 
 import logging
@@ -24,7 +24,7 @@ NEEDED = ("dask", "distributed")
 """The extra `cluster` of pyproject.toml."""
 
 ALLOWED_FAILURES = 30
-"""Workers that may die with a task before it is blamed, in a cluster that this process made."""
+"""Workers that may die during a task before it fails, in a cluster that this process made."""
 
 AHEAD = 4
 """Tasks queued per worker: enough to keep it busy, few enough to lose little."""
@@ -39,7 +39,7 @@ _prepared: list[Prepare] = []
 
 
 def done(prepare: Prepare, function: Callable[..., Any], arguments: tuple, *more: Any) -> Any:
-    """Do a task in a worker; one at a time in a process, since Mitsuba uses its threads."""
+    """Do a task in a worker, one at a time per process: Mitsuba uses all threads."""
     with _one_at_a_time:
         while prepare not in _prepared:
             prepare()
@@ -48,7 +48,7 @@ def done(prepare: Prepare, function: Callable[..., Any], arguments: tuple, *more
 
 
 def silent(*told: object) -> None:
-    """Take progress that nobody hears of."""
+    """Discard progress."""
 
 
 class Cluster:
@@ -57,10 +57,10 @@ class Cluster:
     Parameters
     ----------
     client
-        Dask's, connected.
+        A connected Dask client.
     prepare
-        Called once in each worker, before its first task; it can be pickled, and equals itself
-        afterwards.
+        Called once in each worker, before its first task. It must be picklable, and equal to its
+        pickled copies.
     """
 
     def __init__(self, client: Any, prepare: Prepare) -> None:
@@ -79,7 +79,7 @@ class Cluster:
         return outcome.result()
 
     def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
-        """Do tasks; yields each as it is finished, with its outcome.
+        """Do tasks; yield each with its outcome when it finishes.
 
         The outcome returns what the function returned, or raises the `FotismosError` that it
         raised, or a `LostProcessError` for any other exception.
@@ -92,9 +92,10 @@ class Cluster:
         from distributed import as_completed
         from distributed.client import FutureCancelledError
 
-        waiting, given = iter(tasks), {}
+        waiting = iter(tasks)
+        given: dict[str, Task] = {}
 
-        def submit(some: Iterable[Task]) -> list:
+        def submit(some: Iterable[Task]) -> list[Any]:
             futures = [self._submitted(task) for task in some]
             given.update({future.key: task for future, task in futures})
             return [future for future, _ in futures]
@@ -102,20 +103,20 @@ class Cluster:
         workers = max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
         queue = as_completed(submit(islice(waiting, AHEAD * workers)))
         for future in queue:
-            task, outcome = given.pop(future.key), Future()
+            task, outcome = given.pop(future.key), Future[Any]()
             try:
                 outcome.set_result(future.result())
             except FutureCancelledError as error:
                 if self._client.status != "running":
                     raise LostProcessError(
-                        "the Dask scheduler is gone. All that is finished is kept; run the same"
-                        " command again, and it goes on from there."
+                        "the Dask scheduler is gone. All finished work is kept: run the same"
+                        " command again to resume."
                     ) from error
                 queue.update(submit([task]))  # its result was lost with the worker that held it
                 continue
             except FotismosError as error:
                 outcome.set_exception(error)
-            # A worker that died too often with it, or one that cannot import fotismos.
+            # Its workers died too often, or cannot import fotismos.
             except Exception as error:
                 told = f"{task.name}: {type(error).__name__}: {error}"
                 outcome.set_exception(LostProcessError(told))
@@ -124,7 +125,7 @@ class Cluster:
 
     def _submitted(self, task: Task) -> tuple[Any, Task]:
         more = () if task.progress is None else (silent,)
-        # To Dask two tasks of one key are one and the same, whoever asks.
+        # Dask treats tasks with equal keys as one, whoever submits them.
         key = f"{task.name}-{uuid4()}"
         arguments = self._prepare, task.function, task.arguments, *more
         return self._client.submit(done, *arguments, key=key), task
@@ -149,7 +150,7 @@ def local(workers: int, prepare: Prepare = tuple) -> Iterator[Cluster]:
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": ":0"},  # a free port for what stays of it
+            scheduler_kwargs={"dashboard_address": ":0"},  # a free port for the rest of it
             silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,
@@ -172,7 +173,7 @@ def connected(address: str, prepare: Prepare = tuple) -> Iterator[Cluster]:
     except (OSError, ValueError) as error:
         raise InstallationError(
             f"no Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`, and"
-            " workers with `dask worker ADDRESS --nthreads 1`, in an environment that has fotismos."
+            " workers with `dask worker ADDRESS --nthreads 1`, where fotismos is installed."
         ) from error
     with _quiet(), client:
         yield Cluster(client, prepare)
@@ -180,7 +181,7 @@ def connected(address: str, prepare: Prepare = tuple) -> Iterator[Cluster]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Dask's own words on lost workers and schedulers from the user's terminal."""
+    """Keep Dask's messages about lost workers and schedulers out of the terminal."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     before = [logger.level for logger in loggers]
     for logger in loggers:
@@ -197,7 +198,7 @@ def _distributed() -> Any:
         import distributed
     except ImportError as error:
         raise InstallationError(
-            "a cluster needs Dask, which is not installed. Do:"
+            "a cluster needs Dask, which is not installed. Run:"
             f" {shlex.join([sys.executable, '-m', 'pip', 'install', *NEEDED])}"
         ) from error
     return distributed

@@ -1,4 +1,4 @@
-"""Signals that end a command: the first lets it clear up, a second one ends it at once."""
+"""Signals that end a command: the first lets it clean up, a second ends it at once."""
 
 import os
 import signal
@@ -11,19 +11,19 @@ SIGNALS = {
     for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None))
     if number is not None
 }
-"""Ctrl-C, what ends a job, and the end of a terminal."""
+"""Ctrl-C, the end of a job, and the end of a terminal."""
 
 HELD_BACK = SIGNALS | {signal.SIGALRM}
-"""What can raise an interruption: an alarm stands for a signal that came during an import."""
+"""Signals that can interrupt; an alarm stands for a signal that arrived during an import."""
 
 PAUSE_S = 0.02
-"""Seconds after which a signal that came during an import is looked at again."""
+"""Seconds after which a signal that arrived during an import is tried again."""
 
 _is_held_back = False
 
 
 class Interrupted(KeyboardInterrupt):
-    """A command was told to end; ``exit_code`` is what a shell expects then: 130, 143 or 129."""
+    """A command received a signal to end; ``exit_code`` is what shells expect: 130, 143 or 129."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -39,9 +39,9 @@ def listen() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Let interruptions wait while the block runs, and by the mask in what is started there.
+    """Delay interruptions while the block runs; processes that it starts inherit the mask.
 
-    The mask is of this thread alone: another one may take a signal, and have it handled here.
+    The mask covers this thread alone: another may receive a signal, which is then handled here.
     """
     global _is_held_back
     before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD_BACK)
@@ -64,7 +64,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
             signal.signal(each, lambda number, _: os._exit(128 + number))
     if not (_is_held_back or _is_importing(frame)):
         raise Interrupted(number)
-    # Native modules that are just loaded crash, or swallow what is raised: later, then.
+    # A native module that is loading would crash or swallow the exception, so try again later.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))
     signal.setitimer(signal.ITIMER_REAL, PAUSE_S)
 

@@ -1,7 +1,7 @@
-"""Processes that work is given to, so that a task which kills its process takes no other along.
+"""A pool of processes: a task that kills its process harms no other task.
 
-A process does task after task, so that its start-up is paid once; a new one takes the place of one
-that died, or that ran code of a user's (:func:`comparisons.processes.worker.end_after_task`).
+A process does task after task, so its start-up is paid once. A new one replaces one that died, or
+that ran a user's code (:func:`comparisons.processes.worker.end_after_task`).
 """
 
 import os
@@ -16,7 +16,7 @@ from typing import Any
 from comparisons.processes.worker import GRACE_S, Task, Worker
 
 LOOK_S = 1.0
-"""Seconds between looks at whether a process lives: what it forked may hold its pipe open."""
+"""Seconds between checks that a process lives: its forks may hold its pipe open."""
 
 
 def cores() -> int:
@@ -27,17 +27,17 @@ def cores() -> int:
 
 
 class Pool:
-    """Does tasks in processes of their own; a context that ends the processes.
+    """Does tasks in separate processes; a context that ends the processes.
 
     Parameters
     ----------
     count
-        Processes at the same time, at most. With 0 the tasks are done in this process, one after
-        another and without a limit.
+        Most processes at the same time. With 0 the tasks are done in this process, one after
+        another and without a time limit.
     prepare
         Called once in each process, before its first task.
     limit_s
-        Seconds that a task may take without a sign of progress, start-up included.
+        Seconds that a task may take without reporting progress, start-up included.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Pool:
         self.end()
 
     def start(self) -> None:
-        """Start the processes now, so that they get ready while this one does other things."""
+        """Start the processes now: they get ready while this one does other things."""
         while len(self._idle) + len(self._busy) < self._count:
             self._idle.append(Worker(self._prepare))
 
@@ -64,11 +64,11 @@ class Pool:
         return outcome.result()
 
     def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
-        """Do tasks; yields each as it is finished, with its outcome.
+        """Do tasks; yield each with its outcome when it finishes.
 
         The outcome returns what the function returned, or raises the `FotismosError` that it
-        raised. In a process apart it raises a `LostProcessError` for any other exception, for a
-        process that ended, and when the time is over.
+        raised. In a separate process it raises a `LostProcessError` for any other exception, for a
+        process that ended, and when the time is up.
         """
         if self._count == 0:
             self._prepare()
@@ -79,11 +79,11 @@ class Pool:
         self._fill(waiting)
         while self._busy:
             finished = self._finished()
-            self._fill(waiting)  # so that no process waits for what is done with the results
+            self._fill(waiting)  # no process waits while the caller handles results
             yield from finished
 
     def end(self) -> None:
-        """End the processes, whatever they do."""
+        """End the processes, whatever they are doing."""
         workers, self._idle, self._busy = self._idle + self._busy, [], []
         for worker in workers:
             worker.pipe.close()
@@ -106,7 +106,7 @@ class Pool:
         worker.give(task, self._limit_s, is_second_try)
 
     def _finished(self) -> list[tuple[Task, Future[Any]]]:
-        """Wait for messages, or the end of somebody's time; return the tasks that are over."""
+        """Wait for messages or the next deadline; return the tasks that are over."""
         first = min(worker.deadline for worker in self._busy)
         ready = connection.wait(
             [worker.pipe for worker in self._busy],
@@ -118,7 +118,7 @@ class Pool:
             elif not worker.process.is_alive():
                 worker.gone()
             elif worker.deadline <= monotonic():
-                worker.lose(f"it took {self._limit_s:g} s without any progress, and was ended.")
+                worker.lose(f"it made no progress for {self._limit_s:g} s, and was ended.")
         over = [worker for worker in self._busy if worker.outcome.done()]
         self._busy = [worker for worker in self._busy if worker not in over]
         killed = [worker for worker in over if worker.was_killed and not worker.is_second_try]

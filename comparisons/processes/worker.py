@@ -1,7 +1,7 @@
-"""One process that does tasks, as seen from the process that asks and from within.
+"""One process that does tasks, as seen by its parent and from within.
 
-Each leads a process group of its own, which ends as a whole: with the process, when its time is
-over, and when the process that asked for the work ends, in whatever way.
+Each leads its own process group, which ends as a whole: with the process, when its time is up, or
+when the parent ends in any way.
 """
 
 import logging
@@ -24,37 +24,37 @@ from comparisons.processes.interruption import HELD_BACK, held_back
 from heuristic.errors import FotismosError, LostProcessError
 
 FIRST_VICTIM = Path("/proc/self/oom_score_adj")
-"""Where Linux reads which process to end first when memory runs out."""
+"""Where Linux reads how readily to kill a process when memory runs out."""
 
 GUARD = ("/bin/sh", "-c", "read _; kill -9 0")
-"""Ends its process group as soon as there is nobody left who could write to its input."""
+"""Ends its process group as soon as no process is left that could write to its input."""
 
 GRACE_S = 1.0
 """Seconds in which a process may end by itself."""
 
 PAUSE_S = 0.01
-"""Seconds between looks at whether a process that was told to end has ended."""
+"""Seconds between checks whether a process has ended."""
 
 LOGGER = logging.getLogger(__name__)
-"""Told where an unexpected error came from."""
+"""Receives the traceback of unexpected errors."""
 
 _numbers = count()
 _is_spent = False
 
 
 def end_after_task() -> None:
-    """End this process of a pool once its task is done: other tasks are to find a clean one."""
+    """End this process of a pool once its task is done: other tasks need a clean one."""
     global _is_spent
     _is_spent = True
 
 
 @dataclass(frozen=True)
 class Task:
-    """A call of ``function(*arguments)``, both of which can be pickled.
+    """A call of ``function(*arguments)``, both of them picklable.
 
-    ``name`` stands in messages. ``progress``, where it is given, is called in the process that
-    asked; the function takes what calls it as one more argument. A process that somebody kills
-    loses nothing: the task is given to another one, once.
+    ``name`` appears in messages. ``progress``, if given, is called in the parent; the function
+    takes a callable that forwards to it as its last argument. If its process is killed, the task
+    is given to another one, once.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Task:
 
 
 class Worker:
-    """One process, as seen from the one that asked."""
+    """One process, as seen by its parent."""
 
     task: Task
     outcome: Future[Any]
@@ -78,13 +78,14 @@ class Worker:
         self.pipe, theirs = context.Pipe()
         self._folder = _temporary_folder()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
-        resource_tracker.ensure_running()  # here, for it lets signals through afterwards
+        resource_tracker.ensure_running()  # here, because it unblocks signals
         with held_back(), _temporary_files_in(self._folder):
             self.process.start()
-        theirs.close()  # so that the end of the process is the end of the pipe
+        theirs.close()  # the end of the process must be the end of the pipe
         self._send(prepare)
 
     def give(self, task: Task, limit_s: float, is_second_try: bool = False) -> None:
+        """Send a task, which has ``limit_s`` seconds until its first sign of progress."""
         self.task, self.outcome, self.number = task, Future(), next(_numbers)
         self.is_second_try = is_second_try
         self.deadline = monotonic() + limit_s
@@ -97,38 +98,40 @@ class Worker:
         except (EOFError, OSError):
             self.gone()
             return
-        except Exception as error:  # whatever cannot be unpickled here
+        except Exception as error:  # unpickling can raise anything
             self.lose(f"its answer cannot be read: {type(error).__name__}: {error}")
             return
-        if number != self.number:  # an answer to nothing that was asked
+        if number != self.number:  # an answer to no task of ours
             return
         self.deadline = monotonic() + limit_s
         if kind == "progress":
-            self.task.progress(*content)
+            if self.task.progress:
+                self.task.progress(*content)
         elif kind == "unexpected":
             self.outcome.set_exception(LostProcessError(f"{self.task.name}: {content}"))
         else:
             getattr(self.outcome, kind)(content)
 
     def gone(self) -> None:
-        """Say as the outcome of the task that the process ended."""
+        """Fail the task because the process ended."""
         code = self.end()
         self.was_killed = code == -signal.SIGKILL
         self.lose(_reason(code))
 
     def lose(self, reason: str) -> None:
-        """End the process, and say why as the outcome of its task."""
+        """End the process, and fail its task for that reason."""
         self.end()
         self.outcome.set_exception(LostProcessError(f"{self.task.name}: {reason}"))
 
     def end(self, grace_s: float = GRACE_S) -> int | None:
-        """End the process with its group, and return its exit code; nothing of it is left."""
+        """End the process and its group, delete its files, and return its exit code."""
         self.is_spent = True
         self.pipe.close()
         until = monotonic() + grace_s
-        # Not by `join`, which waits for ever for a process that closed all its files.
+        # Not `join`: it waits forever for a process that closed all its files.
         while self.process.is_alive() and monotonic() < until:
             sleep(PAUSE_S)
+        assert self.process.pid is not None
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
@@ -146,16 +149,16 @@ class Worker:
 
 
 def _reason(code: int | None) -> str:
-    """Say what is known about a process that ended."""
+    """Return why a process ended."""
     if code == -signal.SIGKILL:
-        return "its process was killed (SIGKILL), most often by the system when memory runs out."
+        return "its process was killed (SIGKILL), usually because memory ran out."
     if code is not None and code < 0:
         return f"its process died of {signal.Signals(-code).name} in native code."
     return f"its process ended with exit code {code}."
 
 
 def _temporary_folder() -> str | None:
-    """Make a folder for temporary files of one process; None where there is no place for any."""
+    """Make a folder for the temporary files of one process; None if that is impossible."""
     try:
         return mkdtemp(prefix="fotismos-")
     except OSError:
@@ -164,7 +167,7 @@ def _temporary_folder() -> str | None:
 
 @contextmanager
 def _temporary_files_in(folder: str | None) -> Iterator[None]:
-    """Let processes that are started meanwhile, and theirs, put temporary files into a folder."""
+    """Direct temporary files of processes started in the block, and of theirs, to a folder."""
     before = os.environ.get("TMPDIR")
     if folder:
         os.environ["TMPDIR"] = folder
@@ -178,7 +181,7 @@ def _temporary_files_in(folder: str | None) -> Iterator[None]:
 
 
 def _processes_of(folder: str) -> Iterator[int]:
-    """Yield processes that began with that folder, in whatever group or session they are."""
+    """Yield the processes that started with that folder, in any group or session."""
     mark = b"TMPDIR=" + os.fsencode(folder) + b"\0"
     for place in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):
@@ -187,17 +190,19 @@ def _processes_of(folder: str) -> Iterator[int]:
 
 
 def _work(pipe: Any) -> NoReturn:
-    """Do what comes through the pipe, until it is closed."""
+    """Do the tasks that come through the pipe, until it is closed."""
     os.setpgid(0, 0)
-    os.set_inheritable(pipe.fileno(), False)  # by what this starts: its end is the pipe's
+    os.set_inheritable(pipe.fileno(), False)  # children must not keep it open
     os.register_at_fork(after_in_child=pipe.close)  # only this process answers
-    os.dup2(2, 1)  # standard output is for the results of the process that asked
-    guard = subprocess.Popen(GUARD, stdin=parent_process().sentinel)  # noqa: F841  lives as long
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told as well, and ends this
+    os.dup2(2, 1)  # standard output is for the parent's results
+    parent = parent_process()
+    assert parent is not None
+    guard = subprocess.Popen(GUARD, stdin=parent.sentinel)  # noqa: F841  lives as long
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it too, and ends this process
     signal.pthread_sigmask(signal.SIG_UNBLOCK, HELD_BACK)
     if FIRST_VICTIM.exists():
         FIRST_VICTIM.write_text("1000")
-    waiting = [_asked(pipe)]  # what prepares, until it has
+    waiting = [_asked(pipe)]  # the preparation, until it succeeds
     while True:
         number, *call = _asked(pipe)
         _tell(pipe, number, *_answer(pipe, number, waiting, *call))
@@ -207,7 +212,7 @@ def _asked(pipe: Any) -> Any:
     try:
         return pipe.recv()
     except (EOFError, OSError):
-        os._exit(0)  # nobody is there any more
+        os._exit(0)  # the parent is gone
 
 
 def _answer(
@@ -215,10 +220,10 @@ def _answer(
     number: int,
     waiting: list[Callable[[], object]],
     function: Callable[..., Any],
-    arguments: tuple,
+    arguments: tuple[Any, ...],
     with_progress: bool,
 ) -> tuple[str, Any]:
-    """Return how a task ended, and what of it: the method of its outcome to call, and with what."""
+    """Do a task; return the method of its outcome to call, and the argument."""
 
     def progress(*told: Any) -> None:
         _tell(pipe, number, "progress", told)
@@ -230,7 +235,7 @@ def _answer(
         return "set_result", function(*arguments, *([progress] if with_progress else []))
     except FotismosError as error:
         return "set_exception", error
-    except BaseException as error:  # Ctrl-C is ignored here: whatever comes is the task's own
+    except BaseException as error:  # Ctrl-C is ignored here: this is the task's own
         LOGGER.info("a task failed", exc_info=True)
         return "unexpected", f"{type(error).__name__}: {error}"
 
@@ -238,8 +243,8 @@ def _answer(
 def _tell(pipe: Any, number: int, kind: str, content: Any) -> None:
     try:
         pipe.send((number, kind, content, _is_spent))
-    except OSError:  # nobody listens, or this is the fork of a process that answers
+    except OSError:  # the parent is gone, or this is a fork
         os._exit(0)
-    except Exception as error:  # what cannot be pickled
+    except Exception as error:  # pickling can raise anything
         told = f"its result cannot be sent: {type(error).__name__}: {error}"
         pipe.send((number, "unexpected", told, _is_spent))

@@ -1,4 +1,4 @@
-"""Studies: comparisons over a space of parameters, one row of one dataset each.
+"""Studies: comparisons over a parameter space, each a row of one dataset.
 
 A worker process of a cluster imports this package before anything else of fotismos.
 """

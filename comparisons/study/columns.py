@@ -1,15 +1,19 @@
 """The columns of a study's dataset: unit and meaning of each."""
 
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from reference.effects import EFFECTS
 
+Row: TypeAlias = dict[str, Any]
+"""Values by column."""
+
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its unit, ``1`` for pure numbers, its meaning, and its Python type."""
+    """A column: its unit (``1`` for pure numbers), its meaning, and its Python type."""
 
     unit: str
     meaning: str
@@ -18,11 +22,11 @@ class Column:
 
 STEPPED = tuple(effect for effect in EFFECTS if effect.step)
 STEPS = ("form", *(effect.label for effect in STEPPED))
-"""What lies between the halves, in the order in which it is added to the heuristic image: the form
-of BSDFs and lights, and then one effect after the other."""
+"""The steps between the halves, in the order in which they are added to the heuristic image: the
+form of BSDFs and lights, then one effect after another."""
 
 DIMMED = {"quarter": 1 / 4, "sixteenth": 1 / 16}
-"""Parts of the light at which the departure is told too: what is visible depends on it."""
+"""Further light levels at which the departure is measured: visibility depends on the level."""
 
 LUMINANCE = "display-linear, 1 for a white diffuse surface that faces the light"
 IDENTITY = {
@@ -58,24 +62,24 @@ CHANGES = {
     "peak_reference": Column(
         "deg", "view angle at which the reference's specular part peaks, in the plane of incidence"
     ),
-    "miss": Column("1", "largest relative miss of the pairing, 0 where it is met"),
-    "error": Column("", "why there is no result; empty where there is one", str),
+    "miss": Column("1", "largest relative miss of the pairing, 0 if it is exact"),
+    "error": Column("", "why there is no result; empty if there is one", str),
 }
 
 
-def results():
-    """Return the columns of results; those of the departure are those of the metrics."""
+def results() -> dict[str, Column]:
+    """Return the columns of results, including the departure in each metric."""
     name, label = LEADING.name, LEADING.label
     departure = {
         name: Column("1", LEADING.heading),
         f"{name}_p95": Column("1", f"{label}, 95th percentile"),
-        f"{name}_noise": Column("1", f"{label} that the noise of the comparison alone would give"),
+        f"{name}_noise": Column("1", f"{label} that the noise of the comparison alone would cause"),
         f"{name}_shape": Column("1", f"{label}, mean, after the best exposure"),
         **{
             f"{name}_{part}": Column("1", f"{label}, mean, under a {part} of the light")
             for part in DIMMED
         },
-        "exposure": Column("1", f"factor on the heuristic image that makes {label} smallest"),
+        "exposure": Column("1", f"factor on the heuristic image that minimises {label}"),
     }
     departure |= {name: Column("1", metric.heading) for name, metric in METRICS.items()}
     departure[RATIO.name] = Column(RATIO.unit, "mean ratio of luminances, heuristic to reference")

@@ -1,7 +1,9 @@
 """Rows as one Parquet file, with units, meanings and provenance in its schema."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeGuard
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -9,19 +11,19 @@ import pyarrow.parquet as pq
 from comparisons import atomic
 from comparisons.record import versions
 from comparisons.store import require_regular
-from comparisons.study.columns import IDENTITY, PARAMETERS, Column, results
-from comparisons.study.design import OWN
+from comparisons.study.columns import IDENTITY, PARAMETERS, Column, Row, results
+from comparisons.study.design import OWN, Study
 from heuristic.errors import InputError
 
 TYPES = {str: pa.string(), int: pa.int64(), float: pa.float64()}
 
 
-def table(study, rows):
+def table(study: Study, rows: list[Row]) -> pa.Table:
     """Return the rows of a study as a ``pyarrow.Table``.
 
     Each field's metadata has ``unit`` and ``description``; the schema's has ``title``, ``study``
-    (the TOML text) and ``versions`` (JSON). Columns that no row has are left out; of the others,
-    what a row does not have is null. No time or place is noted, so that equal studies are equal.
+    (the TOML text) and ``versions`` (JSON). Columns without any value are omitted; other missing
+    values are null. No time or place is recorded, so equal studies give equal tables.
     """
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
@@ -47,14 +49,14 @@ def table(study, rows):
     return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in rows], schema)
 
 
-def _meaning(path):
+def _meaning(path: str) -> str:
     if path.startswith(OWN):
         return "parameter that the heuristic declares"
     return "parameter of the scene, by its path"
 
 
-def fits(rows, points):
-    """Tell whether something read from a file is rows of these points, as :func:`table` takes."""
+def fits(rows: object, points: Sequence[dict[str, float]]) -> TypeGuard[list[Row]]:
+    """Return whether an object read from a file is rows of these points, fit for :func:`table`."""
     if not isinstance(rows, list) or len(rows) != len(points):
         return False
     known = IDENTITY | PARAMETERS | results()
@@ -69,13 +71,13 @@ def fits(rows, points):
     return True
 
 
-def _is_of(column, value):
+def _is_of(column: Column, value: object) -> bool:
     if column.kind is float and type(value) is int:
         return abs(value) < 2**53
     return value is None or type(value) is column.kind
 
 
-def write(path, data):
+def write(path: str | Path, data: pa.Table) -> None:
     """Write a table to a Parquet file, atomically.
 
     Raises
@@ -86,20 +88,20 @@ def write(path, data):
     atomic.write(Path(path), file_of(data))
 
 
-def file_of(data):
+def file_of(data: pa.Table) -> bytes:
     """Return the Parquet file of a table as bytes."""
     stream = pa.BufferOutputStream()
     pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
     return stream.getvalue().to_pybytes()
 
 
-def read(path):
+def read(path: str | Path) -> pa.Table:
     """Read a dataset.
 
     Raises
     ------
     InputError
-        When it is missing, or no Parquet file.
+        When it is missing, or is not a Parquet file.
     """
     try:
         require_regular(path)

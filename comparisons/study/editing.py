@@ -1,22 +1,27 @@
 """Scenes that serve many points: made once per structure, and edited through ``mitsuba.traverse``.
 
-Two graphs have one structure if they differ at most in values that :data:`EDITABLE` names. The
-scenes of the first are then edited into those of the second, which makes nothing again that does
-not depend on the values, and leaks nothing.
+Two graphs have the same structure if they differ only in values that :data:`EDITABLE` names. The
+first one's scenes are then edited into the second one's, which leaks nothing and rebuilds only what
+depends on the values.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any, TypeAlias
 
 import mitsuba as mi
 import numpy as np
 
+from heuristic.arrays import Scene
 from heuristic.errors import InputError
 from reference.pairing import lights
-from reference.scene.graph import Reference
+from reference.scene.graph import Graph, Reference
 from reference.scene.values import COLOURS
 
-EDITABLE = {
+Convert: TypeAlias = Callable[[Mapping[str, Any]], Any]
+
+EDITABLE: dict[str, dict[str, tuple[str, Convert | None]]] = {
     "phong": {
         "k_a": ("k_a.value", None),
         "k_d": ("k_d.value", None),
@@ -34,99 +39,100 @@ EDITABLE = {
     },
     "diffuse": {"reflectance": ("reflectance.value", None)},
     "disk": {"to_world": ("to_world", lambda props: _transform(props["to_world"]))},
-} | {
-    plugin: {key: (name, None) for key, name in names.items()}
-    for kind in lights.KINDS
-    for plugin, names in kind.edits.items()
+    **{
+        plugin: {key: (name, None) for key, name in names.items()}
+        for kind in lights.KINDS
+        for plugin, names in kind.edits.items()
+    },
 }
-"""Values that can be edited: for each plugin and property, the name that ``mitsuba.traverse`` has
-for it, and how it is made out of the properties where it is not the property itself."""
+"""Editable values: for each plugin and property, its name in ``mitsuba.traverse``, and a function
+that makes the value from the properties if it is not the property itself."""
 
 
 @dataclass
 class _Made:
-    graph: object
-    scene: object
-    parameters: object
+    graph: Graph
+    scene: Scene
+    parameters: Any
 
 
 class Kept:
-    """One Mitsuba scene for the graphs that come one after another, edited where that is possible.
+    """One Mitsuba scene for successive graphs, edited if possible.
 
     ``made`` counts the scenes that were made.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.made = 0
-        self._kept = None
+        self._kept: _Made | None = None
 
-    def scene(self, graph):
+    def scene(self, graph: Graph) -> Scene:
         """Return a Mitsuba scene of a graph: the cached one, edited, or a new one."""
         if self._kept is not None:
-            edits = self._edits_of(graph)
+            edits = _edits(self._kept, graph)
             if edits is not None:
-                self._apply(edits, graph)
+                self._apply(self._kept, edits, graph)
                 return self._kept.scene
         scene = graph.instantiate()
         self._kept = _Made(graph, scene, mi.traverse(scene))
         self.made += 1
         # Editing moves values out of the kernels' code. Done at once, all points share kernels.
-        self._apply(self._edits_of(graph, every=True), graph)
+        self._apply(self._kept, _edits(self._kept, graph, every=True) or {}, graph)
         return scene
 
-    def _edits_of(self, graph, every=False):
-        """Return the values to set, by Mitsuba's names, ``every`` one or those that differ.
-
-        None where the graph has another structure, so that editing would not do.
-        """
-        old, places = self._kept.graph, _places(graph)
-        if places != _places(old):
-            return None
-        edits = {}
-        for index, place in places.items():
-            if old.plugin(index) != graph.plugin(index):
-                return None
-            before, after = dict(old.props(index).items()), dict(graph.props(index).items())
-            if before.keys() != after.keys():
-                return None
-            for key, value in after.items():
-                same = _same(before[key], value)
-                if same and not every:
-                    continue
-                name, convert = _editable(graph.plugin(index), key)
-                path = f"{place}.{name}"
-                known = name is not None and path in self._kept.parameters
-                if known and type(before[key]) is type(value):
-                    edits[path] = convert(after) if convert else value
-                elif not same:
-                    return None
-        return edits
-
-    def _apply(self, edits, graph):
-        parameters = self._kept.parameters
+    def _apply(self, kept: _Made, edits: dict[str, Any], graph: Graph) -> None:
         try:
             for key, value in edits.items():
-                parameters[key] = value
-            parameters.update()
+                kept.parameters[key] = value
+            kept.parameters.update()
         except Exception:
             self._kept = None  # half edited
             raise
-        self._kept.graph = graph
+        kept.graph = graph
 
 
-def _editable(plugin, key):
-    """Return what :data:`EDITABLE` says; parameters of a heuristic have names of their own."""
+def _edits(kept: _Made, graph: Graph, every: bool = False) -> dict[str, Any] | None:
+    """Return the values to set, by Mitsuba's names: all editable ones, or those that differ.
+
+    None if the graph has another structure, which editing cannot give.
+    """
+    old, places = kept.graph, _places(graph)
+    if places != _places(old):
+        return None
+    edits = {}
+    for index, place in places.items():
+        if old.plugin(index) != graph.plugin(index):
+            return None
+        before, after = dict(old.props(index).items()), dict(graph.props(index).items())
+        if before.keys() != after.keys():
+            return None
+        for key, value in after.items():
+            same = _same(before[key], value)
+            if same and not every:
+                continue
+            name, convert = _editable(graph.plugin(index), key)
+            path = f"{place}.{name}"
+            known = name is not None and path in kept.parameters
+            if known and type(before[key]) is type(value):
+                edits[path] = convert(after) if convert else value
+            elif not same:
+                return None
+    return edits
+
+
+def _editable(plugin: str, key: str) -> tuple[str | None, Convert | None]:
+    """Return the entry of :data:`EDITABLE`; parameters of a heuristic keep their names."""
     if plugin == "heuristic":
         return key, None
     return EDITABLE.get(plugin, {}).get(key, (None, None))
 
 
-def _transform(given):
-    """Return a transform in the variant's own precision; the parser keeps doubles."""
+def _transform(given: Any) -> Any:
+    """Return a transform in the variant's precision; the parser keeps doubles."""
     return mi.ScalarTransform4f(np.array(given.matrix, np.float32))
 
 
-def _same(a, b):
+def _same(a: Any, b: Any) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
         return a.index() == b.index()
     if hasattr(a, "matrix") and hasattr(b, "matrix"):
@@ -134,8 +140,8 @@ def _same(a, b):
     return repr(a) == repr(b)
 
 
-def _places(graph):
-    """Return the name under which Mitsuba finds each node, by index, as far as it has one."""
+def _places(graph: Graph) -> dict[int, str]:
+    """Return Mitsuba's names of the nodes, by index."""
     places, queue = {0: ""}, [0]
     while queue:
         parent = queue.pop(0)
@@ -149,8 +155,8 @@ def _places(graph):
     return places
 
 
-def set_values(graph, values):
-    """Put other values at some places of a user's scene.
+def set_values(graph: Graph, values: dict[str, float]) -> None:
+    """Set values in a user's scene.
 
     Parameters
     ----------
@@ -158,18 +164,18 @@ def set_values(graph, values):
         The scene.
     values
         Numbers by path, ``<id of the element>.<parameter>``, such as ``"red.reflectance"``. The
-        scene must state the parameter, as a number or as RGB, which becomes a grey.
+        scene must state the parameter as a number, or as RGB, which becomes grey.
 
     Raises
     ------
     InputError
-        When a path leads nowhere or to something that is not a number.
+        When a path does not lead to a number or a colour.
     """
     for path, value in values.items():
         _set(graph, path, value)
 
 
-def _set(graph, path, value):
+def _set(graph: Graph, path: str, value: float) -> None:
     identifier, _, key = path.rpartition(".")
     found = [i for i in graph.nodes_in_use() if graph.props(i).id() == identifier]
     if not found or key not in graph.props(found[0]):
@@ -185,10 +191,10 @@ def _set(graph, path, value):
         )
     props = graph.props(found[0])
     if not _is_number(props[key]):
-        raise InputError(f"{graph.name}: {path} is not a number, and cannot be varied yet.")
+        raise InputError(f"{graph.name}: {path} is not a number or RGB. Vary one that is.")
     is_colour = isinstance(props[key], COLOURS)
     props[key] = mi.ScalarColor3f(value) if is_colour else value
 
 
-def _is_number(value):
+def _is_number(value: object) -> bool:
     return isinstance(value, (Real, *COLOURS)) and not isinstance(value, bool)

@@ -1,5 +1,7 @@
 """The departure of two images, or of two sets of directions, as the columns of a row."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from msgspec.structs import replace
 
@@ -8,13 +10,25 @@ from comparisons.departure.metric import Pixelwise, checked_pair
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from comparisons.study.columns import DIMMED
+from reference.pairing.factors import Miss
 
 
-def measure(heuristic, reference, counted, noise=None):
-    """Return the columns that all scenes have, over the pixels ``counted`` (H, W).
+def measure(
+    heuristic: np.ndarray,
+    reference: np.ndarray,
+    counted: np.ndarray,
+    noise: np.ndarray | None = None,
+) -> dict[str, float]:
+    """Return the columns that all scenes have.
 
-    heuristic, reference, noise
-        Linear images (H, W, 3); the noise belongs to their difference.
+    Parameters
+    ----------
+    heuristic, reference
+        Linear images (H, W, 3).
+    counted
+        Pixels (H, W) that count.
+    noise
+        Noise (H, W, 3) of the difference.
     """
     summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
@@ -38,15 +52,15 @@ def measure(heuristic, reference, counted, noise=None):
     }
 
 
-def largest_miss(misses):
-    """Return the largest relative miss of a pairing, 0 where nothing is missed."""
+def largest_miss(misses: Iterable[Miss]) -> float:
+    """Return the largest relative miss of a pairing, 0 if it is exact."""
     return max((abs(miss.reached / miss.wanted - 1) for miss in misses if miss.wanted), default=0.0)
 
 
-def measure_each(heuristic, reference):
-    """Return the columns of single values (N,) of grey, one array each.
+def measure_each(heuristic: np.ndarray, reference: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of single grey values (N,), one array each.
 
-    A single value has no shape; what a best exposure would leave is nothing.
+    The shape column is missing: the best exposure would remove all departure of a single value.
     """
     test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
     pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}
@@ -59,10 +73,10 @@ def measure_each(heuristic, reference):
     }
 
 
-def _dimmed(test, truth):
-    """Return the leading metric of each pixel (N, 3) under the parts :data:`DIMMED` of the light.
+def _dimmed(test: np.ndarray, truth: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the leading metric of each pixel (N, 3) under the light levels :data:`DIMMED`.
 
-    Both models are linear in the light: less of it is a lower exposure on both images.
+    Both models are linear in the light: less light is a lower exposure on both images.
     """
     return {
         part: LEADING(test, truth, replace(DEFAULT_VIEWING, exposure=factor))

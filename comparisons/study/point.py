@@ -1,5 +1,6 @@
-"""One block of points to rows: a pure function, the same in any process."""
+"""Evaluating one block of points as rows: a pure function, the same in any process."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
@@ -10,10 +11,12 @@ import numpy as np
 
 from comparisons import record
 from comparisons.study import rendered, surface
+from comparisons.study.columns import Row
 from comparisons.study.design import Part
 from comparisons.study.editing import set_values
 from comparisons.study.measure import largest_miss, measure, measure_each
-from comparisons.study.scenes import SCENES
+from comparisons.study.scenes import SCENES, Point
+from comparisons.study.surface import Material
 from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
@@ -23,7 +26,7 @@ from reference.scene.identity import digest
 
 VARIANT = "llvm_ad_rgb"
 PEAK_STEP = 0.05
-"""Degrees between the directions among which a lobe's peak is sought."""
+"""Degrees between the directions searched for a lobe's peak."""
 
 LARGEST_BLOCK = 4096
 
@@ -35,20 +38,20 @@ class Block:
     Attributes
     ----------
     first
-        Number of the first.
+        Number of the first point.
     identity
-        Digest of the part's scene and heuristic with every file that they read, and of the versions
-        in use.
+        Digest of the part's scene and heuristic, with every file that they read, and of the
+        versions in use.
     """
 
     part: Part
     first: int
-    points: tuple[dict, ...]
+    points: tuple[Point, ...]
     identity: str
 
     @property
-    def key(self):
-        """A name made out of all that the rows depend on, so that equal blocks are done once."""
+    def key(self) -> str:
+        """A name from all that the rows depend on: equal blocks are done once."""
         part = self.part
         content = {
             "scene": part.scene,
@@ -63,8 +66,8 @@ class Block:
         return sha256(dumps(content).encode()).hexdigest()[:32]
 
 
-def blocks(part):
-    """Return the blocks of a part: single points, or those that differ in directions alone.
+def blocks(part: Part) -> list[Block]:
+    """Return the blocks of a part: single points, or points that differ only in directions.
 
     Raises
     ------
@@ -75,13 +78,14 @@ def blocks(part):
     scene = SCENES.get(part.scene)
     together = scene.together if scene else ()
 
-    def alike(numbered):
+    def alike(numbered: tuple[int, Point]) -> int | list[float]:
         number, point = numbered
         if not together:
             return number
         return [value for name, value in point.items() if name not in together]
 
-    found, first = [], 0
+    found: list[Block] = []
+    first = 0
     for _, group in groupby(enumerate(part.points()), alike):
         points = [point for _, point in group]
         for begin in range(0, len(points), LARGEST_BLOCK):
@@ -91,20 +95,20 @@ def blocks(part):
     return found
 
 
-def _identity(part):
+def _identity(part: Part) -> str:
     _prepare()
     own = "" if part.scene in SCENES else digest(rendered.opened(part.scene))
     told = [own, named(part.heuristic).digest(), record.versions()]
     return sha256(dumps(told, sort_keys=True).encode()).hexdigest()
 
 
-def check(part):
-    """Ensure that a part's scene and heuristic are there, and that paths lead to numbers.
+def check(part: Part) -> None:
+    """Ensure that a part's scene and heuristic exist, and that paths lead to numbers.
 
     Raises
     ------
     InputError
-        Naming what is not there.
+        Naming what does not exist.
     """
     _prepare()
     known = {each.name: each for each in named(part.heuristic).parameters}
@@ -122,17 +126,17 @@ def check(part):
             raise InputError(f"part {part.name!r}: {error}") from error
 
 
-def rows(block):
-    """Evaluate a block; return one row per point, as dictionaries.
+def rows(block: Block) -> list[Row]:
+    """Evaluate a block; return one row per point.
 
-    A point that fails has its parameters and, in the column ``error``, what went wrong.
+    The row of a point that fails has its parameters and, in the column ``error``, the reason.
     """
     _prepare()
     part = block.part
+    error = None
     try:
         results = _results(part, block)
-        error = None
-    # Whatever went wrong with one point must not end a study of thousands.
+    # A failing point must not end a study of thousands.
     except Exception as failure:
         kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
         results, error = [{} for _ in block.points], f"{kind}{failure}"
@@ -142,13 +146,13 @@ def rows(block):
     ]
 
 
-def _prepare():
+def _prepare() -> None:
     set_variant(VARIANT)
     plugins.register()
     direct.register()
 
 
-def _results(part, block):
+def _results(part: Part, block: Block) -> list[Row]:
     if part.scene == "patch":
         return _patch(part, block.points)
     if part.scene == "lobe":
@@ -156,8 +160,8 @@ def _results(part, block):
     return [rendered.row(part, point, block.identity) for point in block.points]
 
 
-def _patch(part, points):
-    """Return what is seen of a surface of one material from one direction each."""
+def _patch(part: Part, points: Sequence[Point]) -> list[Row]:
+    """Return the columns of views of a surface of one material, one direction per point."""
     material = surface.material(points[0], part.convention)
     angles = {
         name: np.array([point[name] for point in points])
@@ -177,10 +181,10 @@ def _patch(part, points):
     ]
 
 
-def _lobe(part, point):
-    """Return the departure over all views, the albedos, and where the specular part peaks.
+def _lobe(part: Part, point: Point) -> Row:
+    """Return the departure over all views, the albedos, and the peak of the specular part.
 
-    Statistics are over views of equal projected solid angle: each sees as much of the surface.
+    Statistics are over views of equal projected solid angle.
     """
     material, angle = surface.material(point, part.convention), point["light_angle"]
     plane = surface.direction(np.arange(0, 90, PEAK_STEP), 0.0)
@@ -189,7 +193,8 @@ def _lobe(part, point):
     view = np.concatenate(parts, axis=1)
     light = np.broadcast_to(surface.direction(angle, 180.0), view.shape)
     splits = np.cumsum([part.shape[1] for part in parts])[:-1]
-    result, images = _shared(material), []
+    result: Row = _shared(material)
+    images = []
     for name, radiance in (
         ("heuristic", surface.heuristic_radiance(material.phong, light, view)),
         ("reference", surface.reference_radiance(material.plastic, light, view)),
@@ -203,9 +208,9 @@ def _lobe(part, point):
         highest = in_plane > in_plane.max() * (1 - 1e-6)
         if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
             result[f"peak_{name}"] = float(np.argmax(in_plane)) * PEAK_STEP
-    counted = np.ones(images[0].shape[:2], bool)
-    return result | measure(*images, counted)
+    test, truth = images
+    return result | measure(test, truth, np.ones(test.shape[:2], bool))
 
 
-def _shared(material):
+def _shared(material: Material) -> dict[str, float]:
     return material.values() | {"miss": largest_miss(material.misses)}

@@ -1,39 +1,54 @@
-"""Running a study: which points are left, where they are done, and what is kept of them.
+"""Running a study: which points are left, where they are done, and how they are kept.
 
-Every finished block is a file of its own at once, under a name made out of all that it depends on.
-So a run that ends early loses nothing, and the next one repeats nothing.
+Each finished block is saved at once in its own file, named by everything that it depends on. So a
+run that ends early loses nothing, and the next one repeats nothing.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+import pyarrow as pa
 
 from comparisons.processes.pool import Pool
 from comparisons.processes.worker import Task
 from comparisons.store import Entry
 from comparisons.study import dataset, point
+from comparisons.study.columns import Row
+from comparisons.study.design import Study
 from comparisons.study.point import Block
 from heuristic.errors import LostProcessError
+from reference.rendering.passes import Progress
+
+if TYPE_CHECKING:
+    from comparisons.processes.cluster import Cluster
+
+Spread: TypeAlias = Callable[[list[Block]], Iterable[tuple[Block, list[Row]]]]
+"""Does blocks, and yields each with its rows as it finishes, in any order."""
 
 POINTS = "points"
-"""Folder of the finished blocks."""
+"""Folder of finished blocks."""
 
 WORTH_A_PROCESS = 16
-"""Blocks below which the start of a process costs more than it saves."""
+"""Fewest blocks that repay the start of another process."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A study that has run: the dataset, and how many points were done, cached, and failed."""
+    """A finished study: the dataset, and how many points were done, cached, and failed."""
 
-    table: object
+    table: pa.Table
     done: int
     cached: int
     failed: int
 
 
-def all_blocks(study):
-    """Return the blocks of points of a study, of :class:`comparisons.study.point.Block`.
+def all_blocks(study: Study) -> list[Block]:
+    """Return the blocks of points of a study.
 
     Raises
     ------
@@ -45,8 +60,14 @@ def all_blocks(study):
     return [block for part in study.parts for block in point.blocks(part)]
 
 
-def run(study, folder, spread=None, progress=None, blocks=None):
-    """Do the points of a study that are not done yet, and put all together.
+def run(
+    study: Study,
+    folder: str | Path,
+    spread: Spread | None = None,
+    progress: Progress | None = None,
+    blocks: list[Block] | None = None,
+) -> Outcome:
+    """Do the points of a study that are not done yet, and gather all.
 
     Points that failed in an earlier run are done again.
 
@@ -55,15 +76,14 @@ def run(study, folder, spread=None, progress=None, blocks=None):
     study : comparisons.study.design.Study
         The study.
     folder
-        Where finished blocks are kept, in ``points/``.
+        Keeps finished blocks, in ``points/``.
     spread : callable, optional
-        Takes a list of blocks and yields ``(block, rows)`` as they are finished, in any order
-        (:func:`processes`, :func:`workers_of`). If omitted, all are done in
-        this process.
+        Takes a list of blocks and yields ``(block, rows)`` as they finish, in any order
+        (:func:`processes`, :func:`workers_of`). If omitted, this process does all.
     progress : callable, optional
         Called as ``progress(stage, done, total)`` with numbers of points.
     blocks : optional
-        What :func:`all_blocks` returned elsewhere: it reads the scenes, and runs scripts.
+        The result of :func:`all_blocks`, if called elsewhere: it reads scenes and runs scripts.
 
     Returns
     -------
@@ -72,7 +92,7 @@ def run(study, folder, spread=None, progress=None, blocks=None):
     Raises
     ------
     InputError
-        As :func:`all_blocks`, before anything is rendered.
+        See :func:`all_blocks`; before anything is rendered.
     """
     blocks = all_blocks(study) if blocks is None else blocks
     kept = Path(folder) / POINTS
@@ -83,7 +103,7 @@ def run(study, folder, spread=None, progress=None, blocks=None):
         rows = (entries[block.key].load() or {}).get("rows")
         if dataset.fits(rows, block.points) and not _failed(rows):
             found[block.key] = rows
-    # Parts may share points; these are done once.
+    # Points that parts share are done once.
     left = list({block.key: block for block in blocks if block.key not in found}.values())
     total = sum(len(block.points) for block in blocks)
     cached = done = total - sum(len(block.points) for block in left)
@@ -98,22 +118,27 @@ def run(study, folder, spread=None, progress=None, blocks=None):
     return Outcome(dataset.table(study, rows), done - cached, cached, _failed(rows))
 
 
-def processes(count, ready=lambda workers: tuple, limit_s=inf):
-    """Return what spreads blocks over so many processes of this machine, as `run` takes it.
+def processes(
+    count: int,
+    ready: Callable[[int], Callable[[], object]] = lambda workers: tuple,
+    limit_s: float = inf,
+) -> Spread:
+    """Return a function for :func:`run` that spreads blocks over processes of this machine.
 
-    ``ready(workers)`` returns what gets one of so many ready to render, and ``limit_s`` is as of
-    :class:`comparisons.processes.pool.Pool`; with a ``count`` of 0 this process does all.
+    There are at most ``count`` processes; with 0 this process does all. ``ready(workers)`` returns
+    the function that prepares each of them; for ``limit_s`` see
+    :class:`comparisons.processes.pool.Pool`.
 
-    A small point is half Python and NumPy, which keep one core busy whatever Mitsuba's threads do;
-    several processes keep all of them busy.
+    Small points spend half their time in Python and NumPy, which use one core whatever Mitsuba's
+    threads do; several processes use all cores.
 
     Raises
     ------
     LostProcessError
-        While it runs, when one of the processes ends.
+        While running, when one of the processes ends.
     """
 
-    def spread(blocks):
+    def spread(blocks: list[Block]) -> Iterator[tuple[Block, list[Row]]]:
         workers = min(count, len(blocks) // WORTH_A_PROCESS + 1)
         with Pool(workers, ready(workers), limit_s) as pool:
             for task, rows in pool.each(_tasks(blocks)):
@@ -121,21 +146,20 @@ def processes(count, ready=lambda workers: tuple, limit_s=inf):
                     yield task.arguments[0], rows.result()
                 except LostProcessError as error:
                     raise LostProcessError(
-                        f"{error} All finished points are kept; run the same command again, and it"
-                        " goes on from there."
+                        f"{error} All finished points are kept: run the same command again to"
+                        " resume."
                     ) from error
 
     return spread
 
 
-def workers_of(cluster):
-    """Return what spreads blocks over a cluster, as `run` takes it.
+def workers_of(cluster: Cluster) -> Spread:
+    """Return a function for :func:`run` that spreads blocks over a cluster.
 
-    A block that is not done has rows that say why. ``cluster`` is a
-    :class:`comparisons.processes.cluster.Cluster`.
+    The rows of a block that fails give the reason.
     """
 
-    def spread(blocks):
+    def spread(blocks: list[Block]) -> Iterator[tuple[Block, list[Row]]]:
         for task, rows in cluster.each(_tasks(blocks)):
             (block,) = task.arguments
             error = rows.exception()
@@ -144,24 +168,24 @@ def workers_of(cluster):
     return spread
 
 
-def _tasks(blocks):
+def _tasks(blocks: list[Block]) -> list[Task]:
     return [Task(f"points of {block.part.name}", point.rows, (block,)) for block in blocks]
 
 
-def _failing(block, reason):
+def _failing(block: Block, reason: str) -> list[Row]:
     return [
         {"part": block.part.name, "point": block.first + number, **values, "error": reason}
         for number, values in enumerate(block.points)
     ]
 
 
-def _named(block: Block, rows):
-    """Give rows the part and numbers of this block; it may have stood elsewhere before."""
+def _named(block: Block, rows: list[Row]) -> list[Row]:
+    """Give rows the part and numbers of this block, which may have had others before."""
     return [
         row | {"part": block.part.name, "point": block.first + number}
         for number, row in enumerate(rows)
     ]
 
 
-def _failed(rows):
+def _failed(rows: list[Row]) -> int:
     return sum(row["error"] is not None for row in rows)

@@ -1,27 +1,36 @@
-"""What a study can vary: parametrised scenes of the project's own, and their parameters.
+"""The built-in study scenes, and their parameters.
 
-Two need no image. A flat surface under parallel light is one radiance in each direction, and the
-kernel and Mitsuba's BSDF give it at once (:mod:`comparisons.study.surface`). The others are
-rendered. All materials are grey. Lights give the irradiance ``pi`` where the surface (the centre of
-the sphere) faces them, so that a white diffuse surface has the value 1 there.
+Two need no image: a flat surface under parallel light has one radiance per direction, which the
+kernel and Mitsuba's BSDF give directly (:mod:`comparisons.study.surface`). The others are rendered.
+All materials are grey. Lights give the irradiance ``pi`` where the surface (the centre of the
+sphere) faces them: a white diffuse surface has the value 1 there.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, inf, radians, sin, tan
+from typing import Any, TypeAlias
 
 import mitsuba as mi
 
+Point: TypeAlias = dict[str, float]
+"""Values by parameter."""
+
+Dict: TypeAlias = dict[str, Any]
+"""What ``mitsuba.load_dict`` takes."""
+
+Vector: TypeAlias = tuple[float, float, float]
+
 CAMERA_DISTANCE, LIGHT_DISTANCE = 8.0, 10.0
-"""Of the scene ``sphere``, in radii: the lamp, however large, is behind the camera."""
+"""For ``sphere``, in radii: a lamp of any size is behind the camera."""
 
 ROOM, CEILING = 4.0, 3.9
-"""Of the scene ``enclosure``, in radii: half the room's side, and the lamp's height."""
+"""For ``enclosure``, in radii: half the room's side, and the lamp's height."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: its unit, allowed range (``low`` and ``high`` included), and meaning."""
+    """A parameter: its unit, inclusive range, default, and meaning."""
 
     unit: str
     low: float
@@ -57,22 +66,22 @@ class StudyScene:
     title
         A sentence on what is compared.
     parameters
-        Its own named parameters; each scene has those of one of the two materials besides.
+        Its own parameters; each scene also has those of one of the two materials.
     make
-        Makes the dictionary for ``mitsuba.load_dict`` out of a point and a BSDF; None for scenes
-        that are evaluated without an image.
+        Makes the dictionary for ``mitsuba.load_dict`` from a point and a BSDF; None for scenes
+        that are not rendered.
     together
-        Parameters that vary within one block of points, because they are evaluated at once.
+        Parameters that vary within one block of points, which is evaluated at once.
     """
 
     title: str
     parameters: dict[str, Parameter]
-    make: Callable[[dict, dict], dict] | None = None
+    make: Callable[[Point, Dict], Dict] | None = None
     together: tuple[str, ...] = ()
 
 
-def bsdf(point):
-    """Return the dictionary of the material that a point gives, ``roughplastic`` or ``phong``."""
+def bsdf(point: Point) -> Dict:
+    """Return the dictionary of a point's material, ``roughplastic`` or ``phong``."""
     if "n" in point:
         return {"type": "phong", "k_d": point["k_d"], "k_s": point["k_s"], "n": point["n"]}
     return {
@@ -84,7 +93,7 @@ def bsdf(point):
     }
 
 
-def _sphere(point, material):
+def _sphere(point: Point, material: Dict) -> Dict:
     angle = radians(point["light_angle"])
     place = (LIGHT_DISTANCE * sin(angle), 0.0, LIGHT_DISTANCE * cos(angle))
     return {
@@ -96,7 +105,7 @@ def _sphere(point, material):
     }
 
 
-def _enclosure(point, material):
+def _enclosure(point: Point, material: Dict) -> Dict:
     return {
         "type": "scene",
         "integrator": {"type": "path", "hide_emitters": True},
@@ -112,13 +121,13 @@ def _enclosure(point, material):
     }
 
 
-def _lamp(place, distance, size):
-    """A disk that faces the origin: seen under an angle, it gives the irradiance ``pi`` there.
+def _lamp(place: Vector, distance: float, size: float) -> Dict:
+    """Return a disk of a given angular size that faces the origin, with irradiance ``pi`` there.
 
     A disk of radiance ``L`` and half angle ``a`` gives ``E = pi L sin^2(a)`` on its axis.
     """
     half = radians(size) / 2
-    # Any vector will do that is not parallel to the axis; lamps are in the plane y = 0.
+    # `up` must not be parallel to the axis; lamps are in the plane y = 0.
     to_world = mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 1, 0))
     return {
         "type": "disk",
@@ -128,7 +137,7 @@ def _lamp(place, distance, size):
     }
 
 
-def _camera(place, target, up, field_of_view):
+def _camera(place: Vector, target: Vector, up: Vector, field_of_view: float) -> Dict:
     return {
         "type": "perspective",
         "fov": field_of_view,
@@ -158,7 +167,7 @@ SCENES = {
         _enclosure,
     ),
 }
-"""The named scenes. Any other scene can be studied through paths to its parameters."""
+"""The study scenes by name. Other scenes are studied through paths to their parameters."""
 
 UNLIMITED = Parameter("", -inf, inf, 0, "a parameter of the scene, by its path")
-"""What is known of a parameter of a user's own scene."""
+"""Any parameter of a user's scene."""

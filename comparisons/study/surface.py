@@ -1,18 +1,21 @@
 """A flat surface under parallel light, evaluated without an image: kernel against Mitsuba's BSDF.
 
 The light has the heuristic intensity 1, so the irradiance ``pi`` on a surface that faces it. The
-surface lies in the plane z = 0, the light in the plane y = 0 on the side of negative x, so that its
-mirror image is at the azimuth 0. Directions point away from the surface.
+surface lies in the plane z = 0, and the light in the plane y = 0 at negative x, so its mirror image
+is at azimuth 0. Directions point away from the surface.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
 import heuristic
+from comparisons.study.scenes import Point
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
 from reference.pairing import factors
@@ -20,21 +23,21 @@ from reference.pairing.albedo import RoughPlastic
 from reference.pairing.factors import Convention, Miss, Phong
 
 HEIGHTS, AZIMUTHS = 240, 120
-"""Directions of the quadrature over the hemisphere, half of it for symmetry."""
+"""Directions of the quadrature over half the hemisphere; the other half is symmetric."""
 
 VIEW_HEIGHTS, VIEW_AZIMUTHS = 96, 64
 
 
 @dataclass(frozen=True)
 class Material:
-    """A material in both models, with what the pairing misses."""
+    """A material in both models, with the misses of the pairing."""
 
     phong: Phong
     plastic: RoughPlastic
     misses: tuple[Miss, ...]
 
-    def values(self):
-        """Return the values of all parameters of both models, by their names in a study."""
+    def values(self) -> dict[str, float]:
+        """Return a study's parameters of both models."""
         return {
             "alpha": self.plastic.alpha,
             "int_ior": self.plastic.int_ior,
@@ -47,7 +50,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Radiance:
-    """What is seen of the surface, (N,) each: the sum of diffuse and specular part, and the latter.
+    """The radiance of the surface, (N,) each: in all, and of the specular part alone.
 
     Display-linear: a white diffuse surface that faces the light has the value 1.
     """
@@ -56,41 +59,41 @@ class Radiance:
     specular: np.ndarray
 
 
-def material(point, convention):
-    """Return the :class:`Material` of a point, which has the parameters of one of the models."""
+def material(point: Point, convention: Convention) -> Material:
+    """Return the material of a point, which has the parameters of one of the models."""
     if "n" in point:
-        grey = [(point[name],) * 3 for name in ("k_d", "k_s")]
-        return _of_phong(Phong(*grey, point["n"]), convention)
+        k_d, k_s = ((point[name],) * 3 for name in ("k_d", "k_s"))
+        return _of_phong(Phong(k_d, k_s, point["n"]), convention)
     grey = (point["reflectance"],) * 3
     return _of_plastic(RoughPlastic(grey, point["alpha"], point["int_ior"]), convention)
 
 
 @lru_cache(maxsize=256)
-def _of_phong(phong: Phong, convention: Convention):
+def _of_phong(phong: Phong, convention: Convention) -> Material:
     if not any(phong.k_s):
-        # Pairing makes it a plain diffuse surface, which a roughplastic is not.
+        # Pairing makes it plain diffuse, not roughplastic.
         return Material(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
     plastic, misses = factors.to_roughplastic(phong, convention)
     return Material(phong, plastic, tuple(misses))
 
 
 @lru_cache(maxsize=256)
-def _of_plastic(plastic: RoughPlastic, convention: Convention):
+def _of_plastic(plastic: RoughPlastic, convention: Convention) -> Material:
     phong, misses = factors.to_phong(plastic, convention)
     return Material(phong, plastic, tuple(misses))
 
 
-def direction(theta, phi):
+def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
     """Return unit vectors (3, N) from polar angles and azimuths in degrees."""
     angles = np.broadcast_arrays(np.atleast_1d(theta), phi)
-    theta, phi = map(np.deg2rad, angles)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    t, p = map(np.deg2rad, angles)
+    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
 
 
-def heuristic_radiance(phong, light, view):
-    """Return the :class:`Radiance` of the kernel, for directions (3, N) of light and viewer.
+def heuristic_radiance(phong: Phong, light: np.ndarray, view: np.ndarray) -> Radiance:
+    """Return the kernel's radiance, for directions (3, N) of light and viewer.
 
-    All numbers are opaque, so that one kernel serves all materials and directions.
+    All numbers are opaque, so one kernel serves all materials and directions.
     """
     number = dr.leaf_t(mi.Float)
     k_d, k_s, n = (dr.opaque(number, v) for v in (phong.k_d[0], phong.k_s[0], phong.n))
@@ -111,8 +114,8 @@ def heuristic_radiance(phong, light, view):
     return Radiance(*(np.array(part, float) for part in parts))
 
 
-def reference_radiance(plastic, light, view):
-    """Return the :class:`Radiance` of Mitsuba's BSDF, for directions (3, N) of light and viewer."""
+def reference_radiance(plastic: RoughPlastic, light: np.ndarray, view: np.ndarray) -> Radiance:
+    """Return the radiance of Mitsuba's BSDF, for directions (3, N) of light and viewer."""
     bsdf = _bsdf(plastic)
     si = dr.zeros(mi.SurfaceInteraction3f, light.shape[1])
     si.wi = mi.Vector3f(view)
@@ -129,7 +132,7 @@ def reference_radiance(plastic, light, view):
 
 
 @lru_cache(maxsize=8)
-def _bsdf(plastic: RoughPlastic):
+def _bsdf(plastic: RoughPlastic) -> Any:
     if plastic.int_ior == plastic.ext_ior:
         return mi.load_dict({"type": "diffuse", "reflectance": plastic.diffuse_reflectance[0]})
     return mi.load_dict(
@@ -148,7 +151,7 @@ def _bsdf(plastic: RoughPlastic):
 class Hemisphere:
     """Directions of the viewer over half the hemisphere, with weights for means and albedos.
 
-    ``weight`` is in proportion to the projected solid angle, and adds up to 1.
+    ``weight`` is proportional to the projected solid angle, and sums to 1.
     """
 
     view: np.ndarray
@@ -156,22 +159,22 @@ class Hemisphere:
 
 
 @lru_cache(maxsize=1)
-def hemisphere():
-    """Return the :class:`Hemisphere` by Gauss-Legendre nodes in polar angle and in azimuth."""
+def hemisphere() -> Hemisphere:
+    """Return the Gauss-Legendre nodes in polar angle and azimuth."""
     x, w = np.polynomial.legendre.leggauss(HEIGHTS)
-    theta, w = (x + 1) * 45, w / 2
+    w = w / 2
     y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
-    phi, v = (y + 1) * 90, v / 2
-    theta, phi = np.meshgrid(theta, phi)
+    v = v / 2
+    theta, phi = np.meshgrid((x + 1) * 45, (y + 1) * 90)
     weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
     return Hemisphere(direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum())
 
 
 @lru_cache(maxsize=1)
-def views():
-    """Return directions of the viewer, (3, N), each for the same projected solid angle.
+def views() -> np.ndarray:
+    """Return directions of the viewer, (3, N), of equal projected solid angle.
 
-    Over half the hemisphere: the centres of cells of equal steps in ``sin^2(theta)`` and azimuth.
+    They cover half the hemisphere: centres of cells equal in ``sin^2(theta)`` and azimuth.
     """
     height = (np.arange(VIEW_HEIGHTS) + 0.5) / VIEW_HEIGHTS
     azimuth = (np.arange(VIEW_AZIMUTHS) + 0.5) * 180 / VIEW_AZIMUTHS
@@ -179,8 +182,8 @@ def views():
     return direction(theta.ravel(), phi.ravel())
 
 
-def albedo(radiance, light_angle):
-    """Return the share of the light that leaves the surface, from radiances over the hemisphere.
+def albedo(radiance: np.ndarray, light_angle: float) -> float:
+    """Return the share of the light that leaves the surface, from radiances on :func:`hemisphere`.
 
     ``pi mean(L) / (pi cos(theta))``, the mean over projected solid angle: exitance over
     irradiance.

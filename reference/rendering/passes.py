@@ -4,7 +4,7 @@ In turn, so a drift of the machine affects all equally. All renderers take the s
 their camera rays are the same, and pixel filter and edges cancel in a difference.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -54,8 +54,8 @@ def passes(
     stream: Stream = Stream.COMPARED,
     progress: Progress | None = None,
     stage: str = "rendering",
-) -> Iterator[Pass]:
-    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each when done.
+) -> Generator[Pass, None, None]:
+    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each as it is done.
 
     Parameters
     ----------

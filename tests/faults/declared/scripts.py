@@ -187,7 +187,7 @@ def faults() -> Iterator[Fault]:
         yield Fault(name, words, "bad", (0, 1, 2), prepare, RESULTS, leaves, ours=("bad.py",))
     for name, code in NEVER_ENDS.items():
         words = (*one, "--timeout", "12")
-        yield Fault(f"without end: {name}", words, "12 s without any progress", (1,), _script(code))
+        yield Fault(f"without end: {name}", words, "no progress for 12 s", (1,), _script(code))
     for name, code in TO_PARENT.items():
         prepare = _script(f"{PARENT}os.kill(parent, signal.{name})\ntime.sleep(100)")
         yield Fault(f"{name} to the command", one, "interrupted", (code,), prepare)

@@ -96,7 +96,7 @@ def faults() -> Iterator[Fault]:
     for name, words, message in SMALL_WORDS:
         yield Fault(name, words, message, prepare=prepare)
     yield Fault(
-        "a timeout that is over at once", (*compare(), "--timeout", "1e-9"), "without any progress",
+        "a timeout that is over at once", (*compare(), "--timeout", "1e-9"), "made no progress",
         (1,), prepare,
     )  # fmt: skip
     yield Fault("-o of no name", ("compare", "a.xml", "-o", "", *SMALL), "out", (0, 2), prepare)
