@@ -113,4 +113,4 @@ def test_the_command_answers_and_its_exit_code_tells_whether_there_is_one(run, m
     assert said.startswith("No measured method stays within")
     code, _, said = run(*words, "--within", 1, "--verify")
     assert code == 2
-    assert "ask one at a time" in said
+    assert "give one" in said
