@@ -65,7 +65,7 @@ def annotate(
     Raises
     ------
     InputError
-        When a file cannot be written to.
+        If a file cannot be written to.
     """
     variables = os.environ if environment is None else environment
     try:

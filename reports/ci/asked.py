@@ -87,7 +87,7 @@ def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
     Raises
     ------
     InputError
-        When it cannot be written to.
+        If it cannot be written to.
     """
     if path is None:
         return
