@@ -9,13 +9,13 @@ from heuristic.program import VARIABLE
 
 
 def main() -> None:
-    """Run the command line, which signals may end at any moment."""
+    """Run the command line, which a signal may end at any moment."""
     interruption.listen()
     _open_standard_streams()
     if Path(sys.argv[0]).name == "__main__.py":
         os.environ.setdefault(VARIABLE, "python -m reports")
     try:
-        from reports import cli  # within reach of the signals
+        from reports import cli  # a signal may also interrupt this import
 
         cli.main()
     except KeyboardInterrupt as error:
@@ -23,7 +23,7 @@ def main() -> None:
 
 
 def _open_standard_streams() -> None:
-    """Give the streams that are closed to nobody, lest other files get their numbers."""
+    """Open closed standard streams to the null device, lest other files get their numbers."""
     for number in range(3):
         try:
             os.fstat(number)

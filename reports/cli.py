@@ -1,7 +1,7 @@
 """The command line.
 
 Exit codes: 0 done; 1 a check failed; 2 bad input or installation; 130, 143 and 129 after Ctrl-C,
-SIGTERM and SIGHUP. A mistake of the user's gets one message on standard error, never a traceback.
+SIGTERM and SIGHUP. A user's mistake gets one message on standard error, never a traceback.
 """
 
 import os
@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 import click
 
@@ -23,7 +24,7 @@ from reports.commands.completion import VARIABLE
 
 
 class Commands(Mapping[str, click.Command]):
-    """The commands by name: one a module of `reports.commands`, imported when it is asked for."""
+    """The commands by name: one per module of `reports.commands`, imported on demand."""
 
     def __getitem__(self, name: str) -> click.Command:
         if name not in set(self):
@@ -38,9 +39,9 @@ class Commands(Mapping[str, click.Command]):
 
 
 class Group(click.Group):
-    """A group that knows what a mistyped command was meant to be."""
+    """A group that suggests a command for a mistyped one."""
 
-    def resolve_command(self, context: click.Context, words: list[str]):
+    def resolve_command(self, context: click.Context, words: list[str]) -> Any:
         """Find the command that the first word names."""
         word = words[0]
         if self.get_command(context, word) is None and not word.startswith("-"):
@@ -57,24 +58,24 @@ class Group(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="fotismos")
-def cli():
+def cli() -> None:
     """Textbook shading against physically based rendering, scene by scene.
 
     \b
     Examples:
       fotismos compare fig-8-9              how far, where, and is it more than noise?
-      fotismos compare my_scene.xml         the same of a Mitsuba scene of yours
+      fotismos compare my_scene.xml         the same for your own Mitsuba scene
       fotismos plan cornell-box             which effects does it call for?
       fotismos cost cornell-box             what does accuracy cost in time?
       fotismos fit fig-8-9                  the model's fault, or its parameters'?
       fotismos report                       all built-in scenes in one page
 
-    Colours and bars are for terminals alone, and NO_COLOR=1 switches colours off.
+    Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
 
 
-def main():
-    """Run the command line; the exit code says how it went."""
+def main() -> None:
+    """Run the command line, and exit with its code."""
     try:
         code = cli(
             prog_name=shlex.join(program()),
@@ -83,7 +84,7 @@ def main():
         )
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
         click.echo(
-            "fotismos: interrupted; finished scenes are kept, and the same command goes on.",
+            "fotismos: interrupted; finished scenes are kept, and the same command resumes.",
             err=True,
         )
         sys.exit(interruption.code_of(error.__cause__ or error))
@@ -93,7 +94,7 @@ def main():
     except FotismosError as error:
         click.echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
-    except BrokenPipeError:  # who read our output has seen enough
+    except BrokenPipeError:  # the reader of the output closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
     except OSError as error:  # standard output on a full disk, above all
@@ -101,5 +102,5 @@ def main():
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(2)
     else:
-        if code:  # what a command left with, which is None where it said nothing
+        if code:  # None if the command set none
             sys.exit(code)

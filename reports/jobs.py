@@ -1,4 +1,4 @@
-"""The options that commands share, and what their words ask for."""
+"""Options that commands share, and the requests and processes made from them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import click
 from click.shell_completion import CompletionItem
@@ -25,27 +24,32 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from comparisons.case import Request
-    from comparisons.processes.cluster import Cluster
 
 
-def resolution(text):
+Command = TypeVar("Command", bound=Callable[..., Any])
+Decorator: TypeAlias = Callable[[Any], Any]
+
+
+def resolution(text: str) -> tuple[int, int]:
     """Parse ``WIDTHxHEIGHT``, two positive integers."""
     width, separator, height = text.lower().partition("x")
     if not (separator and width.isdecimal() and height.isdecimal()):
-        raise click.BadParameter(f"{text!r} is no resolution; write it like 512x512.")
+        raise click.BadParameter(f"{text!r} is not a resolution; write it like 512x512.")
     return int(width), int(height)
 
 
-def _definition(text):
+def _definition(text: str) -> tuple[str, str]:
     """Parse ``NAME=VALUE`` for a placeholder ``$NAME`` of a scene file."""
     name, separator, value = text.partition("=")
     if not (separator and name):
-        raise click.BadParameter(f"{text!r} is no parameter; write it like name=value.")
+        raise click.BadParameter(f"{text!r} is not a definition; write it like name=value.")
     return name, value
 
 
-def complete_scene(context, parameter, beginning):
-    """Complete a SCENE: the built-in ones that begin so, or else files."""
+def complete_scene(
+    context: click.Context, parameter: click.Parameter, beginning: str
+) -> list[CompletionItem]:
+    """Complete a SCENE: built-in ones with this beginning, or else files."""
     from comparisons.gallery.builtin import SCENES
 
     named = [name for name in SCENES if name.startswith(beginning)]
@@ -54,12 +58,12 @@ def complete_scene(context, parameter, beginning):
 
 
 def require_known(names: Iterable[str]) -> None:
-    """Ensure, before anything is loaded, that there are such files, folders and built-in scenes.
+    """Ensure, before anything is loaded, that these files, folders or built-in scenes exist.
 
     Raises
     ------
     InputError
-        Naming what was probably meant.
+        With a suggestion.
     """
     from comparisons.gallery.builtin import builtin
 
@@ -69,13 +73,13 @@ def require_known(names: Iterable[str]) -> None:
             if name and path.exists():
                 continue
         except OSError as error:
-            raise InputError(f"{name[:60]!r}: {error.strerror}. Give a scene's name.") from error
+            raise InputError(f"{name[:60]!r}: {error.strerror}. Give a scene.") from error
         if path.suffix in (".xml", ".py") or path.parent.name:
             siblings = {str(path.with_name(one)) for one in _names_in(path.parent)}
             raise InputError(
                 f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
-                " (.xml), a Python file that makes one (.py), a folder of such, or the name of a"
-                f" built-in scene; `{program.command('scenes')}` lists them."
+                " (.xml), a Python file that makes one (.py), a folder of scenes, or a built-in"
+                f" scene; `{program.command('scenes')}` lists them."
             )
         builtin(name)
 
@@ -94,7 +98,7 @@ scenes_argument = click.argument(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
-def output_option(default):
+def output_option(default: str) -> Decorator:
     """Return the option for the folder of the results."""
     return click.option(
         "-o",
@@ -112,50 +116,50 @@ figures_option = click.option(
 fresh_option = click.option(
     "--fresh",
     is_flag=True,
-    help="Render all scenes; without it, finished ones are found again in OUTPUT.",
+    help="Render all scenes again; without it, finished ones in OUTPUT are reused.",
 )
 
 
-def rendering_options(command):
-    """Add the options that all commands which render have in common."""
+def rendering_options(command: Command) -> Command:
+    """Add the options of all commands that render."""
     return _with(
         command,
         click.option("--variant", type=click.Choice(VARIANTS),
                      help="Mitsuba variant. [default: llvm_ad_rgb, or llvm_ad_spectral for a scene"
                      " with tabulated spectra]"),
         click.option("--heuristic-variant", type=click.Choice(VARIANTS),
-                     help="Variant of the heuristic half, where it is another: RGB shading against"
-                     " a spectral reference. [default: the scene's own, else that of --variant]"),
+                     help="Variant of the heuristic half, such as RGB shading against a spectral"
+                     " reference. [default: the scene's own, else --variant]"),
         click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
-                     help="Seed of the run; each pass hashes its own from it."),
+                     help="Seed of the run, from which each pass derives its own."),
         click.option("--spp", type=click.IntRange(min=2),
                      help="Samples per pixel, over all passes. [default: the plan's]"),
         click.option("--resolution", type=resolution, metavar="WxH",
-                     help="Width and height in place of the film's own."),
+                     help="Width and height. [default: the film's]"),
         click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl|three:phong",
-                     help="Which heuristic shades: phong, blinn, what engines use (such as"
-                     " mean-ambient), one that a package declares, or a function shade(point) of a"
+                     help="The heuristic: phong, blinn, one that engines use (such as"
+                     " mean-ambient), one that a package declares, or a function shade(point) in a"
                      " file. [default: phong]"),
         click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
                      help="Shading of polygons in the heuristic half. [default: the scene's own,"
                      " else phong]"),
         click.option("--tessellation", type=click.IntRange(min=1), metavar="N",
-                     help="Mesh the shapes of the heuristic half: N edges a quarter turn or a"
+                     help="Mesh the shapes of the heuristic half: N edges per quarter turn or"
                      " straight side. [default: the scene's own, else 16 for flat and gouraud]"),
         click.option("--everything", is_flag=True,
-                     help="Switch off all pruning: simulate what is not called for, too."),
+                     help="Switch off all pruning: simulate every effect."),
         click.option("--pairing", default="matched", show_default=True,
                      type=click.Choice(["literal", "matched"]),
                      help="How roughplastic and phong are paired."),
         click.option("--pixels-per-degree", type=Within(min=1, max=1000), metavar="N",
-                     help="FLIP: pixels to a degree of the eye's view. [default: 67]"),
+                     help="FLIP: pixels per degree of vision. [default: 67]"),
         click.option("--allow-empty", is_flag=True,
-                     help="Take pictures in which no pixel sees a surface."),
+                     help="Accept pictures in which no pixel sees a surface."),
     )  # fmt: skip
 
 
-def scene_options(command):
-    """Add the options that say what is taken from a scene file."""
+def scene_options(command: Command) -> Command:
+    """Add the options for scene files."""
     return _with(
         command,
         click.option("-D", "define", type=_definition, multiple=True, metavar="NAME=VALUE",
@@ -165,19 +169,19 @@ def scene_options(command):
     )  # fmt: skip
 
 
-def _with(command, *options):
+def _with(command: Command, *options: Decorator) -> Command:
     for option in reversed(options):
         command = option(command)
     return command
 
 
 scripts_option = click.option(
-    "--scripts", is_flag=True, help="Run the Python scripts in folders too, which are code."
+    "--scripts", is_flag=True, help="Run the Python files in folders, too; they are code."
 )
 
 
 class Within(click.FloatRange):
-    """A number in an interval, where NaN never is."""
+    """A number in an interval; NaN is in none."""
 
     def convert(
         self, value: Any, parameter: click.Parameter | None, context: click.Context | None
@@ -196,11 +200,11 @@ timeout_option = click.option(
     show_default=True,
     type=Within(min=0, min_open=True),
     metavar="SECONDS",
-    help="End a scene that makes no progress for so long.",
+    help="End a scene that makes no progress for this long.",
 )
 
 
-def _workers(default: int | None, shown: str | bool = True) -> Callable[[Any], Any]:
+def _workers(default: int | None, shown: str | bool = True) -> Decorator:
     return click.option(
         "--workers",
         default=default,
@@ -215,32 +219,29 @@ workers_option = _workers(1)
 all_workers_option = _workers(None, "one per core")
 
 IN_PROCESSES = True
-"""Whether scenes are read and rendered in processes apart; tests do so in their own."""
+"""Whether scenes are read and rendered in separate processes; tests use their own process."""
 
 
 scheduler_option = click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Use the Dask cluster whose scheduler is there, such as tcp://host:8786.",
+    help="Use the Dask cluster with this scheduler, such as tcp://host:8786.",
 )
 
 
-def pool(
-    timeout: float, workers: int | None = 1, scheduler: str | None = None
-) -> AbstractContextManager[Pool | Cluster]:
-    """Return where scenes are read and rendered: apart from the process that the user sees.
+def pool(timeout: float, workers: int | None = 1, scheduler: str | None = None) -> Pool:
+    """Return processes or a cluster in which scenes are read and rendered.
 
-    A scene may run code of its own, and native code may crash or hang.
+    They are separate, since a scene may run its own code, and native code may crash or hang.
 
     Parameters
     ----------
     timeout
-        Seconds that a task may take without any progress; Dask's clusters have limits of their own.
+        Seconds that a task may take without any progress; a Dask cluster has its own limits.
     workers
         Processes at the same time; None for one per core.
     scheduler
-        Address of a Dask cluster to use in place of processes here. Its workers need the same
-        folders.
+        Address of a Dask cluster that replaces processes here. Its workers need the same folders.
     """
     if scheduler is None:
         workers = workers or cores()
@@ -249,7 +250,8 @@ def pool(
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from comparisons.processes import cluster
 
-    return cluster.connected(scheduler, Ready.far_away())
+    # As a context it gives a Cluster, which does what a Pool does.
+    return cast(Pool, cluster.connected(scheduler, Ready.far_away()))
 
 
 @dataclass(frozen=True)
@@ -259,13 +261,13 @@ class Ready:
     Attributes
     ----------
     level
-        Of the user's output: at 1, verbose, what Mitsuba says is heard.
+        Verbosity; at 1, verbose, Mitsuba's messages are printed.
     threads
-        Of Dr.Jit; if omitted, one per core.
+        Dr.Jit's threads; if omitted, one per core.
     folder
-        From which the names of files are seen; if omitted, the process is there already.
+        Folder to which file names are relative; if omitted, the process's.
     program
-        How printed commands begin; if omitted, as the process was started.
+        Beginning of printed commands; if omitted, the way the process was started.
     """
 
     level: int
@@ -275,23 +277,23 @@ class Ready:
 
     @classmethod
     def among(cls, workers: int) -> Ready:
-        """Return what gets one of so many processes of this machine ready."""
+        """Return the preparation of one of this many processes of this machine."""
         return cls(verbosity.level(), cores() // workers if workers > 1 else None)
 
     @classmethod
     def far_away(cls) -> Ready:
-        """Return what gets a process ready that somebody else started."""
+        """Return the preparation of a process on another machine."""
         return cls(verbosity.level(), None, os.getcwd(), shlex.join(program.program()))
 
     def __call__(self) -> None:
-        """Do so.
+        """Get this process ready.
 
         Raises
         ------
         InputError
-            When the folder is not there.
+            If the folder does not exist.
         InstallationError
-            Saying what was found, what is needed and how to get it.
+            If there is no usable LLVM.
         """
         if self.program is not None:
             os.environ[program.VARIABLE] = self.program
@@ -306,7 +308,7 @@ class Ready:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up
 
-        gc.freeze()  # what is loaded by now stays: collecting for each scene need not look at it
+        gc.freeze()  # modules stay: garbage collections need not look at them
 
 
 def _enter(folder: str) -> None:
@@ -314,7 +316,7 @@ def _enter(folder: str) -> None:
         os.chdir(folder)
     except OSError as error:
         raise InputError(
-            f"{folder}: {error.strerror}, says a worker of the cluster. Its workers need the same"
+            f"{folder}: {error.strerror}, on a worker of the cluster. Workers need the same"
             " folders as this machine."
         ) from error
 
@@ -324,7 +326,7 @@ def _print(text: str) -> None:
 
 
 def _pass_over(text: str) -> None:
-    """Records state what concerns them."""
+    """Ignore a message: the record has the warnings that concern it."""
 
 
 def command_line() -> str:
@@ -333,9 +335,9 @@ def command_line() -> str:
 
 
 def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
-    """Return the names of scenes, with the scenes in it in place of each folder.
+    """Return the names of scenes, each folder replaced by the scenes in it.
 
-    Scripts in a folder are run only ``with_scripts``; one that is named is always.
+    A folder's scripts are included only ``with_scripts``; a named script always is.
 
     Raises
     ------
@@ -346,7 +348,7 @@ def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
 
 
 def _within(folder: Path, with_scripts: bool) -> list[str]:
-    """Return the scenes in a folder; none for what is not one."""
+    """Return the scenes in a folder; none if the path is not a folder."""
     if not folder.is_dir():
         return []
     from reference.scene.folders import scenes_in
@@ -356,20 +358,20 @@ def _within(folder: Path, with_scripts: bool) -> list[str]:
         return list(map(str, sorted((*found.written, *found.scripts))))
     if found.scripts:
         scripts = ", ".join(str(path.relative_to(folder)) for path in found.scripts)
-        told = f"{folder}: {scripts}: scripts are code, which only --scripts runs"
+        told = f"{folder}: {scripts}: scripts are code, run only with --scripts"
         if not found.written:
-            raise InputError(f"{told}. There is no other scene.")
+            raise InputError(f"{told}. The folder has no other scene.")
         click.echo(f"fotismos: {told}.", err=True)
     return list(map(str, found.written))
 
 
 def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
-    """Return what is asked for about each of some scenes: values for the placeholders it has.
+    """Return the request for each scene: with values only for the placeholders that it has.
 
     Raises
     ------
     InputError
-        For a value that no scene has a placeholder for.
+        For a value whose placeholder no scene has.
     """
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
@@ -386,7 +388,7 @@ def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
 
 
 def request(words: Mapping[str, Any]) -> Request:
-    """Return what the words of a command ask for about the rendering of its scenes."""
+    """Return the rendering request of a command's options."""
     from comparisons.case import Request
 
     return Request.of({**words, "define": dict(words.get("define") or ())})

@@ -1,4 +1,4 @@
-"""Comparisons in a notebook, shown as in the page.
+"""Comparisons in a notebook, shown as on the page.
 
 ::
 
@@ -27,7 +27,7 @@ from reports.page import page
 from reports.run import output
 
 HEIGHT = 720
-"""Pixels of the frame; what is longer scrolls."""
+"""Height of the frame in pixels; longer pages scroll."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class Shown:
     page: str
 
     def _repr_html_(self) -> str:
-        """Show the page in a frame of its own: neither its styles nor its scripts get out."""
+        """Show the page in a frame, which isolates its styles and scripts."""
         return (
             f'<iframe sandbox="allow-scripts" style="width: 100%; height: {HEIGHT}px; border: 0"'
             f' title="Comparison" srcdoc="{escape(self.page)}"></iframe>'
         )
 
     def at(self, x: int, y: int) -> "ShownTerms":
-        """Return the terms of 8.10 at a pixel, or at the nearest one that has them.
+        """Return the terms of equation 8.10 at a pixel, or at the nearest one that has them.
 
         Parameters
         ----------
@@ -58,14 +58,14 @@ class Shown:
         Raises
         ------
         InputError
-            For a pixel outside the image or on the background, and where the heuristic half is not
-            shaded by 8.10.
+            For a pixel outside the image or on the background, and for a heuristic other than
+            equation 8.10.
         """
         if self.comparison.terms is None:
             raise InputError(f"there are no terms. {self.comparison.no_terms}")
         found = self.comparison.terms.at(x, y)
         if found is None:
-            raise InputError(f"pixel {x}, {y} sees no surface: give one that does.")
+            raise InputError(f"pixel {x}, {y} sees no surface. Give one that does.")
         place, images = found.pixel[::-1], self.comparison.images
         error = float(images.reference_stderr[place].max())
         return ShownTerms(found, tuple(images.reference[place].tolist()), error)
@@ -73,9 +73,9 @@ class Shown:
 
 @dataclass(frozen=True)
 class ShownTerms:
-    """The terms at a pixel as numbers, and as a figure and a table.
+    """The terms at a pixel, shown as a figure and a table.
 
-    `reference` is the physical reference there, `standard_error` that of its noisiest channel.
+    `reference` is the physical reference at the pixel, `standard_error` its noisiest channel's.
     """
 
     terms: PixelTerms
@@ -92,19 +92,19 @@ def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:
     Parameters
     ----------
     scene
-        A dictionary as ``mitsuba.load_dict`` takes it, a function that returns one, a built-in
-        name, or the path of a scene.
+        A dictionary for ``mitsuba.load_dict``, a function that returns one, a built-in name, or the
+        path of a scene.
     name
-        The scene's name, in place of its own.
+        Replaces the scene's name.
     options
-        By the names of the command line, such as ``spp=64`` or ``resolution=(128, 128)``.
+        Those of the command line, such as ``spp=64`` or ``resolution=(128, 128)``.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or an option is not known.
+        If the scene cannot be read or paired, or an option is unknown.
     NonFiniteError
-        When a rendering holds a NaN or an infinity.
+        If a rendering contains a NaN or an infinity.
     """
     case = open_case(scene, Request.of(options), name)
     comparison = comparisons.compare.compare(case.source, case.options, command=case.command())

@@ -7,17 +7,15 @@ from pathlib import Path
 import click
 
 option = click.option(
-    "--open", "is_opened", is_flag=True, help="Open the page in a browser as soon as it is there."
+    "--open", "is_opened", is_flag=True, help="Open the page in a browser as soon as it exists."
 )
 
 
 def seen(is_opened: bool) -> Callable[[Path], object]:
-    """Return what is to be done with the path of a page that is there."""
+    """Return the function to call with the path of a new page: open it, or do nothing."""
     return _open if is_opened else lambda _: None
 
 
 def _open(page: Path) -> None:
     if not webbrowser.open(page.resolve().as_uri()):
-        click.echo(
-            f"fotismos: there is no browser to open {page} with. Open it yourself.", err=True
-        )
+        click.echo(f"fotismos: no browser was found to open {page}. Open it yourself.", err=True)

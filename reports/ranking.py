@@ -1,4 +1,4 @@
-"""Whether metrics rank scenes alike: correlations of ranks over the scenes of a run."""
+"""Whether metrics rank scenes alike: rank correlations over the scenes of a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import METRICS
 
-#: Scenes of which a ranking says something.
+#: Fewest scenes for a meaningful ranking.
 FEWEST = 4
 
 
@@ -23,7 +23,7 @@ class Agreement:
     spearman
         Correlation of the ranks.
     kendall
-        Pairs of scenes that both order alike, less those that they order oppositely, as a share
+        Share of the pairs of scenes in the same order, minus the share in opposite order
         (τ_b, which leaves ties out).
     """
 
@@ -32,9 +32,9 @@ class Agreement:
 
 
 def rankings(records: Sequence[ComparisonRecord]) -> dict[str, dict[str, Agreement]]:
-    """Return the agreement of each two metrics, by their names, on means without noise.
+    """Return the agreement of each pair of metrics on means without noise, by their names.
 
-    Empty for fewer than `FEWEST` scenes. A metric that has one value for all scenes ranks nothing,
+    Empty for fewer than `FEWEST` scenes. A metric with the same value in all scenes ranks nothing,
     and is left out.
     """
     if len(records) < FEWEST:

@@ -1,12 +1,12 @@
-"""What a run found, in sentences and bars: how many scenes look right, and what the others lack.
+"""A run's findings in sentences and bars: how many scenes look right, and what the others lack.
 
-A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. What it
-lacks is told by the prices of effects, where a study of cost has them.
+A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. The prices
+of effects, from a study of cost, say what it lacks.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
 
 SHARE = 0.05
-"""Of the pixels, that may depart by more than the tolerance."""
+"""Share of the pixels that may depart by more than the tolerance."""
 
 TOLERANCES = tuple(LEADING.visible)
 USUAL = 2.0
-"""The tolerance that is shown first: what is seen side by side."""
+"""The tolerance shown first: visible side by side."""
 
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
 
 WITH_CAUSES = "--why"
-"""The option of ``compare`` that finds causes and remedies, which it does by default."""
+"""The option of ``compare`` that finds causes and remedies; it is on by default."""
 
 NAMED = 3
-"""Effects that the sentence names."""
+"""Number of effects that the sentence names."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """What one effect has of a bar: ΔE2000, in the scale of the scene's mean."""
+    """One effect's part of a bar: ΔE2000, scaled to the scene's mean."""
 
     effect: str
     colour: str
@@ -64,7 +64,7 @@ class Finding:
     beyond
         ``{tolerance: share of the pixels that depart by more}``.
     parts
-        What effects have of the mean, largest first; empty without a study of cost.
+        The effects' parts of the mean, largest first; empty without a study of cost.
     remedies
         ``{tolerance: cheapest method, or None}``; empty without a study of cost.
     is_exact
@@ -79,17 +79,17 @@ class Finding:
     is_exact: bool
 
     def is_right(self, tolerance: float) -> bool:
-        """Tell whether the scene looks right at one of :data:`TOLERANCES`."""
+        """Return whether the scene looks right at one of :data:`TOLERANCES`."""
         return self.beyond[tolerance] <= SHARE
 
     @property
     def cause(self) -> str | None:
-        """The effect that has most of the departure, None where none is known."""
+        """The effect that causes most of the departure; None if unknown."""
         return self.parts[0].effect if self.parts else None
 
 
 def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
-    """Return what was found of a scene."""
+    """Return the finding of a scene."""
     metric = record.metrics[LEADING.name]
     return Finding(
         scene=record.scene,
@@ -102,7 +102,7 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
 
 
 def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
-    """Scale the prices that are surely above 0 to the mean, which was measured in full size."""
+    """Scale the prices that are surely above 0 to the mean, which was measured at full size."""
     sure = [price for price in cost.prices.effects if price.removes.low > 0]
     total = sum(price.removes.value for price in sure)
     ordered = sorted(sure, key=lambda price: -price.removes.value)
@@ -116,11 +116,11 @@ def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
     from comparisons.cost.front import cheapest  # only with a study of cost
 
     best = cheapest(cost.points, tolerance)
-    return best and Remedy(best.rung, best.seconds.median)
+    return Remedy(best.rung, best.seconds.median) if best else None
 
 
 def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
-    """Return what a run found, in one or two sentences."""
+    """Return a run's findings, in one or two sentences."""
     right = sum(found.is_right(tolerance) for found in findings)
     if len(findings) == 1:
         (only,) = findings
@@ -141,7 +141,7 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
 
 
 def about(found: Finding, tolerance: float = USUAL) -> str:
-    """Return what was found of one scene: how much is wrong, mostly why, and what would do."""
+    """Return one scene's finding: how much is wrong, mostly why, and a remedy."""
     if found.is_exact:
         return "Textbook shading is exact here, as far as can be seen."
     share = found.beyond[tolerance]
@@ -154,35 +154,31 @@ def about(found: Finding, tolerance: float = USUAL) -> str:
     remedy = found.remedies.get(tolerance)
     if remedy and not found.is_right(tolerance):
         said.append(
-            f"The cheapest method that was tried within a mean of {LEADING.label} {tolerance:g}:"
+            f"The cheapest method tried within a mean of {LEADING.label} {tolerance:g}:"
             f" {remedy.method}, {seconds(remedy.seconds)} at the small size of the study."
         )
     return " ".join(said)
 
 
 def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
-    """Return a line for each scene that does not look right: what it lacks, and what would do."""
+    """Return a line for each scene that does not look right: what it lacks, and a remedy."""
     if not any(found.remedies for found in findings):
-        return [f"What it lacks, and what would mend it: the same command with {WITH_CAUSES}."]
+        return [f"For causes and remedies, give the same command with {WITH_CAUSES}."]
     lines = []
     for found in findings:
         if found.is_right(tolerance) or not found.remedies:
             continue
         remedy = found.remedies[tolerance]
         cause = f"mostly {found.cause}" if found.cause else "no cause is known"
-        way = (
-            f"{remedy.method} in {seconds(remedy.seconds)}"
-            if remedy
-            else "no method that was tried"
-        )
+        way = f"{remedy.method} in {seconds(remedy.seconds)}" if remedy else "no method tried"
         lines.append(f"{found.scene}: {cause}; within {LEADING.label} {tolerance:g}: {way}")
     return lines
 
 
 def ranked(findings: Sequence[Finding]) -> list[str]:
-    """Return the effects that have most of the departure of some scenes together, largest first."""
-    sizes = Counter()
+    """Return the effects by their total departure over some scenes, largest first."""
+    sizes: dict[str, float] = defaultdict(float)
     for found in findings:
         for part in found.parts:
             sizes[part.effect] += part.size
-    return [effect for effect, _ in sizes.most_common()]
+    return sorted(sizes, key=lambda effect: -sizes[effect])

@@ -342,7 +342,7 @@ def test_scenes_in_subfolders_are_found_and_scripts_only_where_asked(run, folder
     words = ("compare", folder, "-o", tmp_path / "out", "--spp", 4, "--resolution", "8x8")
     code, _, messages = run(*words)
     assert code == 0
-    assert "inner/most/deed.py: scripts are code, which only --scripts runs" in messages
+    assert "inner/most/deed.py: scripts are code, run only with --scripts" in messages
     assert not (tmp_path / "done").exists()
     found = {path.parent.name for path in (tmp_path / "out").glob("*/comparison.json")}
     assert found == {"a", "a-2"}

@@ -42,7 +42,7 @@ def test_a_quiet_run_prints_the_page_alone_and_a_verbose_one_says_more(run, tmp_
     assert "mean ΔE2000" in usual
     code, printed, messages = run("compare", "fig-8-8a", "-v", "-o", tmp_path, *SMALL)
     assert "mean ΔE2000" in printed
-    for word in ("4 samples a pixel", "heuristic_point as point", "missed: specular", "metrics"):
+    for word in ("4 samples per pixel", "heuristic_point as point", "missed: specular", "metrics"):
         assert word in messages
 
 

@@ -89,7 +89,7 @@ def test_advice_names_cause_and_remedy_of_each_scene_that_fails():
     )
     assert lines == [
         "a: mostly occlusion; within ΔE2000 2: path 3 in 41.0 ms",
-        "b: no cause is known; within ΔE2000 2: no method that was tried",
+        "b: no cause is known; within ΔE2000 2: no method tried",
     ]
     (line,) = verdict.advice([found("a")])
     assert verdict.WITH_CAUSES in line

@@ -1,8 +1,8 @@
 """Figures for print, each as SVG and PDF: a strip of pictures, histograms, and a run's departures.
 
-Maps have the fixed ranges of their metrics, and every figure of a kind has the same
-axis, so that the figures of different scenes compare. Text is black on white. Pictures are kept
-pixel for pixel. The files depend on what they show alone: they hold no date.
+Maps have the fixed ranges of their metrics, and figures of a kind share an axis, so figures of
+different scenes can be compared. Text is black on white. Pictures are kept pixel for pixel. The
+files are reproducible: they hold no date.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import altair as alt
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -23,6 +24,7 @@ from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import LEADING
 from comparisons.record import Comparison
 from reports.charts import error_over_time, histograms, vega
+from reports.charts.theme import Spec
 from reports.files import images, ownership
 from reports.terminal.printing import number
 
@@ -34,13 +36,13 @@ TEXT_WIDTH = 6.9
 #: Inches: between panels, for the colour bar with its labels, and for the titles.
 GAP, BAR, HEADING = 0.08, 0.55, 0.22
 
-#: Points, as they are printed at that width.
+#: Points, printed at that width.
 FONT_SIZE = 8
 
-#: Departures below are drawn at the left border, since a logarithmic axis has no 0.
+#: Smaller departures are drawn at the left border, since a logarithmic axis has no 0.
 LEAST, LARGEST = 1e-3, 100.0
 
-#: Colour and shape of what is drawn of each scene.
+#: Colour and shape of each quantity of a scene.
 MARKS = {
     "as it is": ("#08519c", "circle"),
     "after exposure": ("#b3450b", "diamond"),
@@ -59,7 +61,7 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
 
 
 def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:
-    """Write the departures of all scenes of a run as ``folder/departures`` in each format."""
+    """Write the departures of a run's scenes as ``folder/departures`` in each format."""
     write_chart(folder, "departures", departures(list(records)))
 
 
@@ -96,7 +98,7 @@ def strip(comparison: Comparison) -> Figure:
         figure = Figure(figsize=(TEXT_WIDTH, tall + HEADING + GAP))
         inches = (1 / TEXT_WIDTH, 1 / (tall + HEADING + GAP))
 
-        def place(left, width):
+        def place(left: float, width: float) -> Axes:
             box = left * inches[0], GAP * inches[1], width * inches[0], tall * inches[1]
             return figure.add_axes(box)
 
@@ -115,8 +117,8 @@ def strip(comparison: Comparison) -> Figure:
 
 def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
     """Return the file of a Matplotlib figure."""
-    # Type 42 keeps text as text, as journals ask for; the salt makes the ids of an SVG repeatable.
-    settings = {"pdf.fonttype": 42, "svg.hashsalt": "fotismos"}
+    # Type 42 keeps text as text, as journals require; the salt makes the ids of an SVG repeatable.
+    settings: Any = {"pdf.fonttype": 42, "svg.hashsalt": "fotismos"}
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     buffer = BytesIO()
     with rc_context(settings):
@@ -124,10 +126,10 @@ def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
     return buffer.getvalue()
 
 
-def departures(records: Sequence[ComparisonRecord]) -> dict[str, Any]:
-    """Return the chart of means by scene: as it is, its shape, and the noise floor.
+def departures(records: Sequence[ComparisonRecord]) -> Spec:
+    """Return the chart of means by scene: as it is, after exposure, and the noise floor.
 
-    The axis is logarithmic, from 0.001 to 100 whatever the scenes; values beyond take its ends.
+    The axis is logarithmic, always from 0.001 to 100; values beyond are drawn at its ends.
     """
     rows = []
     for record in records:

@@ -9,15 +9,16 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import METRICS
 from comparisons.departure.statistics import Histogram, Summary
 from reports.charts import vega
+from reports.charts.theme import Spec
 from reports.terminal.printing import number, percent
 
-#: Widths of the chart in pixels; the page scales it.
+#: Size of the chart in pixels; the page scales it.
 WIDTH, HEIGHT = 300, 130
 
-#: Colour of the area (readable on light and dark grounds).
+#: Colour of the area, visible on light and dark grounds.
 AREA = "#7d8fb3"
 
-#: What is marked: its word, and the dash of its line.
+#: The marks: word, and dash of the line.
 MARKS = {
     "mean": ("mean", [1, 0]),
     "p95": ("95 %", [5, 3]),
@@ -25,14 +26,14 @@ MARKS = {
 }
 
 #: A mark's line from the axis to its row, and the text to its right.
-LINE = {
+LINE: Spec = {
     "mark": {"type": "rule", "strokeWidth": 1.2},
     "encoding": {
         "y2": {"datum": 0},
         "strokeDash": {"field": "dash", "type": "nominal", "scale": None},
     },
 }
-TEXT = {
+TEXT: Spec = {
     "mark": {"type": "text", "align": "left", "dx": 4, "baseline": "top"},
     "encoding": {"text": {"field": "label"}},
 }
@@ -47,8 +48,8 @@ def figures(record: ComparisonRecord) -> list[vega.Figure]:
     ]
 
 
-def specs(record: ComparisonRecord) -> dict[str, dict[str, Any]]:
-    """The specifications by metric: of the histograms of a record, where any pixel counts."""
+def specs(record: ComparisonRecord) -> dict[str, Spec]:
+    """The specifications of a record's histograms, by metric; empty if no pixel counts."""
     counted = record.pixels.counted
     return {
         name: spec(name, histogram, record.metrics[name], counted)
@@ -57,35 +58,37 @@ def specs(record: ComparisonRecord) -> dict[str, dict[str, Any]]:
     }
 
 
-def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> dict[str, Any]:
+def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> Spec:
     """The Vega-Lite specification of a histogram of `comparison.json`.
 
-    The axis is logarithmic, the bins are of equal ratio, and the height is the share of the pixels
+    The axis is logarithmic, the bins have equal ratios, and the height is the share of the pixels
     in each: equal areas are equal shares.
 
+    Parameters
+    ----------
     name
         One of `comparisons.departure.metrics.METRICS`.
     counted
-        Pixels in all.
+        Number of all pixels.
     """
     bins = _shares(histogram, counted)
     top = max(row["share"] for row in bins) or 1.0
     domain = [histogram.low, 4 * histogram.high]  # room for the last label
-    x = {"field": "value", "type": "quantitative", "title": METRICS[name].label}
+    x: Spec = {"field": "value", "type": "quantitative", "title": METRICS[name].label}
     x["scale"] = {"type": "log", "domain": domain, "nice": False, "clamp": True}
     x["axis"] = {"values": [0.01, 0.1, 1, 10, 100, 1000], "format": "~g", "grid": False}
-    y = {"field": "share", "type": "quantitative", "title": "share of pixels"}
+    y: Spec = {"field": "share", "type": "quantitative", "title": "share of pixels"}
     y["scale"] = {"domain": [0, 1.45 * top], "nice": False}
     y["axis"] = {"format": ".0%", "tickCount": 3}
     area = {"type": "area", "interpolate": "step-after", "color": AREA, "tooltip": True}
-    layer = [{"data": {"values": bins}, "mark": area}]
+    layer: list[Spec] = [{"data": {"values": bins}, "mark": area}]
     if marks := _marks(summary, histogram.low, top):
         layer.append({"data": {"values": marks}, "layer": [LINE, TEXT]})
     return {"width": WIDTH, "height": HEIGHT, "encoding": {"x": x, "y": y}, "layer": layer}
 
 
 def note(histogram: Histogram, counted: int) -> str:
-    """What the chart leaves out, in words; empty where that is nothing."""
+    """The pixels that the chart leaves out, in words; empty for none."""
     parts = [
         f"{percent(count / counted)} of the pixels {side} {limit:g}"
         for count, side, limit in (
@@ -97,8 +100,8 @@ def note(histogram: Histogram, counted: int) -> str:
     return "Not shown: " + ", ".join(parts) + "." if parts else ""
 
 
-def _shares(histogram, counted):
-    """Lower edge and share of the pixels of each bin, and a closing zero."""
+def _shares(histogram: Histogram, counted: int) -> list[dict[str, float]]:
+    """Each bin's lower edge and share of the pixels, and a closing zero."""
     low, counts = histogram.low, histogram.counts
     decades = math.log10(histogram.high / low) / len(counts)
     return [
@@ -107,10 +110,10 @@ def _shares(histogram, counted):
     ]
 
 
-def _marks(summary, low, top):
-    """A line and a label for each mark, in a row of its own: the further right, the lower.
+def _marks(summary: Summary, low: float, top: float) -> list[dict[str, Any]]:
+    """A line and a label for each mark, each in its own row: the further right, the lower.
 
-    A line ends at its label's row and the label is to its right, so that nothing crosses.
+    A line ends at its label's row, and the label is to its right, so nothing crosses.
     """
     marks = sorted((getattr(summary, name), *style) for name, style in MARKS.items())
     return [

@@ -1,7 +1,10 @@
 """Predicted error over predicted time of each method at a size, with bands, as a chart."""
 
+from typing import Any
+
 import altair as alt
 
+from comparisons.cost.cost_record import Cost, Forecast, Prediction, Seen
 from reports.charts.error_over_time import (
     LEAST_ERROR,
     by_family,
@@ -11,14 +14,15 @@ from reports.charts.error_over_time import (
     names_beside,
     tooltips,
 )
+from reports.charts.theme import Spec
 
 
-def prediction_chart(record, ground="transparent"):
-    """Return the chart of a ``Cost`` with a prediction: curves, bands, and what was measured."""
+def prediction_chart(record: Cost, ground: str = "transparent") -> Spec:
+    """Return the chart of a study with a prediction: curves, bands, and measured points."""
     families = {rung.name: rung.family for rung in record.rungs}
-    found = record.prediction
+    found = _prediction(record)
     rows = [_row(forecast, families[forecast.method]) for forecast in found.forecasts]
-    seen = [_seen(f, families[f.method]) for f in found.forecasts if f.measured]
+    seen = [_seen(f.method, f.measured, families[f.method]) for f in found.forecasts if f.measured]
     times = domain([row[end] for row in rows for end in ("fastest", "slowest")])
     errors = domain([max(row[end], LEAST_ERROR) for row in rows for end in ("low", "high")])
     for row in (*rows, *seen):
@@ -40,11 +44,17 @@ def prediction_chart(record, ground="transparent"):
     return layered(layers)
 
 
-def standing_alone(record):
+def _prediction(record: Cost) -> Prediction:
+    assert record.prediction is not None, "the chart is of a study with --at"
+    return record.prediction
+
+
+def standing_alone(record: Cost) -> Spec:
     """Return the chart with a title, on white."""
-    width, height = record.prediction.resolution
+    found = _prediction(record)
+    width, height = found.resolution
     subtitle = [
-        f"fitted to {', '.join('x'.join(map(str, size)) for size in record.prediction.fitted)};"
+        f"fitted to {', '.join('x'.join(map(str, size)) for size in found.fitted)};"
         f" {record.machine.cores} cores, {record.machine.processor}",
         reading(record),
     ]
@@ -55,15 +65,16 @@ def standing_alone(record):
     return prediction_chart(record, "white") | {"title": title}
 
 
-def reading(record):
+def reading(record: Cost) -> str:
     """Return how to read the chart, in a line."""
-    level = f"{record.prediction.level:.0%}"
-    crosses = any(forecast.measured for forecast in record.prediction.forecasts)
+    found = _prediction(record)
+    level = f"{found.level:.0%}"
+    crosses = any(forecast.measured for forecast in found.forecasts)
     said = f"bands and strokes: {level} intervals of error and time; points: powers of 2 samples"
     return f"{said}; crosses: measured" if crosses else said
 
 
-def _row(forecast, family):
+def _row(forecast: Forecast, family: str) -> dict[str, Any]:
     return {
         "rung": forecast.method,
         "family": family,
@@ -77,10 +88,9 @@ def _row(forecast, family):
     }
 
 
-def _seen(forecast, family):
-    measured = forecast.measured
+def _seen(method: str, measured: Seen, family: str) -> dict[str, Any]:
     return {
-        "rung": forecast.method,
+        "rung": method,
         "family": family,
         "time": measured.seconds.median * 1e3,
         "error": measured.error,

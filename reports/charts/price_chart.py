@@ -1,16 +1,19 @@
 """The prices of effects as a chart."""
 
+from typing import Any
+
 import altair as alt
 
-from reports.charts.theme import EFFECT_COLOURS
+from comparisons.cost.cost_record import Cost, Price
+from reports.charts.theme import EFFECT_COLOURS, Spec
 from reports.charts.vega import specification
 
 
-def price_chart(record):
-    """Return the chart of the prices of a :class:`Cost`: ΔE2000 removed by each effect, as bars.
+def price_chart(record: Cost) -> Spec:
+    """Return the chart of the prices: ΔE2000 removed by each effect, as bars.
 
-    Rules are 95 % intervals, the circle and the stroke what the effect removes where it is added
-    first and last. A tooltip has the numbers.
+    Rules are 95 % intervals. The circle and the stroke show the ΔE2000 removed if the effect is
+    added first and last. A tooltip has the numbers.
     """
     rows = [_row(price) for price in record.prices.effects]
     names = [row["effect"] for row in rows]
@@ -25,7 +28,7 @@ def price_chart(record):
         ],
     )
 
-    def x(name):
+    def x(name: str) -> alt.X:
         return alt.X(f"{name}:Q", title="mean ΔE2000 that it removes")
 
     removed = alt.Color("effect:N", legend=None, scale=colours)
@@ -39,7 +42,7 @@ def price_chart(record):
     return specification(layers.properties(width=340, height=alt.Step(30), padding=padding))
 
 
-def _row(price):
+def _row(price: Price) -> dict[str, Any]:
     removed = price.removes
     return {
         "effect": price.effect,

@@ -15,25 +15,32 @@ A figure is a table of the study's TOML file::
     rule = 1.0                     # lines: a horizontal line
     log = ["x", "y"]               # lines: logarithmic axes
 
-Points that differ in other parameters still are averaged, and the subtitle says over which. Colours
-are viridis and magma, whose lightness rises steadily, so that they survive without colour.
+Points that differ in other parameters are averaged, and the subtitle says over which. Colours are
+viridis and magma, whose lightness rises steadily: they also work in grey.
 """
 
 from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import altair as alt
 import numpy as np
+import pyarrow as pa
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from comparisons.study import query
+from comparisons.study.design import Part, Study
 from heuristic.errors import InputError, unknown
-from reports.charts.theme import FAINT
+from reports.charts.theme import FAINT, Spec
 from reports.charts.vega import specification
 
 KEYS = {"name", "title", "part", "kind", "x", "y", "values", "series", "where", "rule", "log"}
 NEEDED = {"map": {"name", "title", "part", "x", "y", "values"},
           "lines": {"name", "title", "part", "x", "values"}}  # fmt: skip
+Named: TypeAlias = Mapping[str, Any]
+"""A figure of a TOML file, or a row of the dataset."""
+
 SYMBOLS = {
     "alpha": "α",
     "dE2000": "ΔE2000",
@@ -45,19 +52,19 @@ SYMBOLS = {
     "log2_luminance": "luminance ratio",
 }
 WORDS = ("#fde725", "#5ec962", "#5aa0c8", "#c9b6e4")
-"""Colours for words, light enough for the letter of the word that stands in each cell besides."""
+"""Colours for words, light enough for the word's first letter, which each cell shows too."""
 
 DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
-"""Of the lines of several columns."""
+"""Dashes of lines of several columns."""
 
 
-def check(figure, study):
+def check(figure: Named, study: Study) -> None:
     """Ensure that a figure of a TOML file is complete, and that its part and parameters exist.
 
     Raises
     ------
     InputError
-        Naming what is missing or not known.
+        Naming the missing or unknown keys.
     """
     where = f"figure {figure.get('name')!r}"
     kind = figure.get("kind")
@@ -77,25 +84,26 @@ def check(figure, study):
             raise unknown(f"{where}: parameter", name, spans)
 
 
-def default_figures(study):
-    """Return a figure for each part that names none: the departure over its first parameters."""
+def default_figures(study: Study) -> Iterator[dict[str, Any]]:
+    """Yield a figure for each part without one: the departure over its first parameters."""
     shown = {figure["part"] for figure in study.figures}
     for part in study.parts:
         names = part.varying
         if part.name in shown or not names:
             continue
         over = {"kind": "lines"} if len(names) == 1 else {"kind": "map", "y": names[0]}
-        figure = {"name": part.name, "title": part.name, "part": part.name, "values": ["dE2000"]}
+        named = dict.fromkeys(("name", "title", "part"), part.name)
+        figure: dict[str, Any] = {**named, "values": ["dE2000"]}
         yield figure | over | {"x": names[-1]}
 
 
-def chart(figure, table, study):
+def chart(figure: Named, table: pa.Table, study: Study) -> Spec:
     """Return the Vega-Lite specification of a figure.
 
     Raises
     ------
     InputError
-        When a column does not exist, or nothing is to be shown.
+        If a column does not exist, or no point is to be shown.
     """
     for column in figure["values"]:
         query.require(table, column)
@@ -111,7 +119,7 @@ def chart(figure, table, study):
     return spec | {"title": title, "description": figure["title"], "padding": 8}
 
 
-def _map(figure, table, part, data):
+def _map(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> alt.TopLevelMixin:
     (column,) = figure["values"]
     names = figure["x"], figure["y"]
     is_grid, is_word = part.design == "grid", isinstance(data[0][column], str)
@@ -135,8 +143,8 @@ def _map(figure, table, part, data):
     return alt.layer(*layers).properties(width=420, height=300)
 
 
-def _places(names, table, part):
-    """Return the axes of a map: steps of a grid's parameters, or the spans of sampled ones."""
+def _places(names: Sequence[str], table: pa.Table, part: Part) -> dict[str, Any]:
+    """Return the axes of a map: steps of a grid's parameters, or spans of sampled ones."""
     x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
     if part.design == "grid":
         x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
@@ -148,7 +156,7 @@ def _places(names, table, part):
     }
 
 
-def _lines(figure, table, part, data):
+def _lines(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> alt.TopLevelMixin:
     x, series, columns = figure["x"], figure.get("series"), figure["values"]
     keys = (x, series) if series else (x,)
     values = [
@@ -157,15 +165,17 @@ def _lines(figure, table, part, data):
         for cell in _mean(data, keys, column)
     ]
     title = _label(columns[0]) if len(columns) == 1 else _common(columns)
-    x_scale, y_scale = (
+    scales: list[Spec] = [
         {"type": "log"} if axis in figure.get("log", ()) else {"zero": axis == "y"} for axis in "xy"
-    )
+    ]
     chart = (
         alt.Chart()
         .mark_line(strokeWidth=2)
         .encode(
-            x=_axis(alt.X, table, x).scale(nice=False, **x_scale),
-            y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(**y_scale),
+            x=_axis(alt.X, table, x).scale(nice=False, **scales[0]),
+            y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(
+                **scales[1]
+            ),
         )
     )
     if series:
@@ -182,9 +192,9 @@ def _lines(figure, table, part, data):
     return alt.layer(*layers, data=alt.Data(values=values)).properties(width=460, height=300)
 
 
-def _mean(data, keys, column):
-    """Return the mean of a column for each combination of keys; of words, the most frequent."""
-    groups = defaultdict(list)
+def _mean(data: Sequence[Named], keys: Sequence[str], column: str) -> list[dict[str, Any]]:
+    """Return a column's mean for each combination of keys; of words, the most frequent."""
+    groups: dict[tuple[Any, ...], list[Any]] = defaultdict(list)
     for row in data:
         if row[column] is not None:
             groups[tuple(row[key] for key in keys)].append(row[column])
@@ -196,30 +206,30 @@ def _mean(data, keys, column):
     return cells
 
 
-def _inks(count):
-    """Return colours along viridis without its light end, which would not show on white."""
+def _inks(count: int) -> list[str]:
+    """Return colours along viridis without its light end, which is invisible on white."""
     return [to_hex(ink) for ink in colormaps["viridis"](np.linspace(0, 0.8, count))]
 
 
-def _axis(channel, table, name):
+def _axis(channel: Any, table: pa.Table, name: str) -> Any:
     field = {alt.X: "x", alt.Y: "y"}[channel]
     return channel(f"{field}:Q", title=_title(table, name)).axis(format=".3~g")
 
 
-def _title(table, column):
+def _title(table: pa.Table, column: str) -> str:
     return _with(_label(column), query.unit(table, column))
 
 
-def _with(label, unit):
+def _with(label: str, unit: str) -> str:
     return f"{label} ({unit})" if unit not in ("", "1") else label
 
 
-def _label(column):
+def _label(column: str) -> str:
     return SYMBOLS.get(column, column.replace("_", " "))
 
 
-def _common(columns):
-    """Return what the names of several columns share, such as ``albedo`` of both halves."""
+def _common(columns: Sequence[str]) -> str:
+    """Return the words common to several columns' names, such as ``albedo`` of both halves."""
     words = [column.split("_") for column in columns]
     shared = [word for word in words[0] if all(word in other for other in words)]
     return " ".join(shared) or "value"

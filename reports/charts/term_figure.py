@@ -1,6 +1,6 @@
 """Equation 8.10 at a pixel for notebooks and docs: the vectors and lobes as SVG, the terms as HTML.
 
-The page draws the same figure by itself (``reports/page/templates/viewer/vectors.js``).
+The page's own version of the figure is ``reports/page/templates/viewer/vectors.js``.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,17 +20,17 @@ VECTOR, LOBE = 150, 165
 COLOURS = {"N": "#1c1e21", "L": "#b97b00", "R": "#0067a8", "V": "#00795a", "physical": "#b0426f"}
 
 VIEWS = np.arange(-90, 91, 1.5)
-"""Degrees from the normal at which the textbook's lobe is drawn."""
+"""Degrees from the normal at which the textbook lobe is drawn."""
 
 
 def strongest(point: PixelTerms) -> LightTerms | None:
-    """Return the light that gives most at a point; None without one that reaches its side."""
+    """Return the light that contributes most at a point; None if none reaches its side."""
     lit = [light for light in point.lights if light.cos_incidence > 0]
     return max(lit, key=lambda one: luminance(np.add(one.diffuse, one.specular)), default=None)
 
 
 def textbook_lobe(material: TermMaterial, incidence: float) -> NDArray[np.float64]:
-    """Return ``k_d (N·L) + k_s (R·V)^n`` for a light of intensity 1, luminance, at `VIEWS`."""
+    """Return the luminance of ``k_d (N·L) + k_s (R·V)^n`` at `VIEWS`, for intensity 1."""
     share = 0.5 if material.form == "blinn" else 1.0
     cosine = np.maximum(np.cos(np.radians(share * (VIEWS - incidence))), 0)
     k_d, k_s = luminance(material.k_d), luminance(material.k_s)
@@ -38,7 +38,7 @@ def textbook_lobe(material: TermMaterial, incidence: float) -> NDArray[np.float6
 
 
 def physical_lobe(table: NDArray[np.float64], incidence: float) -> NDArray[np.float64]:
-    """Return what a table of :mod:`comparisons.terms.polar` has between its incidences."""
+    """Interpolate a table of :mod:`comparisons.terms.polar` at an incidence in degrees."""
     columns = [np.interp(incidence, polar.INCIDENCES, column) for column in table.T]
     return np.array(columns)
 

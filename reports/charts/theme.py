@@ -1,37 +1,40 @@
 """How charts look: one theme, in the text's colour on a page and in black on paper."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 from reference.effects import EFFECTS
 
+Spec: TypeAlias = dict[str, Any]
+"""A Vega-Lite specification, or a part of one."""
+
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
-"""Of the effects that have a price: the seven of Okabe and Ito for what often comes together, and
-three of Tol's muted scheme. Both are made to be told apart with the common colour deficiencies."""
+"""Colours of effects with a price: Okabe and Ito's seven for effects that often come together, and
+three of Tol's muted scheme. Both suit the common colour deficiencies."""
 
 EFFECTS_TITLE = "Effects"
-"""Of the map of what dominates where."""
+"""Title of the map of dominant effects."""
 
 NO_EFFECT = "#dee2e6"
-"""Where no effect removes enough to be seen."""
+"""Colour where no effect removes enough to be seen."""
 
 FAINT = "#8a8a8a"
-"""Lines that help to read others, on a light and on a dark ground."""
+"""Colour of guide lines, visible on light and dark grounds."""
 
 
-def themed(spec: Mapping[str, Any], theme: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a specification in a theme; its own config has the last word."""
+def themed(spec: Mapping[str, Any], theme: Mapping[str, Any]) -> Spec:
+    """Return a specification in a theme, which the specification's config overrides."""
     return {**spec, "config": _merged(theme, spec.get("config", {}))}
 
 
-def _merged(theme, own):
+def _merged(theme: Any, own: Any) -> Any:
     if not isinstance(theme, Mapping):
         return own
     return {**theme, **{key: _merged(theme.get(key), value) for key, value in own.items()}}
 
 
-def _theme(ink, **own):
-    texts = {"labelColor": ink, "titleColor": ink, "titleFontWeight": "normal"}
+def _theme(ink: str, **own: Any) -> Spec:
+    texts: Spec = {"labelColor": ink, "titleColor": ink, "titleFontWeight": "normal"}
     sizes = {"labelFontSize": 11, "titleFontSize": 11}
     lines = {f"{line}Color": ink for line in ("domain", "tick", "grid")}
     faint = {"domainOpacity": 0.5, "tickOpacity": 0.5, "gridOpacity": 0.1}
@@ -48,8 +51,8 @@ def _theme(ink, **own):
     }
 
 
-#: Charts are described by their page, not in themselves.
+#: The page describes its charts, not the charts themselves.
 PAGE = _theme("currentColor", aria=False, background="transparent", font="system-ui, sans-serif")
 
-#: The font is Matplotlib's, whose figures stand beside these.
+#: The font is Matplotlib's, since its figures are printed next to these.
 PAPER = _theme("black", background="white", font="DejaVu Sans, sans-serif")

@@ -1,9 +1,8 @@
 """Charts: Vega-Lite specifications, drawn as SVG here and live in the page.
 
-The SVG is what paper and browsers without JavaScript show; it takes the colour of the text around
-it, so that it fits a light and a dark page. The page replaces it by a live chart with the same
-specification, drawn by the Vega bundle that the page holds once. A specification carries its data
-and names no address, so that nothing is loaded.
+Paper and browsers without JavaScript show the SVG. It takes the colour of the surrounding text, so
+it fits a light and a dark page. The page replaces it with a live chart of the same specification,
+drawn by the page's one Vega bundle. A specification contains its data, and loads nothing.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from comparisons.store import Entry
 from heuristic.errors import OutputError
 from reports.charts import theme
+from reports.charts.theme import Spec
 
 if TYPE_CHECKING:
     import altair
@@ -37,7 +37,7 @@ class Figure:
 
 
 def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
-    """Make a figure of a Vega-Lite specification; the specification's own config has the last word.
+    """Make a figure of a Vega-Lite specification, whose config overrides the theme.
 
     Its text may come from users' files: it is escaped in the picture, and is data in the page.
     """
@@ -52,12 +52,12 @@ def paper(spec: Mapping[str, Any], kind: str = "svg") -> bytes:
 
 
 def _made(function: str, argument: Mapping[str, Any] | str) -> Any:
-    """Return what a function of vl_convert makes.
+    """Call a function of vl_convert.
 
     Raises
     ------
     OutputError
-        When it has no files or memory for it; it panics then, which is no usual exception.
+        If files or memory run out; vl_convert then panics, with a ``BaseException``.
     """
     import vl_convert
 
@@ -71,8 +71,8 @@ def _made(function: str, argument: Mapping[str, Any] | str) -> Any:
         ) from error
 
 
-def specification(chart: altair.TopLevelMixin) -> dict[str, Any]:
-    """Return the Vega-Lite specification of an Altair chart, without a look of its own."""
+def specification(chart: altair.TopLevelMixin) -> Spec:
+    """Return the Vega-Lite specification of an Altair chart, without a theme."""
     spec = chart.to_dict()
     del spec["config"]  # Altair's default theme
     return spec
@@ -80,15 +80,15 @@ def specification(chart: altair.TopLevelMixin) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def bundle() -> str:
-    """Vega, Vega-Lite and vega-embed as one JavaScript module that leaves `window.vegaEmbed`.
+    """Vega, Vega-Lite and vega-embed as one JavaScript module that sets `window.vegaEmbed`.
 
-    It takes two seconds to make, and is kept in the user's cache where there is one.
+    It takes two seconds to make, and is kept in the user's cache if there is one.
     """
     import vl_convert
 
-    # There may be no home, or none that can be written to.
+    # The home folder may be missing, or read-only.
     with suppress(OSError, RuntimeError, OutputError):
-        kept = Entry(_cache() / "vega.json", vl_convert.__version__)
+        kept = Entry(_cache() / "vega.json", vl_convert.__version__)  # type: ignore[attr-defined]  # untyped
         script = (kept.load() or {}).get("script")
         if not isinstance(script, str):
             script = _bundled()
@@ -104,13 +104,13 @@ def _bundled() -> str:
 
 
 def _cache() -> Path:
-    """The folder for what can be made again (XDG Base Directory Specification)."""
+    """The cache folder (XDG Base Directory Specification)."""
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (given if given.is_absolute() else Path.home() / ".cache") / "fotismos"
 
 
 def _inline(svg: str) -> str:
-    """The SVG with ids of its own, since several share one page; described by its figure."""
+    """The SVG with unique ids, since several share one page; its figure describes it."""
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)
     return owned.replace("<svg ", '<svg aria-hidden="true" ', 1)

@@ -1,4 +1,4 @@
-"""What CI services show beside a change: annotations, and a summary as a table.
+"""What CI services show next to a change: annotations, and a summary as a table.
 
 =====================  ==================  ======================================================
 Service                Known by            What is written
@@ -14,45 +14,58 @@ TeamCity               TEAMCITY_VERSION    ``##teamcity[buildProblem]`` lines
 All others get the table in the log, as people do.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from heuristic.errors import InputError
 from reports.ci import junit, lines
 from reports.files import ownership
 from reports.terminal.tables import markdown
 
+if TYPE_CHECKING:
+    from reports.ci.checks import Result
+
 GITHUB = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 GITHUB_PROPERTY = GITHUB | str.maketrans({":": "%3A", ",": "%2C"})
 AZURE = str.maketrans({"%": "%AZP25", "\r": "%0D", "\n": "%0A"})
 AZURE_PROPERTY = str.maketrans({"%": "%AZP25", ";": "%3B", "]": "%5D"})
 TEAMCITY = str.maketrans({c: f"|{c}" for c in "'|[]"} | {"\n": "|n", "\r": "|r"})
-"""What each service wants in place of characters that its lines are made of."""
+"""How each service escapes the characters that its lines are made of."""
 
 
-def annotate(results, folder, level, environment=None, written=None):
+def annotate(
+    results: Sequence[Result],
+    folder: Path,
+    level: float,
+    environment: Mapping[str, str] | None = None,
+    written: Path | None = None,
+) -> list[str]:
     """Write the files that the CI service reads, and return the lines that it looks for.
 
     Parameters
     ----------
     results
-        Of :mod:`reports.ci.checks`.
+        One for each baseline.
     folder
         Folder of the results.
     level
         Significance of the whole command.
     environment
-        Variables of the environment; those of this process where they are not given.
+        Environment variables; if omitted, this process's.
     written
-        A file that has the table already, by ``--summary``.
+        A file that ``--summary`` has already written the table to.
 
     Raises
     ------
     InputError
-        When a file cannot be written to.
+        If a file cannot be written to.
     """
     variables = os.environ if environment is None else environment
     try:
@@ -64,7 +77,13 @@ def annotate(results, folder, level, environment=None, written=None):
         ) from error
 
 
-def _annotate(results, folder, level, variables, written):
+def _annotate(
+    results: Sequence[Result],
+    folder: Path,
+    level: float,
+    variables: Mapping[str, str],
+    written: Path | None,
+) -> list[str]:
     bad = [result for result in results if result.exit_code]
     if variables.get("GITHUB_ACTIONS") == "true":
         summary = variables.get("GITHUB_STEP_SUMMARY")
@@ -88,7 +107,7 @@ def _annotate(results, folder, level, variables, written):
     return []
 
 
-def table(results, level):
+def table(results: Sequence[Result], level: float) -> str:
     """Return the results as a Markdown table."""
     headings = ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
     rows = [headings, *([*map(cell, _cells(result))] for result in results)]
@@ -96,7 +115,7 @@ def table(results, level):
     return "\n".join([*head, *markdown(rows, right=3)]) + "\n\n"
 
 
-def _cells(result):
+def _cells(result: Result) -> tuple[str, ...]:
     if result.check is None or not result.check.moved:
         return result.name, result.status, result.message, "", "", "", ""
     moved = result.check.moved
@@ -104,43 +123,43 @@ def _cells(result):
     return result.name, result.status, f"{what} ({len(moved)} in all)", *numbers
 
 
-def cell(text):
-    """Return text in one line that Markdown shows as it is; `markdown` sees to bars."""
+def cell(text: str) -> str:
+    """Return text in one line that Markdown shows unchanged; `markdown` escapes bars."""
     text = junit.clean(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
-def _title(result):
-    """Name the baseline, and say so if it could not be checked; what moved is in the headline."""
+def _title(result: Result) -> str:
+    """Name the baseline, and say whether it could be checked; the headline says what moved."""
     name = junit.clean(result.name)
     return f"fotismos check: {name}" + " not checked" * (result.status == "error")
 
 
-def _github(result, variables):
+def _github(result: Result, variables: Mapping[str, str]) -> str:
     place = os.path.relpath(result.path, variables.get("GITHUB_WORKSPACE") or ".")
     file = junit.clean(Path(place).as_posix()).translate(GITHUB_PROPERTY)
     title = _title(result).translate(GITHUB_PROPERTY)
     return f"::error file={file},title={title}::{junit.headline(result).translate(GITHUB)}"
 
 
-def _azure(result):
+def _azure(result: Result) -> str:
     place = junit.clean(os.path.relpath(result.path)).translate(AZURE_PROPERTY)
     text = junit.headline(result).translate(AZURE)
     return f"##vso[task.logissue type=error;sourcepath={place}]{_title(result)}: {text}"
 
 
-def _teamcity(result):
+def _teamcity(result: Result) -> str:
     text = f"{_title(result)}: {junit.headline(result)}".translate(TEAMCITY)
     text = "".join(c if ord(c) < 128 else f"|0x{ord(c):04X}" for c in text)
     return f"##teamcity[buildProblem description='{text}']"
 
 
-def _code_quality(result):
+def _code_quality(result: Result) -> dict[str, Any]:
     path = junit.clean(Path(os.path.relpath(result.path)).as_posix())
     return {
         "description": f"{_title(result)}: {junit.headline(result)}",
         "check_name": "fotismos check",
-        # One finding for one baseline, however its numbers move: GitLab compares branches by it.
+        # One per baseline, however its numbers move: GitLab compares branches by it.
         "fingerprint": hashlib.sha256(path.encode()).hexdigest(),
         "severity": "critical" if result.status == "error" else "major",
         "location": {"path": path, "lines": {"begin": 1}},

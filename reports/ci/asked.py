@@ -1,4 +1,4 @@
-"""What CI asks of a command beside its results: bounds, a JUnit file, a summary in Markdown."""
+"""Options for CI: bounds, a JUnit file, a summary in Markdown."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Share(click.ParamType):
         except ValueError:
             share = math.nan
         if not (sign and not rest and 0.0 <= share <= 1.0):
-            told = f"{value!r} is not a percentage: write one from 0% to 100%, such as 5%."
+            told = f"{value!r} is not a percentage: give one from 0% to 100%, such as 5%."
             self.fail(told, parameter, context)
         return share
 
@@ -51,7 +51,7 @@ bounds = (
         "--max-visible",
         type=Share(),
         metavar="P%",
-        help="Exit code 1 if in a larger share of a scene's pixels ΔE2000 is above 2, by more than"
+        help="Exit code 1 if a larger share of a scene's pixels has ΔE2000 above 2, by more than"
         " noise.",
     ),
 )
@@ -82,12 +82,12 @@ def with_options(*options: Callable) -> Callable:
 
 
 def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
-    """Write a JUnit file, if one was asked for.
+    """Write a JUnit file, if one was requested.
 
     Raises
     ------
     InputError
-        When it cannot be written to.
+        If it cannot be written to.
     """
     if path is None:
         return
@@ -102,16 +102,16 @@ def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
 
 @dataclass
 class Judge:
-    """Judges the scenes of a run in the end, and writes what was asked for.
+    """Judges the scenes at the end of a run, and writes the requested files.
 
-    ``words`` are the options of this module by name.
+    ``words`` are the values of this module's options.
     """
 
     words: dict[str, Any]
     exit_code: int = 0
 
     def __call__(self, folder: Path, views: Sequence[SceneView]) -> None:
-        """Set the exit code, 1 where a gate failed."""
+        """Set the exit code: 1 if a gate failed."""
         if not any(value is not None for value in self.words.values()):
             return
         from reports.ci import gates, junit, summaries

@@ -1,14 +1,17 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from comparisons import atomic
-from comparisons.case import SUFFIXES, Request, file_of, open_case
+from comparisons.case import SUFFIXES, Case, Request, file_of, open_case
 from comparisons.check.baseline import FORMAT_0_1, Baseline, parse
 from comparisons.check.measurement import HALVES
 from comparisons.store import content, require_regular
@@ -16,6 +19,9 @@ from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import in_file
 from reports.files import exr
+
+Pictures = Mapping[str, NDArray[np.floating]]
+"""The halves' small pictures, ``{half: (H, W, 3) linear RGB}``."""
 
 
 @dataclass(frozen=True)
@@ -25,44 +31,44 @@ class BaselineFile:
     path: Path
     baseline: Baseline
 
-    def open(self, seed=None):
-        """Open the scene, as :func:`comparisons.case.open_case`.
+    def open(self, seed: int | None = None) -> Case:
+        """Open the scene, see :func:`comparisons.case.open_case`.
 
         Parameters
         ----------
         seed
-            In place of the baseline's own.
+            Replaces the baseline's.
         """
         options = options_from(self.baseline.options, self.path)
         options |= {} if seed is None else {"seed": seed}
         return open_case(scene_from(self.baseline.scene, self.path), Request.of(options))
 
-    def pictures(self):
-        """Return the halves' small pictures by name, or None where the baseline has none.
+    def pictures(self) -> Pictures | None:
+        """Return the small pictures, or None if the baseline has none.
 
         Raises
         ------
         InputError
-            When they cannot be read.
+            If they cannot be read.
         """
         if not self.baseline.images:
             return None
         return _read_pictures(self.path.parent / Path(self.baseline.images).name)
 
 
-def find(path):
-    """Return the files that ``path`` stands for: itself, or the baselines in a folder, by name.
+def find(path: str | Path) -> list[Path]:
+    """Return the baselines at ``path``: the file itself, or a folder's, sorted.
 
     Raises
     ------
     InputError
-        When there is nothing.
+        If there are none.
     """
     path = Path(path)
     if path.is_dir():
         found = sorted(path.glob("*.json"))
         if not found:
-            raise InputError(f"{path}: no baseline (*.json) is in this folder. {_HOW}")
+            raise InputError(f"{path}: this folder has no baseline (*.json). {_HOW}")
         return found
     if not path.is_file():
         raise InputError(f"{path}: there is no such baseline. {_HOW}")
@@ -70,7 +76,7 @@ def find(path):
 
 
 LARGEST = 2**24
-"""Bytes of a baseline, and of its pictures: a thousand times what is written."""
+"""Bytes of a baseline, and of its pictures: a thousand times their usual size."""
 
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
@@ -81,13 +87,13 @@ HEADS = ('{\n  "record_version"', "{\n  " + FORMAT_0_1)
 _HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`."
 
 
-def read(path):
+def read(path: Path) -> BaselineFile:
     """Read a baseline.
 
     Raises
     ------
     InputError
-        When it cannot be read, or is none.
+        If the file cannot be read, or is not a baseline.
     """
     try:
         text = content(path, LARGEST).decode()
@@ -96,8 +102,8 @@ def read(path):
     return BaselineFile(path, parse(text, str(path)))
 
 
-def was_ours(path):
-    """Tell whether a file that cannot be read begins as baselines do, if only with a part of it."""
+def was_ours(path: Path) -> bool:
+    """Return whether a broken file begins as baselines do, or is cut off in their beginning."""
     try:
         text = content(path, LARGEST).decode(errors="replace")
     except OSError:
@@ -105,13 +111,13 @@ def was_ours(path):
     return any(text.startswith(head) or head.startswith(text) for head in HEADS)
 
 
-def write(path, baseline, pictures=None):
-    """Write a baseline atomically, with small pictures of both halves where given.
+def write(path: Path, baseline: Baseline, pictures: Pictures | None = None) -> None:
+    """Write a baseline atomically, with its small pictures if given.
 
     Raises
     ------
     InputError
-        When the place cannot be written to.
+        If the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -119,7 +125,7 @@ def write(path, baseline, pictures=None):
             require_regular(path)
         if pictures is not None:
             images = path.with_suffix(".exr")
-            # "baseline." keeps the layers at half precision, which pictures are fine with.
+            # "baseline." keeps the layers at half precision, which is enough for pictures.
             layers = {f"baseline.{half}": image for half, image in pictures.items()}
             exr.write(images, layers, {"scene": baseline.scene})
             baseline = structs.replace(baseline, images=images.name)
@@ -130,36 +136,36 @@ def write(path, baseline, pictures=None):
         ) from error
 
 
-def scene_from(scene, path):
-    """Return the scene of a baseline as a name for :func:`comparisons.case.open_case`."""
+def scene_from(scene: str, path: Path) -> str:
+    """Return a baseline's scene as :func:`comparisons.case.open_case` takes it."""
     beside = path.parent / scene
     return str(beside) if Path(scene).suffix in SUFFIXES or beside.is_file() else scene
 
 
-def scene_for(scene, path):
-    """Return how a baseline at ``path`` names a scene: files relative to its own folder.
+def scene_for(scene: str, path: Path) -> str:
+    """Return how a baseline at ``path`` names a scene: files relative to the baseline's folder.
 
     Raises
     ------
     InputError
-        When the file is not there.
+        If the file does not exist.
     """
     file = file_of(scene)
     return scene if file is None else Path(os.path.relpath(file, path.parent)).as_posix()
 
 
-def options_from(options, path):
-    """Return the options of a baseline as a :class:`comparisons.case.Request` takes them."""
+def options_from(options: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return a baseline's options as a :class:`comparisons.case.Request` takes them."""
     return _with_heuristic(options, lambda file: os.path.relpath(path.parent / file))
 
 
-def options_for(options, path):
-    """Return options as a baseline at ``path`` has them: files relative to its own folder."""
+def options_for(options: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return options as a baseline at ``path`` has them: files relative to its folder."""
     return _with_heuristic(options, lambda file: os.path.relpath(file, path.parent))
 
 
-def _with_heuristic(options, placed):
-    """Return options whose heuristic, where it is in a file, has another path."""
+def _with_heuristic(options: Mapping[str, Any], placed: Callable[[str], str]) -> dict[str, Any]:
+    """Return options with another path for the heuristic's file, if it has one."""
     file, function = in_file(options.get("heuristic", "")) or ("", "")
     if not file:
         return dict(options)
@@ -167,16 +173,16 @@ def _with_heuristic(options, placed):
     return dict(options) | {"heuristic": word}
 
 
-def name_of(scene):
-    """Return what the baseline of a scene is called: its name, or its file's."""
+def name_of(scene: str | Path) -> str:
+    """Return the name of a scene's baseline: the scene's, or its file's."""
     return Path(scene).stem if Path(scene).suffix in SUFFIXES else str(scene)
 
 
-def _read_pictures(path):
+def _read_pictures(path: Path) -> Pictures:
     import OpenEXR
 
     try:
-        content(path, LARGEST)  # refuses what is not a file before it is opened
+        content(path, LARGEST)  # rejects all but regular files, before one is opened
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
             pictures = {
@@ -185,8 +191,7 @@ def _read_pictures(path):
                 )
                 for half in HALVES
             }
-    # Of what is not an EXR file, the library says so in many ways.
-    except Exception as error:
+    except Exception as error:  # the library has many for a file that is not EXR
         raise _unreadable(path, error) from error
     for picture in pictures.values():
         if picture.ndim != 3 or max(picture.shape) > LONGEST_KEPT or not np.isfinite(picture).all():
@@ -194,7 +199,7 @@ def _read_pictures(path):
     return pictures
 
 
-def _unreadable(path, reason):
+def _unreadable(path: Path, reason: object) -> InputError:
     return InputError(
         f"{path}: the baseline's pictures cannot be read: {reason}. Write them again with"
         f" `{program.command('check', 'BASELINE', '--update', '--images')}`."

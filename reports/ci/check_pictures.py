@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from matplotlib import colormaps
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from comparisons.check.measurement import HALVES, block_edges
+from comparisons.check.check import Check
+from comparisons.check.measurement import HALVES, Pictures, block_edges
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.spaces import luminance
+from reports.ci import baselines
 from reports.ci.baselines import LONGEST_KEPT
 from reports.files import images
+
+Picture = Image.Image
+Place = tuple[int, int]
 
 LONGEST = 640
 """Pixels of the longer side; small pictures are enlarged, pixel by pixel."""
@@ -19,21 +27,20 @@ NAMES = tuple(half + kind for half in HALVES for kind in ("", "-before", "-chang
 """Names of all pictures that a failure can have."""
 
 LARGEST_ERROR = 2.0
-"""ΔE2000 at which the error maps' colours end: what moved is often hardly noticeable."""
+"""ΔE2000 at which the error maps' colours end: changes are often hardly noticeable."""
 
 LEAST_P = 1e-6
 """The p-value at which the map's colours end."""
 
 
-def pictures(check, before=None):
-    """Return the PNG files of a check by name.
+def pictures(check: Check, before: baselines.Pictures | None = None) -> dict[str, bytes]:
+    """Return a check's pictures, ``{name: PNG file}``.
 
-    ``heuristic`` and ``reference`` are the halves as they are now; ``*-change`` says by how much
-    the luminance of each block changed, ``*-p`` how probable that is by chance, corrected for all
-    that was tested; ``*-before`` is the baseline's own picture, where ``before`` has it, and
-    ``*-error`` ΔE2000 from it.
+    ``heuristic`` and ``reference`` are the halves now. ``*-change`` is the change of each block's
+    luminance, ``*-p`` its probability by chance, corrected for all that was tested. With the
+    baseline's pictures ``before``, ``*-before`` shows them, and ``*-error`` is ΔE2000 from them.
     """
-    made = {}
+    made: dict[str, Picture] = {}
     for half in HALVES:
         now = getattr(check.pictures, half)
         made[half] = _enlarged(images.tonemap(now))
@@ -47,15 +54,15 @@ def pictures(check, before=None):
     return {name: images.png(picture) for name, picture in made.items()}
 
 
-def reduced(pictures):
-    """Return both halves by name, averaged down to what a baseline keeps."""
+def reduced(pictures: Pictures) -> baselines.Pictures:
+    """Return both halves, averaged down to :data:`LONGEST_KEPT` pixels."""
     height, width = pictures.heuristic.shape[:2]
     scale = min(1.0, LONGEST_KEPT / max(height, width))
     size = max(1, round(height * scale)), max(1, round(width * scale))
     return {half: _reduced_to(getattr(pictures, half), size) for half in HALVES}
 
 
-def _reduced_to(image, size):
+def _reduced_to(image: NDArray, size: Sequence[int]) -> NDArray[np.floating]:
     """Average an image (H, W, 3) down to ``(height, width)``."""
     if image.shape[:2] == tuple(size):
         return image
@@ -68,7 +75,7 @@ def _reduced_to(image, size):
     return np.stack([np.asarray(plane, float) for plane in planes], axis=-1)
 
 
-def _change(check, half, now):
+def _change(check: Check, half: str, now: NDArray) -> Picture:
     old, new = (luminance(m.colours[half].blocks) for m in (check.before, check.after))
     change = (new - old) / np.maximum(np.abs(old), 1e-4)
     limit = max(float(np.abs(change).max()), 1e-6)
@@ -76,18 +83,18 @@ def _change(check, half, now):
     return _over(now, 0.5 + 0.5 * change / limit, images.SIGNED_COLOURS, labels)
 
 
-def _percent(change):
+def _percent(change: float) -> str:
     return f"{100 * change:+.2g} %" if abs(change) >= 1e-6 else "0"
 
 
-def _p_values(check, half, now):
+def _p_values(check: Check, half: str, now: NDArray) -> Picture:
     p = check.p_values(half)
     labels = [[f"p {value:.1g}" if value < 0.995 else "" for value in row] for row in p]
     share = np.log(np.maximum(p, LEAST_P)) / np.log(LEAST_P)
     return _over(now, share, images.ERROR_COLOURS, labels)
 
 
-def _over(now, share, colours, labels):
+def _over(now: NDArray, share: NDArray, colours: str, labels: Sequence[Sequence[str]]) -> Picture:
     """Draw blocks, coloured by a share from 0 to 1 and labelled, over the picture in grey."""
     picture = _enlarged(images.tonemap(now)).convert("L").convert("RGB")
     shade = colormaps[colours](np.clip(share, 0.0, 1.0))[..., :3]
@@ -114,7 +121,7 @@ def _over(now, share, colours, labels):
     return picture
 
 
-def _boxes(shape, size):
+def _boxes(shape: Sequence[int], size: Place) -> Iterator[tuple[Place, tuple[int, int, int, int]]]:
     """Yield each block's ``(row, column)`` and its corners in an enlarged picture."""
     rows, columns = (block_edges(side) for side in shape)
     x, y = columns * size[0] // shape[1], rows * size[1] // shape[0]
@@ -123,7 +130,7 @@ def _boxes(shape, size):
             yield (row, column), (x[column], y[row], x[column + 1] - 1, y[row + 1] - 1)
 
 
-def _enlarged(picture):
+def _enlarged(picture: Picture) -> Picture:
     factor = max(1, LONGEST // max(picture.size))
     size = picture.width * factor, picture.height * factor
     return picture.resize(size, Image.Resampling.NEAREST)

@@ -1,17 +1,21 @@
 """The results of checks as records, for ``--json`` and for the files of a failure."""
 
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from msgspec import Meta
 
 from comparisons.check.moved import Move
 from comparisons.records import VERSION, Amount, Count, Record, Share
 
+if TYPE_CHECKING:
+    from reports.ci.checks import Result
+
 Status = Literal["passed", "failed", "error", "created", "updated", "unchanged"]
 
 
 class Before(Record):
-    """A metric, as the baseline has it and now."""
+    """A metric in the baseline, and now."""
 
     before: float
     after: float
@@ -25,7 +29,7 @@ class VersionChange(Record):
 
 
 class CheckRecord(Record, kw_only=True, omit_defaults=True):
-    """What became of one baseline; of one that was not compared, the numbers are left out."""
+    """The result for one baseline; without numbers if it was not compared."""
 
     record_version: int
     baseline: Annotated[str, Meta(description="Path of its file.")]
@@ -44,7 +48,7 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
     ] = ()
     objects: Annotated[
         dict[str, dict[str, Share]] | None,
-        Meta(description="By half: the share of the change that each object has."),
+        Meta(description="By half: each object's share of the change."),
     ] = None
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
 
@@ -58,9 +62,9 @@ class Checks(Record, kw_only=True):
     checks: tuple[CheckRecord, ...]
 
 
-def of(result):
-    """Return the record of one :class:`reports.ci.checks.Result`."""
-    compared = {}
+def of(result: "Result") -> CheckRecord:
+    """Return the record of one result."""
+    compared: dict[str, Any] = {}
     if result.check is not None:
         check = result.check
         compared = {
@@ -84,11 +88,11 @@ def of(result):
         versions=result.versions or None,
         causes=result.causes,
         objects=result.objects,
-        pictures=result.folder and result.folder.as_posix(),
+        pictures=result.folder.as_posix() if result.folder else None,
     )
 
 
-def of_all(results, level):
-    """Return the record of the results of one command."""
+def of_all(results: Sequence["Result"], level: float) -> Checks:
+    """Return the record of one command's results."""
     passed = all(result.exit_code == 0 for result in results)
     return Checks(passed=passed, significance=level, checks=tuple(map(of, results)))

@@ -1,61 +1,66 @@
 """Checking scenes against baselines, and writing baselines and the pictures of what failed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from comparisons import record
+from comparisons.case import Case
 from comparisons.check import baseline, check, suspects
+from comparisons.check.baseline import Baseline
 from comparisons.check.check import Check
 from comparisons.check.measurement import HALVES
 from comparisons.check.moved import LEVEL
+from comparisons.compare import Progress
 from comparisons.records import to_json
 from heuristic.errors import FotismosError
 from reference.scene.graph import set_variant
 from reports.ci import baselines, check_pictures, check_record
-from reports.ci.baselines import BaselineFile
-from reports.ci.check_record import VersionChange
+from reports.ci.baselines import BaselineFile, Pictures
+from reports.ci.check_record import Status, VersionChange
 from reports.files import ownership
 
 FILES = ("check.json", *(f"{name}.png" for name in check_pictures.NAMES))
-"""What a failure leaves in its folder."""
+"""The files of a failure."""
 
 ERROR = 2
-"""Exit code of what could not be checked, told apart from 1, which means that something moved."""
+"""Exit code if a baseline could not be checked; 1 means that something moved."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one baseline.
+    """The result for one baseline.
 
     Attributes
     ----------
     path, scene
         The baseline's file, and the scene that it names.
     status
-        ``passed``, ``failed`` (something moved), ``error`` (it could not be told); of an update
-        ``created``, ``updated`` or ``unchanged``.
+        ``passed``, ``failed`` (something moved), ``error`` (not checked); of an update ``created``,
+        ``updated`` or ``unchanged``.
     seconds
         Time that it took.
     check
-        The comparison with the baseline; None where there was none to compare with.
+        The comparison with the baseline; None if there was nothing to compare with.
     message
-        Of an error, or on an update.
+        The error, or a remark on an update.
     exit_code
-        0, 1 for a failure, 2 for an error, whatever its reason.
+        0, 1 for a failure, 2 for an error.
     folder
-        Where the pictures of a failure are.
+        The folder of a failure's pictures.
     versions
-        Those that changed since the baseline was made, by name.
+        Libraries whose version changed since the baseline was made.
     causes
-        Of a failure: sentences on why, as far as the numbers tell.
+        Likely reasons for a failure, in sentences.
     objects
-        Of a failure: the share of the change that each object has, by half.
+        Each object's share of a failure's change, by half.
     """
 
     path: Path
     scene: str
-    status: str
+    status: Status
     seconds: float = 0.0
     check: Check | None = None
     message: str = ""
@@ -66,32 +71,38 @@ class Result:
     objects: dict[str, dict[str, float]] | None = None
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Return the baseline's name."""
         return self.path.stem
 
 
-def examine(file, case, level=LEVEL, folder=None, progress=None):
-    """Check a scene against its baseline, and write pictures of what failed.
+def examine(
+    file: BaselineFile,
+    case: Case,
+    level: float = LEVEL,
+    folder: Path | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Check a scene against its baseline, and write pictures of a failure.
 
     Parameters
     ----------
-    file : BaselineFile
+    file
         The baseline.
     case
         The scene, see :meth:`BaselineFile.open`.
     level
         Chance of an alarm though nothing changed.
     folder
-        For the pictures, which are written only if something moved; those of an earlier failure
-        are deleted.
+        For the pictures, which are written only if something moved; an earlier failure's are
+        deleted.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
 
     Raises
     ------
     FotismosError
-        When the scene cannot be measured, or the baseline's pictures cannot be read.
+        If the scene cannot be measured, or the baseline's pictures cannot be read.
     """
     begin = perf_counter()
     pictures = file.pictures()
@@ -110,15 +121,22 @@ def examine(file, case, level=LEVEL, folder=None, progress=None):
         **({} if found.passed else _explained(found, pictures)),
     )
     if result.folder is not None:
-        _write_failure(result, pictures)
+        _write_failure(result, result.folder, found, pictures)
     return result
 
 
-def update(file, case, level=LEVEL, images=False, progress=None):
-    """Measure again, and write the baseline if anything moved; else its file stays as it is."""
+def update(
+    file: BaselineFile,
+    case: Case,
+    level: float = LEVEL,
+    images: bool = False,
+    progress: Progress | None = None,
+) -> Result:
+    """Measure again, and write the baseline if anything moved, or pictures are to be added."""
     begin = perf_counter()
     found = _checked(file, case, level, progress)
-    old, new, message = file.baseline, None, ""
+    old, message = file.baseline, ""
+    new: Baseline | None = None
     if not found.passed:
         new = baseline.of(old.scene, old.options, found.after)
     elif images and not old.images:
@@ -126,12 +144,14 @@ def update(file, case, level=LEVEL, images=False, progress=None):
     if new is not None:
         kept = check_pictures.reduced(found.pictures) if images or old.images else None
         baselines.write(file.path, new, kept)
-    status = "unchanged" if found.passed else "updated"
+    status: Status = "unchanged" if found.passed else "updated"
     return Result(file.path, old.scene, status, perf_counter() - begin, found, message)
 
 
-def create(path, scene, case, images=False, progress=None):
-    """Measure a scene, and write a baseline of it, in place of any that is there.
+def create(
+    path: Path, scene: str, case: Case, images: bool = False, progress: Progress | None = None
+) -> Result:
+    """Measure a scene, and write or replace its baseline.
 
     Parameters
     ----------
@@ -140,24 +160,24 @@ def create(path, scene, case, images=False, progress=None):
     scene
         How the baseline names the scene.
     case
-        The scene; the resolution is a small one unless it is given.
+        The scene; its resolution is small unless requested otherwise.
     images
-        Write pictures beside it.
+        Write pictures next to it.
     progress
-        As of :func:`comparisons.compare.compare`.
+        See :func:`comparisons.compare.compare`.
     """
     begin = perf_counter()
     case = check.made_small(case)
     measured = check.measure_scene(case.source, case.options, progress=progress)
     options = baselines.options_for(case.asking(spp=measured.spp).request.stated(), path)
-    status = "updated" if path.exists() else "created"
+    status: Status = "updated" if path.exists() else "created"
     new = baseline.of(scene, options, measured.measurement)
     baselines.write(path, new, check_pictures.reduced(measured.pictures) if images else None)
     return Result(path, scene, status, perf_counter() - begin)
 
 
-def guarded(run, path, *more):
-    """Call ``run(path, *more)``; whatever it raises is the error of this baseline alone.
+def guarded(run: Callable[..., Result], path: Path, *more: Any) -> Result:
+    """Return ``run(path, *more)``; an exception becomes this baseline's result.
 
     An interruption and ``SystemExit`` pass through.
     """
@@ -168,7 +188,7 @@ def guarded(run, path, *more):
         return failed(path, error, perf_counter() - begin)
 
 
-def failed(path, error, seconds=0.0):
+def failed(path: Path, error: BaseException, seconds: float = 0.0) -> Result:
     """Return the result of a baseline that an exception kept from being judged."""
     kind = "" if isinstance(error, FotismosError) else f"{type(error).__name__}: "
     where = "" if str(error).startswith(str(path)) else f"{path}: "
@@ -176,12 +196,12 @@ def failed(path, error, seconds=0.0):
     return Result(path, "", "error", seconds=seconds, message=message, exit_code=ERROR)
 
 
-def _checked(file: BaselineFile, case, level, progress):
+def _checked(file: BaselineFile, case: Case, level: float, progress: Progress | None) -> Check:
     set_variant(case.variant)
     return check.check(case.source, case.options, file.baseline.measured(), level, progress)
 
 
-def _changed_versions(baseline):
+def _changed_versions(baseline: Baseline) -> dict[str, VersionChange]:
     now = record.versions()
     return {
         name: VersionChange(old, now.get(name, "none"))
@@ -190,17 +210,16 @@ def _changed_versions(baseline):
     }
 
 
-def _explained(found: Check, before):
+def _explained(found: Check, before: Pictures | None) -> dict[str, Any]:
     """Return causes and objects of a failure; ``before`` are the baseline's pictures, if any."""
     halves = (half for half in HALVES if any(move.half == half for move in found.moved))
     objects = {half: found.objects(half, before and before[half]) for half in halves}
     return {"causes": tuple(suspects.causes(found)), "objects": objects}
 
 
-def _write_failure(result, before):
-    """Write pictures and the record; ``before`` are the pictures of the baseline, if any."""
-    folder = result.folder
+def _write_failure(result: Result, folder: Path, found: Check, before: Pictures | None) -> None:
+    """Write pictures and the record; ``before`` are the baseline's pictures, if any."""
     ownership.folder(folder)
-    for name, png in check_pictures.pictures(result.check, before).items():
+    for name, png in check_pictures.pictures(found, before).items():
         ownership.write(folder / f"{name}.png", png)
     ownership.write(folder / "check.json", to_json(check_record.of(result)))

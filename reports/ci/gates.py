@@ -1,14 +1,14 @@
-"""Bounds on what a comparison may find: beyond one, ``compare`` ends with exit code 1.
+"""Bounds on the results of a comparison: beyond one, ``compare`` ends with exit code 1.
 
-A gate fails only where noise cannot be the reason: the lower end of the 95 % interval is above the
-bound. Where the interval holds the bound more samples decide, and the gate is undetermined.
+A gate fails only if noise cannot be the reason: the lower end of the 95 % interval is above the
+bound. If the interval contains the bound, the gate is undetermined: more samples decide.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING
@@ -16,23 +16,25 @@ from reports.terminal.printing import number, percent
 from reports.terminal.tables import printed
 from reports.verdict import USUAL
 
-FAILED, UNDETERMINED, PASSED = "failed", "undetermined", "passed"
+FAILED: Final = "failed"
+UNDETERMINED: Final = "undetermined"
+PASSED: Final = "passed"
 
 HEADINGS = ("scene", "gate", "bound", "found", "from", "to", "result")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one gate for one scene.
+    """The result of one gate for one scene.
 
     Attributes
     ----------
     scene, gate
-        The scene's name, and what is bounded, in words.
+        The names of the scene, and of the bounded quantity.
     bound, found, low, high
-        What is allowed, what was found, and its 95 % interval; shares for the share of pixels.
+        The largest value allowed, the value found, and its 95 % interval.
     is_share
-        Whether these are printed as percentages.
+        Whether these are shares, printed as percentages.
     """
 
     scene: str
@@ -45,13 +47,13 @@ class Outcome:
 
     @property
     def state(self) -> Literal["failed", "undetermined", "passed"]:
-        """Return what the interval says of the bound."""
+        """Return whether the interval is above the bound, contains it, or is below."""
         if self.low > self.bound:
             return FAILED
         return PASSED if self.high <= self.bound else UNDETERMINED
 
     def cells(self) -> tuple[str, ...]:
-        """Return what a table says of it, under :data:`HEADINGS`."""
+        """Return the cells of its row in a table, under :data:`HEADINGS`."""
         form = percent if self.is_share else number
         numbers = self.bound, self.found, self.low, self.high
         return self.scene, self.gate, *map(form, numbers), self.state
@@ -63,7 +65,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Gates:
-    """The bounds of a command, None for none.
+    """The bounds of a command; None for no bound.
 
     Attributes
     ----------
@@ -92,7 +94,7 @@ class Gates:
 
 
 def lines(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """Yield what people read of the gates of a run."""
+    """Yield the lines on the gates of a run."""
     yield ""
     yield from printed([HEADINGS, *(outcome.cells() for outcome in outcomes)], right=2)
     yield verdict(outcomes)

@@ -1,14 +1,22 @@
 """The results of checks as JUnit XML, which CI services show as tests."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from reports.ci import lines
 
+if TYPE_CHECKING:
+    from reports.ci.checks import Result
+    from reports.ci.gates import Outcome
+
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def document(results):
+def document(results: Sequence[Result]) -> bytes:
     """Return the XML document, one test case for each baseline."""
     statuses = [result.status for result in results]
     totals = {
@@ -24,7 +32,7 @@ def document(results):
         names = {"name": clean(result.name), "file": clean(result.path.as_posix())}
         time = f"{result.seconds:.3f}"
         case = SubElement(suite, "testcase", names, classname="fotismos.check", time=time)
-        if result.status == "failed":
+        if result.status == "failed" and result.check:
             failure = SubElement(case, "failure", message=headline(result), type="moved")
             failure.text = clean("\n".join(lines.moved_lines(result.check)))
         elif result.status == "error":
@@ -34,8 +42,8 @@ def document(results):
     return tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def of_gates(outcomes):
-    """Return the XML document of the gates of a comparison, one test case for each."""
+def of_gates(outcomes: Sequence[Outcome]) -> bytes:
+    """Return the XML document of a comparison's gates, one test case for each."""
     states = [outcome.state for outcome in outcomes]
     totals = {
         "name": "fotismos compare",
@@ -55,7 +63,7 @@ def of_gates(outcomes):
     return tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def headline(result):
+def headline(result: Result) -> str:
     """Return one line on a baseline that did not pass."""
     if result.check is None:
         return clean(result.message)
@@ -67,6 +75,6 @@ def headline(result):
     )
 
 
-def clean(text):
-    """Return text with a mark in place of what XML and UTF-8 cannot hold, as a file's name may."""
+def clean(text: str) -> str:
+    """Return text with "�" for characters that XML and UTF-8 forbid; file names may have them."""
     return NOT_IN_XML.sub("�", text)

@@ -1,14 +1,24 @@
 """The results of checks as lines for a terminal."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
 from heuristic import program
 from reports.terminal.tables import printed
+
+if TYPE_CHECKING:
+    from comparisons.check.check import Check
+    from comparisons.check.moved import Move
+    from reports.ci.checks import Result
 
 SHOWN = 12
 """Quantities of a scene that are listed; all are in the record."""
 
 
-def lines(results, level):
-    """Yield what people read: what moved in each scene, then a table of all."""
+def lines(results: Sequence[Result], level: float) -> Iterator[str]:
+    """Yield what moved in each scene, then a table of all scenes."""
     for result in results:
         yield from _details(result)
     if len(results) > 1:
@@ -17,7 +27,7 @@ def lines(results, level):
     yield verdict(results, level)
 
 
-def verdict(results, level):
+def verdict(results: Sequence[Result], level: float) -> str:
     """Return the line that says how it went."""
     count = len(results)
     updates = [r for r in results if r.status in ("created", "updated", "unchanged")]
@@ -32,7 +42,7 @@ def verdict(results, level):
     return text + (f"; {errors} could not be checked" if errors else "")
 
 
-def moved_lines(check):
+def moved_lines(check: Check) -> Iterator[str]:
     """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
     yield from printed(_moves(check), right=2)
     more = len(check.moved) - SHOWN
@@ -40,7 +50,7 @@ def moved_lines(check):
         yield f"and {more} more; {len(check.moves)} quantities were tested"
 
 
-def _moves(check):
+def _moves(check: Check) -> Iterator[Sequence[str]]:
     yield "what moved", "baseline", "now", "change", "standard errors", "p"
     for move in check.moved[:SHOWN]:
         old, new = move.before, move.after
@@ -49,8 +59,8 @@ def _moves(check):
         yield name, before, now, change, *certainty
 
 
-def moved_cells(move):
-    """Return what a table says of a move: its name, from, to, standard errors and p-value."""
+def moved_cells(move: Move) -> tuple[str, ...]:
+    """Return the cells of a move: its name, from, to, standard errors and p-value."""
     errors = move.standard_errors
     return (
         move.quantity,
@@ -61,14 +71,14 @@ def moved_cells(move):
     )
 
 
-def versions_line(result):
-    """Return what else changed since the baseline, or nothing."""
+def versions_line(result: Result) -> str:
+    """Return which versions changed since the baseline; empty for none."""
     changed = (result.versions or {}).items()
     changes = ", ".join(f"{name} {both.before} -> {both.after}" for name, both in changed)
     return f"versions since the baseline: {changes}" if changes else ""
 
 
-def _details(result):
+def _details(result: Result) -> Iterator[str]:
     if result.check is None or not result.check.moved:
         if result.message:
             yield f"{result.name}: {result.message}"
@@ -84,7 +94,7 @@ def _details(result):
     yield ""
 
 
-def _summary(results):
+def _summary(results: Sequence[Result]) -> Iterator[Sequence[str]]:
     yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "least p", "time"
     for result in results:
         cells = [""] * 5

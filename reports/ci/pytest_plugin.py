@@ -1,4 +1,4 @@
-"""The pytest plugin: departures and baselines of scenes in a test suite of anyone's.
+"""The pytest plugin: departures and baselines of scenes in your tests.
 
 ::
 
@@ -12,19 +12,25 @@ A mark renders a test in other variants, one test for each::
 
     @pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_spectral")
 
-Baselines are in ``baselines/`` beside the test's file; ``pytest --fotismos-update`` writes them.
-Where there is no usable LLVM the tests are skipped, with the reason. Nothing of Mitsuba is imported
-before a test asks for the fixture.
+Baselines are in ``baselines/`` next to the test's file; ``pytest --fotismos-update`` writes them.
+Without a usable LLVM the tests are skipped, with the reason. Mitsuba is not imported before a test
+requests the fixture.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import pytest
+
+if TYPE_CHECKING:
+    from reports.ci.testing import Fotismos
 
 MARK = "fotismos_variant"
 
 
-def pytest_addoption(parser):
+def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that writes baselines."""
     parser.getgroup("fotismos").addoption(
         "--fotismos-update",
@@ -33,7 +39,7 @@ def pytest_addoption(parser):
     )
 
 
-def pytest_configure(config):
+def pytest_configure(config: pytest.Config) -> None:
     """Make the mark known."""
     config.addinivalue_line(
         "markers",
@@ -41,7 +47,7 @@ def pytest_configure(config):
     )
 
 
-def pytest_generate_tests(metafunc):
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Make one test for each variant of the mark."""
     mark = metafunc.definition.get_closest_marker(MARK)
     if mark is not None and "fotismos" in metafunc.fixturenames:
@@ -49,7 +55,7 @@ def pytest_generate_tests(metafunc):
 
 
 @pytest.fixture
-def fotismos(request):
+def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
     """Departures and baselines of scenes: see :class:`reports.ci.testing.Fotismos`."""
     from heuristic import backend
     from heuristic.errors import InstallationError
@@ -64,7 +70,7 @@ def fotismos(request):
     from reports.ci.testing import Fotismos
 
     before, variant = mi.variant(), getattr(request, "param", None)
-    # A test may make a scene of Mitsuba's types, which needs a variant.
+    # A test may make a scene from Mitsuba's types, which needs a variant.
     set_variant(variant or before or "llvm_ad_rgb")
     yield Fotismos(
         folder=request.path.parent / "baselines",
@@ -76,8 +82,8 @@ def fotismos(request):
         mi.set_variant(before)
 
 
-def pytest_assertrepr_compare(op, left, right):
-    """Explain a departure that is not what a test wants."""
+def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
+    """Explain a departure for which an assertion failed."""
     for one in (left, right):
         explain = getattr(type(one), "fotismos_explanation", None)
         if explain is not None:

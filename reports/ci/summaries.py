@@ -1,21 +1,23 @@
 """Summaries in Markdown, fit for a comment on a pull request: a table and a link, no pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from heuristic.errors import OutputError
 from reports import verdict
-from reports.ci import annotations, gates
-from reports.ci.annotations import cell
+from reports.ci import gates
+from reports.ci.annotations import cell, table
 from reports.page.scene_view import SceneView
 from reports.terminal.printing import number, percent
 from reports.terminal.tables import markdown
 
+if TYPE_CHECKING:
+    from reports.ci.checks import Result
+
 
 def of_comparison(views: Sequence[SceneView], outcomes: Sequence[gates.Outcome], page: str) -> str:
-    """Return the summary of a run: what it found, a row for each scene, and its gates.
+    """Return the summary of a run: its finding, a row for each scene, and its gates.
 
     ``page`` is the address of the page, or its path.
     """
@@ -32,18 +34,18 @@ def of_comparison(views: Sequence[SceneView], outcomes: Sequence[gates.Outcome],
     return "\n\n".join([*parts, _link(page)]) + "\n\n"
 
 
-def of_check(results: Sequence, level: float, page: str) -> str:
-    """Return the summary of a check; ``page`` is empty where none was written."""
-    return annotations.table(results, level) + (_link(page) + "\n\n" if page else "")
+def of_check(results: Sequence["Result"], level: float, page: str) -> str:
+    """Return the summary of a check; ``page`` is empty if none was written."""
+    return table(results, level) + (_link(page) + "\n\n" if page else "")
 
 
 def append(path: Path, text: str) -> None:
-    """Append a summary to a file, which may have other content, and is made if it is not there.
+    """Append a summary to a file, which is made if it does not exist.
 
     Raises
     ------
     OutputError
-        When it cannot be written to.
+        If it cannot be written to.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

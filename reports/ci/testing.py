@@ -1,4 +1,4 @@
-"""What a test says about a scene: how far it departs from physics, and that nothing moved."""
+"""Assertions on a scene: how far it departs from physics, and that nothing moved."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import total_ordering
 from pathlib import Path
+from typing import Any
 
-from comparisons.case import Request, open_case
+from comparisons.case import Case, Request, Scene, open_case
 from comparisons.check import check
 from comparisons.check.measurement import PASSES
 from comparisons.check.moved import LEVEL
@@ -25,11 +26,11 @@ class Departure:
     Attributes
     ----------
     scene, metric
-        Of what.
+        The names of the scene and the metric.
     value, error
         The metric, and its standard error over ``passes`` independent passes.
     noise_floor
-        What the noise alone would give; None where it gives nothing.
+        The value that noise alone would give; None for a metric without one.
     """
 
     scene: str
@@ -39,28 +40,26 @@ class Departure:
     noise_floor: float | None
     passes: int
 
-    def __float__(self):
+    def __float__(self) -> float:
         return self.value
 
-    def __eq__(self, other):
+    def __eq__(self, other: Any) -> bool:
         return self.value == float(other)
 
-    def __lt__(self, other):
+    def __lt__(self, other: Any) -> bool:
         return self.value < float(other)
 
-    __hash__ = None  # it compares with numbers, whose hash it has not
-
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"{self.metric} {self.value:.4g}"
 
     @property
-    def interval(self):
+    def interval(self) -> tuple[float, float]:
         """Return the 95 % interval of Student's t."""
         amount = student(self.value, self.error, self.passes)
         return amount.low, amount.high
 
-    def fotismos_explanation(self):
-        """Return the lines that an assertion's message gets."""
+    def fotismos_explanation(self) -> list[str]:
+        """Return the lines for the message of a failed assertion."""
         low, high = self.interval
         floor = "" if self.noise_floor is None else f"; noise alone: {self.noise_floor:.4g}"
         return [
@@ -76,11 +75,11 @@ class Fotismos:
     Attributes
     ----------
     folder
-        Where baselines are that are named after their scene.
+        The folder of the baselines.
     pictures
-        Called for the folder of a failure's pictures.
+        Returns the folder for a failure's pictures.
     variant
-        Mitsuba variant in place of the scenes' own.
+        Mitsuba variant that replaces the scenes'.
     update
         Whether to write baselines.
     """
@@ -90,25 +89,20 @@ class Fotismos:
     variant: str | None = None
     update: bool = False
 
-    def departure(self, scene, metric="dE2000", **options):
+    def departure(self, scene: Scene, metric: str = "dE2000", **options: Any) -> Departure:
         """Measure how far textbook shading is from physics.
 
         Parameters
         ----------
         scene
-            A built-in name, the path of a Mitsuba file, from the test's own folder or else from the
-            current one, a dictionary as ``mitsuba.load_dict`` takes it, or a function that returns
-            one.
+            A built-in name, the path of a Mitsuba file (relative to the test's folder, else to the
+            current one), a dictionary for ``mitsuba.load_dict``, or a function that returns one.
         metric
             ``dE2000``, ``dE_ITP``, ``dE_CAM16UCS``, ``rmse`` or ``log2_luminance``.
         options
             Those of the command line: ``resolution``, ``spp``, ``seed``, ``heuristic``, ... A
-            heuristic may be a function of a point; a file is sought as a scene's is. The longer
-            side is 64 pixels where no resolution is given.
-
-        Returns
-        -------
-        Departure
+            heuristic may also be a function of a point; its file is found as a scene's is. Without
+            a resolution, the longer side is 64 pixels.
         """
         case = check.made_small(
             _open(self._found(scene), self._given({}) | self._placed(options), "scene")
@@ -121,30 +115,31 @@ class Fotismos:
             case.name, metric, measured.value, measured.error, measured.noise_floor, PASSES
         )
 
-    def unchanged(self, scene, name=None, significance=LEVEL, **options):
-        """Fail the test unless a scene is as its baseline says.
+    def unchanged(
+        self,
+        scene: Scene,
+        name: str | None = None,
+        significance: float = LEVEL,
+        **options: Any,
+    ) -> bool:
+        """Return True; fail the test if a scene moved from its baseline.
 
         Parameters
         ----------
         scene
-            As of :meth:`departure`, or the path of a baseline (.json) that is there.
+            See :meth:`departure`; or the path of an existing baseline (.json).
         name
-            Of the baseline, in place of the scene's own; a dictionary needs one.
+            The baseline's name; if omitted, the scene's. A dictionary needs one.
         significance
             Chance of a failure though nothing changed.
         options
-            As of :meth:`departure`. Those of a baseline that is there are its own; only other ones
-            given here count, and with ``--fotismos-update`` they are written.
-
-        Returns
-        -------
-        bool
-            True.
+            See :meth:`departure`. An existing baseline has its own; if those given here differ, the
+            test fails, or ``--fotismos-update`` writes them.
 
         Raises
         ------
         AssertionError
-            With the table of what moved, or for a baseline that is missing.
+            With the table of what moved, or for a missing baseline.
         """
         scene = self._found(scene)
         given = self._given(options)
@@ -166,7 +161,7 @@ class Fotismos:
         if others:
             if not self.update:
                 raise AssertionError(
-                    f"{path}: the baseline has other options than the test: {others}."
+                    f"{path}: the options of the baseline and the test differ: {others}."
                     " `pytest --fotismos-update` writes it again."
                 )
             checks.create(path, file.baseline.scene, case)
@@ -176,24 +171,24 @@ class Fotismos:
             _require_passed(checks.examine(file, case, significance, self.pictures() / path.stem))
         return True
 
-    def _found(self, scene):
-        """Return a scene; a path from the test's own folder, where there is such a file."""
-        if _in_python(scene):
+    def _found(self, scene: Scene) -> Scene:
+        """Return a scene; a path relative to the test's folder, if there is such a file."""
+        if not isinstance(scene, (str, Path)):
             return scene
         place = self.folder.parent / scene
         return place if place.is_file() else scene
 
-    def _path(self, scene, name):
+    def _path(self, scene: Scene, name: str | None) -> Path:
         if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
             return Path(scene)
         suffix = f"-{self.variant}" if self.variant else ""
         return self.folder / f"{name or _name(scene)}{suffix}.json"
 
-    def _given(self, options):
+    def _given(self, options: dict[str, Any]) -> dict[str, Any]:
         return self._placed(options) | ({"variant": self.variant} if self.variant else {})
 
-    def _placed(self, options):
-        """Return options with a heuristic's file from the test's own folder, if it is there."""
+    def _placed(self, options: dict[str, Any]) -> dict[str, Any]:
+        """Return options with a heuristic's file in the test's folder, if it is there."""
         if "heuristic" not in options:
             return options
         name = known_as(options["heuristic"])
@@ -202,16 +197,18 @@ class Fotismos:
         return options | {"heuristic": str(self.folder.parent / name) if is_beside else name}
 
 
-def _open(scene, options, name=None):
+def _open(scene: Scene, options: Mapping[str, Any], name: str | None = None) -> Case:
     own = (name or _name(scene)) if _in_python(scene) else None
     return open_case(scene, Request.of(options), own)
 
 
-def _in_python(scene):
+def _in_python(scene: Scene) -> bool:
     return isinstance(scene, Mapping) or callable(scene)
 
 
-def _other_options(recorded, given):
+def _other_options(
+    recorded: Mapping[str, Any], given: Mapping[str, Any]
+) -> dict[str, tuple[Any, Any]]:
     """Return ``{name: (baseline's, test's)}`` of the options in which they differ."""
     stated = Request.of(given).stated()
     return {
@@ -221,7 +218,7 @@ def _other_options(recorded, given):
     }
 
 
-def _name(scene):
+def _name(scene: Scene) -> str:
     if callable(scene):
         return scene.__name__
     if isinstance(scene, Mapping):
@@ -229,9 +226,10 @@ def _name(scene):
     return baselines.name_of(scene)
 
 
-def _require_passed(result):
+def _require_passed(result: checks.Result) -> None:
     if result.status == "passed":
         return
+    assert result.check is not None, "a failure has a comparison"
     text = [f"{result.path}: {len(result.check.moved)} of {len(result.check.moves)} moved"]
     text += lines.moved_lines(result.check)
     text += [line for line in (lines.versions_line(result), f"pictures: {result.folder}") if line]

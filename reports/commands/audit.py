@@ -1,4 +1,4 @@
-"""``fotismos audit``: what holds of a heuristic or a BSDF, before any scene."""
+"""``fotismos audit``: properties of a heuristic or a BSDF, before any scene."""
 
 from pathlib import Path
 
@@ -10,11 +10,11 @@ from reports.run import tasks
 from reports.terminal import verbosity
 
 
-def _parameter(text):
-    """Parse ``NAME=VALUE``; a value that is not a number or truth stays a word."""
+def _parameter(text: str) -> tuple[str, float | bool | str]:
+    """Parse ``NAME=VALUE``: a number, ``true`` or ``false``, or else a word."""
     name, separator, value = text.partition("=")
     if not (separator and name and value):
-        raise click.BadParameter(f"{text!r} is no parameter; write it like alpha=0.1.")
+        raise click.BadParameter(f"{text!r} is not a parameter; write it like alpha=0.1.")
     try:
         return name, float(value)
     except ValueError:
@@ -24,7 +24,7 @@ def _parameter(text):
 @click.command()
 @click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
               help="What `compare --heuristic` takes.")  # fmt: skip
-@click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba's, such as roughplastic.")
+@click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba, such as roughplastic.")
 @click.option("-p", "parameters", type=_parameter, multiple=True, metavar="NAME=VALUE",
               help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out")
@@ -32,13 +32,20 @@ def _parameter(text):
 @verbosity.quiet_option
 @verbosity.verbose_option
 @jobs.json_option
-def audit(heuristic, bsdf, parameters, output, timeout, as_json):
-    """Say what holds of a way to shade: energy, reciprocity, continuity, gradients.
+def audit(
+    heuristic: str | None,
+    bsdf: str | None,
+    parameters: tuple[tuple[str, float | bool | str], ...],
+    output: Path,
+    timeout: float,
+    as_json: bool,
+) -> None:
+    """Check a heuristic or BSDF: energy, reciprocity, continuity, gradients.
 
-    Asks it about white materials from all directions, and prints a table of checks with the worst
+    Evaluates it on white materials for all directions, and prints a table of checks with the worst
     case of each. Writes audit.json and audit.svg, the albedo over angles, to OUTPUT/audit/NAME.
-    Textbook shading breaks most of the checks: the exit code is 1 only where a value is NaN,
-    infinite or negative.
+    Textbook shading fails most of the checks: the exit code is 1 only if a value is NaN, infinite
+    or negative.
 
     \b
     Examples:
@@ -46,9 +53,10 @@ def audit(heuristic, bsdf, parameters, output, timeout, as_json):
       fotismos audit --heuristic my_shader.py:toon
       fotismos audit --bsdf roughplastic -p alpha=0.1
     """  # noqa: D301 click reads the \b as: keep these lines
-    if (heuristic is None) == (bsdf is None):
-        raise click.UsageError("give what to audit: --heuristic or --bsdf, one of them.")
-    kind, name = ("heuristic", heuristic) if bsdf is None else ("bsdf", bsdf)
+    name = heuristic or bsdf
+    if not name or (heuristic and bsdf):
+        raise click.UsageError("give one of --heuristic and --bsdf.")
+    kind = "heuristic" if heuristic else "bsdf"
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons.records import to_json
@@ -73,7 +81,7 @@ def audit(heuristic, bsdf, parameters, output, timeout, as_json):
 
 
 def _wanted(name: str) -> tuple[str, Path | None]:
-    """Return the name of a folder, and the file of a heuristic in one: one for each function."""
+    """Return a folder's name, one for each function, and the heuristic's file if it has one."""
     from heuristic.heuristics import in_file
 
     if (found := in_file(name)) is None:

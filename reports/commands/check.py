@@ -1,6 +1,8 @@
 """``fotismos check``: whether a change moved anything that was measured before."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -19,13 +21,13 @@ from reports.terminal import verbosity
     "scenes",
     multiple=True,
     metavar="SCENE",
-    help="With --update: the scene that BASELINE is to be of. In a folder a baseline is"
-    " named after its scene, and there may be several.",
+    help="With --update: the scene of BASELINE; several for a folder, whose baselines are named"
+    " after their scenes.",
 )
 @click.option(
     "--images",
     is_flag=True,
-    help="With --update: keep small pictures beside BASELINE, for people to compare.",
+    help="With --update: keep small pictures next to BASELINE, for people to compare.",
 )
 @click.option(
     "--significance",
@@ -45,14 +47,29 @@ from reports.terminal import verbosity
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.pass_context
-def check(context, baseline, update, scenes, images, significance, as_json, junit, summary, link,
-          output, timeout, workers, scheduler, **rendering):  # fmt: skip
-    """Say whether anything that was measured before moved by more than noise.
+def check(
+    context: click.Context,
+    baseline: Path,
+    update: bool,
+    scenes: tuple[str, ...],
+    images: bool,
+    significance: float,
+    as_json: bool,
+    junit: Path | None,
+    summary: Path | None,
+    link: str | None,
+    output: Path,
+    timeout: float,
+    workers: int,
+    scheduler: str | None,
+    **rendering: Any,
+) -> None:
+    """Report whether anything that was measured before moved by more than noise.
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
-    again with the options in its baseline, the seed included; --seed takes another. If something
-    moved, the exit code is 1, and OUTPUT holds pictures of where. If one could not be checked, it
-    is 2; the others are checked all the same.
+    again with its baseline's options and seed; --seed replaces the seed. If something moved, the
+    exit code is 1, and OUTPUT has pictures that show where. If a baseline could not be checked, it
+    is 2; the others are checked nevertheless.
 
     A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
 
@@ -107,12 +124,14 @@ def check(context, baseline, update, scenes, images, significance, as_json, juni
     context.exit(max(result.exit_code for result in results))
 
 
-def _require_consistent(update, scenes, images, given):
-    """Refuse what belongs to --update alone: a check renders what the baseline says."""
+def _require_consistent(
+    update: bool, scenes: tuple[str, ...], images: bool, given: Mapping[str, Any]
+) -> None:
+    """Reject options that need --update: a check renders what the baseline says."""
     wanting = [f"--{name.replace('_', '-')}" for name in given if name != "seed"]
     wanting += ["--scene"] * bool(scenes) + ["--images"] * images
     if wanting and not update:
         raise InputError(
-            f"{', '.join(wanting)}: a check renders its baseline's own scene and options. Add"
-            " --update to write another baseline."
+            f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
+            " to write another baseline."
         )

@@ -1,5 +1,8 @@
 """``fotismos compare``: how far textbook shading is from physics."""
 
+from pathlib import Path
+from typing import Any
+
 import click
 
 from reports import jobs, opening
@@ -22,13 +25,13 @@ from reports.terminal import verbosity
     "--image",
     multiple=True,
     metavar="FILE",
-    help="A picture of the scene, .exr (FILE.exr:LAYER) or .png, in place of the heuristic half;"
-    " several are repeats, from which their noise is known.",
+    help="A picture of the scene, .exr (FILE.exr:LAYER) or .png, that replaces the heuristic half;"
+    " several are repeats, which show its noise.",
 )
 @click.option(
     "--transfer",
     type=click.Choice(["linear", "srgb"]),
-    help="What the values of the picture are. [default: linear for .exr]",
+    help="Transfer function of the picture. [default: linear for .exr]",
 )
 @verbosity.quiet_option
 @verbosity.verbose_option
@@ -36,49 +39,49 @@ from reports.terminal import verbosity
     "--noise",
     type=float,
     metavar="DE",
-    help="Go on until 95 % of pixels have noise under this ΔE2000; --spp is then the most samples"
-    " per pixel. [default limit: 4096]",
+    help="Continue until 95 % of pixels have noise under this ΔE2000, up to --spp samples per"
+    " pixel. [default limit: 4096]",
 )
 @jobs.scene_options
 @click.option(
     "--why/--no-why",
     "with_cost",
     default=None,
-    help="Find causes and remedies, in a small size; not of a picture. [default: why]",
+    help="Find causes and remedies, at a small size; not for a picture. [default: why]",
 )
 @opening.option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
 @asked.with_options(*asked.bounds, *asked.files)
 @click.pass_context
 def compare(
-    context,
-    scenes,
-    output,
-    figures,
-    fresh,
-    with_cost,
-    cost,
-    scripts,
-    timeout,
-    workers,
-    scheduler,
-    is_opened,
-    max_mean,
-    max_visible,
-    junit,
-    summary,
-    link,
-    **rendering,
-):
-    """Say how far textbook shading is from physics, where, and whether that is more than noise.
+    context: click.Context,
+    scenes: tuple[str, ...],
+    output: Path,
+    figures: bool,
+    fresh: bool,
+    with_cost: bool | None,
+    cost: bool,
+    scripts: bool,
+    timeout: float,
+    workers: int,
+    scheduler: str | None,
+    is_opened: bool,
+    max_mean: float | None,
+    max_visible: float | None,
+    junit: Path | None,
+    summary: Path | None,
+    link: str | None,
+    **rendering: Any,
+) -> None:
+    """Measure how far textbook shading is from physics, where, and whether it is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
     which `scene` is a dictionary or returns one, or a folder: the Mitsuba files in it and its
-    subfolders that others do not include. Python files in a folder are code, and run only with
+    subfolders that no other file includes. Python files in a folder are code, and run only with
     --scripts. Writes OUTPUT/index.html and tables of all scenes, and for each scene
-    comparison.json, comparison.exr and pictures. Of several scenes, one that fails keeps no other
-    from being compared. An interrupted run keeps its finished scenes and its passes: the same
-    command goes on where it stopped, to the same image.
+    comparison.json, comparison.exr and pictures. If one scene fails, the others are still
+    compared. An interrupted run keeps its finished scenes and passes: the same command resumes it,
+    and gives the same image.
 
     \b
     Examples:

@@ -1,5 +1,8 @@
 """``fotismos cost``: what each step of accuracy costs in time."""
 
+from pathlib import Path
+from typing import Any
+
 import click
 
 from comparisons.processes.worker import Task
@@ -22,16 +25,25 @@ from reports.terminal import verbosity
 @click.option(
     "--at", type=jobs.resolution, metavar="WxH", help="Predict time and error at this size."
 )
-@click.option("--measure", "is_measured", is_flag=True, help="With --at, measure there, too.")
+@click.option("--measure", "is_measured", is_flag=True, help="With --at: measure at it, too.")
 @jobs.json_option
-def cost(scene, output, figures, rounds, at, is_measured, as_json, timeout, **rendering):
-    """Say what each step of accuracy costs in time, and which effect is worth paying for.
+def cost(
+    scene: str,
+    output: Path,
+    figures: bool,
+    rounds: int | None,
+    at: tuple[int, int] | None,
+    is_measured: bool,
+    as_json: bool,
+    timeout: float,
+    **rendering: Any,
+) -> None:
+    """Measure what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
     prices each effect in which textbook shading differs. Writes cost.json, cost.svg and
     pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without --resolution the film is reduced
-    to 128 pixels of width; --spp gives the samples a pixel of the largest count, 64 where it is not
-    given.
+    to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
     \b
     Examples:
@@ -40,7 +52,7 @@ def cost(scene, output, figures, rounds, at, is_measured, as_json, timeout, **re
       fotismos cost cornell-box --at 1920x1080
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
-        raise InputError("--measure says what to do at a size: give one with --at, as 1920x1080.")
+        raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()

@@ -1,6 +1,7 @@
-"""``fotismos doctor``: what the installation consists of, and whether it renders."""
+"""``fotismos doctor``: versions of the installation, and whether it renders."""
 
 import platform
+from collections.abc import Iterable, Iterator
 from importlib import metadata
 
 import click
@@ -14,11 +15,11 @@ from reports import jobs
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "flip-evaluator", "OpenEXR")
 
 TIMEOUT_S = 300
-"""Seconds for a test rendering, which takes some ten where nothing is compiled yet."""
+"""Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
 
 
 @click.command()
-def doctor():
+def doctor() -> None:
     """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
 
     \b
@@ -29,22 +30,22 @@ def doctor():
         click.echo(line)
 
 
-def examine(variants):
+def examine(variants: Iterable[str]) -> Iterator[str]:
     """Yield lines on versions, LLVM, a test rendering for each variant, OpenGL and metrics.
 
     Raises
     ------
     InstallationError
-        When Dr.Jit found no LLVM that it can work with.
+        If Dr.Jit finds no usable LLVM.
     LostProcessError
-        When rendering ends the process that does it.
+        If rendering ends its process.
     """
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
     for library in LIBRARIES:
         yield f"{library:<15} {metadata.version(library)}"
     info = backend.check()
-    version = ".".join(map(str, info.version))
+    version = ".".join(map(str, info.version or ()))
     yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
     if info.note:
         yield f"                {info.note}"
@@ -57,8 +58,8 @@ def examine(variants):
         yield f"metrics         at most {apart:.0e} from those of colour-science"
 
 
-def rendered(variant):
-    """Render a small figure in a variant, and say how that went."""
+def rendered(variant: str) -> str:
+    """Render a small figure in a variant, and return that it renders."""
     from reference.scene.graph import set_variant
 
     set_variant(variant)
@@ -69,20 +70,20 @@ def rendered(variant):
     return "renders"
 
 
-def shaded():
-    """Compile and run a small shader, and say where; or what is to be installed, which may wait."""
+def shaded() -> str:
+    """Compile and run a small shader, and return on which device, or what to install."""
     from heuristic.glsl import gpu, shader_files
 
     try:
         device = gpu.device()
     except InstallationError as error:
-        return f"cannot be run, which is needed for --heuristic FILE.glsl alone: {error}"
+        return f"cannot be run; only --heuristic FILE.glsl needs it: {error}"
     shader_files.tried("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
     return f"runs on {device.renderer}{', a software GPU' if device.is_software else ''}"
 
 
-def drawn():
-    """Draw nothing with three.js, and say by which version; or what is to be installed."""
+def drawn() -> str:
+    """Draw nothing with three.js, and return its version, or what to install."""
     from heuristic.three_js import browser
 
     identity = [[float(row == column) for column in range(4)] for row in range(4)]
@@ -90,24 +91,24 @@ def drawn():
     try:
         browser.draw(empty | {"width": 2, "height": 2})
     except InstallationError as error:
-        return f"cannot be run, which is needed for --heuristic three:phong alone: {error}"
+        return f"cannot be run; only --heuristic three:phong needs it: {error}"
     return f"draws, version {browser.version()}"
 
 
-def compared():
-    """Return how far colour differences are from those of colour-science.
+def compared() -> float:
+    """Return how far colour differences are from colour-science's.
 
     Raises
     ------
     InstallationError
-        When they are too far.
+        If they are too far.
     """
     from comparisons.departure import definitions
 
     apart = definitions.farthest()
     if not apart <= definitions.AGREEMENT:
         raise InstallationError(
-            f"colour differences are {apart:.1e} from those of colour-science, and"
+            f"colour differences are {apart:.1e} from colour-science's, and"
             f" {definitions.AGREEMENT:g} is allowed. Install the pinned versions: `./run` does."
         )
     return apart

@@ -1,5 +1,8 @@
 """``fotismos export``: a scene for another program."""
 
+from pathlib import Path
+from typing import Any
+
 import click
 
 from comparisons.processes.worker import Task
@@ -16,11 +19,11 @@ from reports.terminal import verbosity
 @jobs.scene_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-def export(scene, output, timeout, **rendering):
-    """Write what another program needs to render the same scene, for `compare --image`.
+def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
+    """Write a scene for another program to render, for `compare --image`.
 
     Writes to OUTPUT/export/SCENE: the camera as matrices of Mitsuba and OpenGL, geometry as glTF
-    and OBJ, lights and materials as paired, what each pixel sees as EXR, and a README of
+    and OBJ, lights and materials as paired, the surface in each pixel as EXR, and a README on
     conventions.
 
     \b

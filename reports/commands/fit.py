@@ -1,7 +1,8 @@
-"""``fotismos fit``: the best heuristic parameters, and what they leave."""
+"""``fotismos fit``: the best heuristic parameters, and the error that remains."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -19,41 +20,48 @@ from reports.terminal import verbosity
     default="perceptual",
     show_default=True,
     type=click.Choice(["perceptual", "linear", "log-luminance"]),
-    help="What is minimised: the mean colour difference in CAM16-UCS, or the mean square"
-    " of the difference in linear RGB or of the ratio of luminances.",
+    help="Loss to minimise: the mean colour difference in CAM16-UCS, or the mean square of the"
+    " difference in linear RGB or of the ratio of luminances.",
 )
 @click.option(
     "--form",
     default="all",
     show_default=True,
     type=click.Choice(["phong", "blinn", "all"]),
-    help="Form of the lobe, each also normalised.",
+    help="Form of the lobe, with and without normalisation.",
 )
 @click.option(
     "--intensities",
     is_flag=True,
-    help="Fit the lights' intensities too, against that of the first; and ambient light,"
-    " where the scene has none.",
+    help="Fit the lights' intensities, too, relative to the first; and ambient light, if the scene"
+    " has none.",
 )
 @jobs.json_option
 @click.option(
     "--markdown",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write the departures of all scenes as a table in Markdown, too.",
+    help="Also write the departures of all scenes as a Markdown table.",
 )
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-def fit(scenes, output, form, as_json, markdown, timeout, **words):
-    """Find the heuristic parameters that come nearest to the reference, and say what they leave.
+def fit(
+    scenes: tuple[str, ...],
+    output: Path,
+    form: str,
+    as_json: bool,
+    markdown: Path | None,
+    timeout: float,
+    **words: Any,
+) -> None:
+    """Find the heuristic parameters nearest to the reference, and the error that remains.
 
-    What the best parameters remove of the loss is the parameter error, what they leave the model
-    error: no parameters remove it. Writes fit.json and fit.png (before, reference, after,
-    residual) to OUTPUT/fit/SCENE. Unless told otherwise it renders 96x96 pixels with 64 samples
-    each.
+    The loss that the best parameters remove is the parameter error. The rest is the model error,
+    which no parameters remove. Writes fit.json and fit.png (before, reference, after, residual) to
+    OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each.
 
     \b
     Examples:

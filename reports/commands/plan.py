@@ -1,5 +1,8 @@
 """``fotismos plan``: which effects a scene calls for."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import click
 
 from comparisons.processes.worker import Task
@@ -16,19 +19,27 @@ from reports.terminal import verbosity
     "--within",
     type=jobs.Within(min=0, min_open=True),
     metavar="ERROR",
-    help="Measure the ladder of cost, and name its cheapest method of no larger error.",
+    help="Measure the ladder of `cost`, and name its cheapest method within this error.",
 )
 @click.option(
-    "--metric", default="dE2000", show_default=True, help="With --within: whose mean the error is."
+    "--metric", default="dE2000", show_default=True, help="With --within: metric of the mean error."
 )
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
 @verbosity.verbose_option
-def plan(scene, as_json, verify, within, metric, timeout, **rendering):
-    """Say which effects a scene calls for, by which rule, and what will be simulated.
+def plan(
+    scene: str,
+    as_json: bool,
+    verify: bool,
+    within: float | None,
+    metric: str,
+    timeout: float,
+    **rendering: Any,
+) -> None:
+    """List the effects that a scene calls for, by which rule, and what will be simulated.
 
-    With --within the exit code is 1 where no method measured stays within the error.
+    With --within, the exit code is 1 if no measured method stays within the error.
 
     \b
     Examples:
@@ -37,13 +48,14 @@ def plan(scene, as_json, verify, within, metric, timeout, **rendering):
       fotismos plan --within 5 cornell-box
     """  # noqa: D301 click reads the \b as: keep these lines
     if verify and within is not None:
-        raise click.UsageError("--verify and --within are two questions: ask one at a time.")
+        raise click.UsageError("--verify and --within exclude each other: give one.")
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from comparisons.records import to_json
         from reports.terminal import choice_lines, plan_lines, progress
 
+        lines: Iterable[str]
         request, code = jobs.request(rendering), 0
         if within is not None:
             with progress.shown() as bar:

@@ -1,20 +1,33 @@
 """``fotismos report``: all built-in scenes in one report."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from comparisons.processes.pool import Pool
 from comparisons.processes.worker import Task
 from reports import jobs, opening
 from reports.run import batch, tasks
 from reports.terminal import verbosity
 
+if TYPE_CHECKING:
+    from comparisons.case import Request
+    from comparisons.hard.collection import HardCases
+    from comparisons.verification import Verification
+    from reports.run.stages import Run
+    from reports.terminal.progress import Bar
+
 VERIFIED_AT = (64, 64)
 """Resolution at which a report verifies its plans."""
 
 QUICK = {"resolution": (64, 64), "spp": 16}
-"""What ``--quick`` stands for where nothing else is asked for."""
+"""The defaults of ``--quick``."""
 
 QUICKLY_VERIFIED_AT = (32, 32)
 
@@ -31,12 +44,22 @@ QUICKLY_VERIFIED_AT = (32, 32)
 @verbosity.verbose_option
 @click.option("--quick", is_flag=True, help="Everything at a small size, in a minute or two.")
 @opening.option
-def report(output, figures, fresh, timeout, workers, scheduler, quick, is_opened, **rendering):
+def report(
+    output: Path,
+    figures: bool,
+    fresh: bool,
+    timeout: float,
+    workers: int | None,
+    scheduler: str | None,
+    quick: bool,
+    is_opened: bool,
+    **rendering: Any,
+) -> None:
     """Compare all built-in scenes, price their effects, and write one report.
 
-    Writes what `compare` does, and in the page the plans verified, the hard cases and the
-    index of equations. The page is there after some seconds, with all scenes at a small size, and
-    is written again as they are refined.
+    Writes the files of `compare`; the page also has verified plans, the hard cases and the index of
+    equations. The page appears after some seconds, with all scenes at a small size, and is written
+    again as they are refined.
 
     \b
     Examples:
@@ -50,7 +73,7 @@ def report(output, figures, fresh, timeout, workers, scheduler, quick, is_opened
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
 
-    def more(pool, run, bar):
+    def more(pool: Pool, run: Run, bar: Bar) -> dict[str, Any]:
         from heuristic import equations
 
         names = [] if request.everything else list(SCENES)
@@ -67,7 +90,9 @@ def report(output, figures, fresh, timeout, workers, scheduler, quick, is_opened
     batch.run(tuple(SCENES), output, wanted, rendered, more, opening.seen(is_opened))
 
 
-def _verified(pool, bar, names, request, quick):
+def _verified(
+    pool: Pool, bar: Bar, names: Sequence[str], request: Request, quick: bool
+) -> tuple[HardCases, list[Verification]]:
     """Evaluate the hard cases, and compare the plan of each scene with everything simulated."""
     from comparisons.check.moved import level_of_each
     from comparisons.verification import LEVEL

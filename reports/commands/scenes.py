@@ -4,8 +4,8 @@ import click
 
 
 @click.command()
-def scenes():
-    """List the built-in scenes, by name and with a sentence each.
+def scenes() -> None:
+    """List the built-in scenes, each with a sentence.
 
     \b
     Examples:

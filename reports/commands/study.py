@@ -17,7 +17,7 @@ from reports.terminal import verbosity
     "--processes",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes on this machine. [default: one a core]",
+    help="Processes on this machine. [default: one per core]",
 )
 @click.option(
     "--workers",
@@ -30,18 +30,25 @@ from reports.terminal import verbosity
     "--findings",
     type=click.Path(path_type=Path),
     metavar="PAGE.md",
-    help="Write the page that FILE.md.j2 describes, its figures beside it, and the"
-    " dataset beside FILE.",
+    help="Write the page that FILE.md.j2 describes, its figures next to it, and the dataset next"
+    " to FILE.",
 )
 @jobs.timeout_option
 @verbosity.quiet_option
 @verbosity.verbose_option
-def study(file, output, processes, workers, scheduler, findings, timeout):  # fmt: skip
+def study(
+    file: Path,
+    output: Path,
+    processes: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    findings: Path | None,
+    timeout: float,
+) -> None:
     """Compare over a grid or a random design of scenes: one dataset, and maps.
 
-    FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and
-    figures/*.svg to OUTPUT/study/NAME. Points that are finished are kept: a study that ends early
-    goes on where it ended when the same command is given again.
+    FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and figures/*.svg to
+    OUTPUT/study/NAME. Finished points are kept: the same command resumes a study that ended early.
 
     \b
     Examples:

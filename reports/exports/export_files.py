@@ -1,4 +1,4 @@
-"""The files of an export, with a page that says what the numbers mean."""
+"""The files of an export, with a README on the conventions."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ README = """# {name}, for another program
 | scene.gltf | geometry, camera, materials and lights in glTF 2.0, its buffer within |
 | scene.obj | the same geometry as Wavefront OBJ |
 | lights.json, materials.json | lights and materials as paired |
-| gbuffer.exr | what the ray through each pixel's centre meets: `P`, `N`, and `shape.Y` |
+| gbuffer.exr | surface hit by the ray through each pixel's centre: `P`, `N`, and `shape.Y` |
 
 - Space is the scene's world, right-handed. Fronts of triangles are counter-clockwise.
 - `to_world` is Mitsuba's: the camera looks along +z, +y is up, +x is to the left. `view` and
@@ -28,14 +28,15 @@ README = """# {name}, for another program
   I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is.
 - `ambient` in lights.json is added times k_a; in physical terms it is an environment of that
   radiance.
-- Angles are in degrees in JSON, in radians in glTF. `direction` is that in which light travels.
+- Angles are in degrees in JSON, in radians in glTF. `direction` is the direction in which light
+  travels.
 - `alpha` is the root mean square slope of the microfacets; glTF's roughness is its square root.
-- `k_d`, `k_s`, `n` are Phong's, as paired; `base_color`, `alpha`, `ior`, `metallic` the physical
-  material's. What is named in `varies` is a texture, told by its middle.
-- `shape.Y` is the number of the object in scene.obj, from 1; 0 is no surface. Spheres, disks and
-  cylinders are exact in gbuffer.exr, and triangles elsewhere (`--tessellation` says how fine).
+- `k_d`, `k_s`, `n` are Phong's, as paired; `base_color`, `alpha`, `ior`, `metallic` are the
+  physical material's. Those in `varies` are textures, given by their value in the middle.
+- `shape.Y` is the number of the object in scene.obj, from 1; 0 is the background. Spheres, disks
+  and cylinders are exact in gbuffer.exr, and triangles elsewhere (`--tessellation` says how fine).
 
-Write the picture as linear values of BT.709's primaries, without alpha, and compare it:
+Write the picture as linear values with BT.709's primaries, without alpha, and compare it:
 
     {command}
 """

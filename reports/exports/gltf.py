@@ -1,8 +1,8 @@
 """A scene as glTF 2.0: geometry, camera, metallic-roughness materials, punctual lights.
 
 Extensions: ``KHR_materials_ior`` and ``KHR_lights_punctual``, in which a light's intensity is pi
-times the I_p of the pair, as irradiance is. What glTF has no word for (attenuation other than by
-the inverse square) stands in ``extras``.
+times the I_p of the pair, as irradiance is. Attenuation other than by the inverse square, which
+glTF lacks, is in ``extras``.
 """
 
 import base64
@@ -20,13 +20,15 @@ LARGEST_RED = 1.0
 
 
 class _Buffer:
-    """The bytes of all arrays, and what glTF says of them."""
+    """The bytes of all arrays, with their views and accessors."""
 
     def __init__(self) -> None:
-        self.bytes, self.views, self.accessors = b"", [], []
+        self.bytes = b""
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
 
     def add(self, array: np.ndarray, kind: str, target: int) -> int:
-        """Keep an array, and return the number of its accessor."""
+        """Append an array, and return the number of its accessor."""
         number_type = UINT if target == INDICES else FLOAT
         content = np.ascontiguousarray(array, np.uint32 if target == INDICES else np.float32)
         self.views.append(
@@ -47,7 +49,7 @@ class _Buffer:
 
 
 def gltf(scene: Exported) -> dict[str, Any]:
-    """Return the content of the file of a scene, buffer included."""
+    """Return the content of a scene's file, buffer included."""
     buffer = _Buffer()
     meshes = [_mesh(shape, buffer) for shape in scene.shapes]
     nodes: list[dict[str, Any]] = [
@@ -124,7 +126,7 @@ def _camera(scene: Exported) -> dict[str, Any]:
 
 
 def _camera_matrix(scene: Exported) -> list[float]:
-    """Return the camera's place, column by column; it looks along -z."""
+    """Return the camera's to_world matrix, column by column; it looks along -z."""
     return np.linalg.inv(scene.camera["view"]).T.ravel().tolist()
 
 

@@ -1,13 +1,15 @@
-"""Geometry as Wavefront OBJ: one object a shape, in world space."""
+"""Geometry as Wavefront OBJ: one object per shape, in world space."""
 
 from collections.abc import Iterator
+
+from numpy.typing import NDArray
 
 from comparisons.exports.exported import Exported
 from heuristic.scene_data import Triangles
 
 
 def obj(scene: Exported) -> str:
-    """Return the file of a scene's shapes."""
+    """Return the content of the file of a scene's shapes."""
     return "\n".join(_lines(scene)) + "\n"
 
 
@@ -28,7 +30,7 @@ def _lines(scene: Exported) -> Iterator[str]:
         first["vn"] += 0 if shape.normals is None else len(shape.normals)
 
 
-def _rows(word: str, rows) -> Iterator[str]:
+def _rows(word: str, rows: NDArray | None) -> Iterator[str]:
     for row in () if rows is None else rows:
         yield f"{word} " + " ".join(f"{value:.9g}" for value in row)
 

@@ -18,13 +18,11 @@ def lines(record: Audit) -> Iterator[str]:
 
 
 def verdict(record: Audit) -> str:
-    """Return in a phrase what does not hold."""
+    """Return a phrase that names the checks that failed."""
     failed = [check.name for check in record.checks if check.verdict == "does not hold"]
-    return (
-        f"{', '.join(failed)} do not hold"
-        if len(failed) > 1
-        else (f"{failed[0]} does not hold" if failed else "all that was asked holds")
-    )
+    if not failed:
+        return "all that was asked holds"
+    return f"{', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
 
 
 def _rows(record: Audit) -> Iterator[Sequence[str]]:
@@ -34,5 +32,5 @@ def _rows(record: Audit) -> Iterator[Sequence[str]]:
 
 
 def _found(value: float | None) -> str:
-    """Return what was found; a count has no decimals."""
+    """Return the value found; a count has no decimals."""
     return f"{value:g}" if value is not None and value == int(value) else number(value)

@@ -1,4 +1,4 @@
-"""Shapes and materials by their part of the departure, as lines for a terminal and as rows."""
+"""Shapes and materials by their share of the departure, as lines for a terminal and as rows."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from reports.terminal.printing import number, percent
 from reports.terminal.tables import comma_separated, printed
 
 COLUMNS = "name", "material", "pixels", "share", "mean_dE2000", "effect"
-"""Fields of a carrier that a table has."""
+"""Fields of a carrier that the table shows."""
 
 
 def lines(record: ComparisonRecord) -> Iterator[str]:
-    """Yield the table of a scene's shapes; nothing where there is but one."""
+    """Yield the table of a scene's shapes; nothing if there is only one."""
     if len(record.objects) < 2:
         return
     rows = [("shape", "mostly", "departure", "pixels", "mean ΔE2000")]
@@ -28,7 +28,7 @@ def lines(record: ComparisonRecord) -> Iterator[str]:
 
 
 def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
-    """Write ``carriers.csv``, the shapes and materials of a run with numbers in full."""
+    """Write ``carriers.csv``, a run's shapes and materials with numbers in full."""
     ownership.write(ownership.folder(folder) / "carriers.csv", comma_separated(_rows(records)))
 
 

@@ -1,4 +1,4 @@
-"""What ``fotismos plan --within`` answers, in a sentence with a price."""
+"""The answer of ``fotismos plan --within``, in a sentence with a price."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 def sentence(choice: Choice) -> str:
-    """Return the method to take, what it leaves and takes, and what it is in place of."""
+    """Return the method to take, its error and time, and the method that it replaces."""
     label = METRICS[choice.metric].label
     chosen, full = choice.chosen, choice.full
     if chosen is None:
         best = _offered(choice.best, label)
         return (
-            f"No method measured stays within {label} {parameter(choice.within)}. The nearest is"
+            f"No measured method stays within {label} {parameter(choice.within)}. The nearest is"
             f" {best}. Give more samples with --spp, or a larger tolerance."
         )
     if chosen.method == full.method:
@@ -31,6 +31,6 @@ def sentence(choice: Choice) -> str:
 def _offered(offer: Offer, label: str) -> str:
     once = f" and once {seconds(offer.prepare_s)} to prepare" if offer.prepare_s else ""
     return (
-        f"{offer.method} with {offer.spp} samples a pixel: {label} {number(offer.error)} at"
+        f"{offer.method} with {offer.spp} samples per pixel: {label} {number(offer.error)} at"
         f" {seconds(offer.seconds)}{once}"
     )

@@ -1,9 +1,29 @@
 """The tables of ``fotismos cost`` on a terminal."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
 from reports.terminal.tables import printed
 
+if TYPE_CHECKING:
+    from comparisons.cost.cost_record import (
+        AskedPrice,
+        Cheapest,
+        Cost,
+        Estimated,
+        Interval,
+        Measured,
+        Prediction,
+        Range,
+        Reached,
+    )
 
-def lines(record):
+Rows: TypeAlias = Iterator[Sequence[str]]
+
+
+def lines(record: Cost) -> Iterator[str]:
     """Yield the lines of a study: rungs, equal time, equal error, prices, and parts."""
     reference = record.reference
     yield (
@@ -11,11 +31,11 @@ def lines(record):
         f" on {record.machine.cores} cores of {record.machine.processor}"
     )
     yield (
-        f"reference: {reference.integrator}, {reference.spp} samples a pixel; its noise alone"
+        f"reference: {reference.integrator}, {reference.spp} samples per pixel; its noise alone"
         f" gives ΔE2000 = {reference.noise_floor:.3g}"
     )
     if record.guard and record.guard.state == "disagreed":
-        yield "a probe disagreed with the plan, so that everything is simulated: please report it"
+        yield "a probe disagreed with the plan, so everything is simulated: please report it"
     yield from _section("Error and time of each method", _rungs(record))
     for method in record.left_out:
         yield f"left out: {method.name}: {method.reason}"
@@ -23,8 +43,8 @@ def lines(record):
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
     if record.prices.effects:
         yield from _section("Price of an effect", _prices(record))
-        yield "removed: Shapley value, the mean over all orders of adding the effects."
-        yield "alone, last: added first, added last."
+        yield "removed: Shapley value, the mean over all orders of adding the effects"
+        yield "alone, last: added first, added last"
         yield noise(record)
         yield closure(record)
     yield from _section("Parts of the departure, linear", _parts(record))
@@ -33,11 +53,11 @@ def lines(record):
 
 
 SHOWN_SPP = (1, 4, 16, 64, 256, 1024, 4096)
-"""Sample counts of forecasts on the terminal, with those that were measured."""
+"""Sample counts whose forecasts are shown, besides the measured ones."""
 
 
-def predicted(prediction):
-    """Yield the lines of what is predicted at a size."""
+def predicted(prediction: Prediction) -> Iterator[str]:
+    """Yield the lines of a prediction at a size."""
     width, height = prediction.resolution
     sizes = ", ".join("x".join(map(str, size)) for size in prediction.fitted)
     yield from _section(f"Predicted at {width}x{height}", _forecasts(prediction))
@@ -49,7 +69,7 @@ def predicted(prediction):
         yield from _section(f"Price of an effect at {width}x{height}", _asked(prediction.prices))
 
 
-def _forecasts(prediction):
+def _forecasts(prediction: Prediction) -> Rows:
     is_measured = any(forecast.measured for forecast in prediction.forecasts)
     measured = ("measured time", "measured error") if is_measured else ()
     yield "method", "samples", "time", "interval", "mean ΔE2000", "interval", *measured
@@ -67,7 +87,7 @@ def _forecasts(prediction):
             )
 
 
-def _asked(prices):
+def _asked(prices: Iterable[AskedPrice]) -> Rows:
     yield "effect", "removed", "interval", "adds", "interval"
     for price in prices:
         removes = price.removes
@@ -80,20 +100,20 @@ def _asked(prices):
         )
 
 
-def _cheapest(row):
-    if row.method is None:
+def _cheapest(row: Cheapest) -> str:
+    if row.seconds is None:
         return f"ΔE2000 = {row.error:g}: no method reaches it."
     time, interval = _timed(row.seconds.value, row.seconds)
     return f"ΔE2000 = {row.error:g}: {row.method}, {row.spp} samples, {time} ({interval})."
 
 
-def noise(record):
-    """Say how much noise was taken out of the prices."""
-    return f"Noise alone gives ΔE2000 = {record.prices.floor:.2g}; it was taken out."
+def noise(record: Cost) -> str:
+    """Return the noise that was subtracted from the prices, in a sentence."""
+    return f"Noise alone gives ΔE2000 = {record.prices.floor:.2g}; it is subtracted."
 
 
-def closure(record):
-    """Say what prices add up to, and whether what is left is more than its interval."""
+def closure(record: Cost) -> str:
+    """Return the sum of the prices, and whether the rest is more than noise."""
     left, departure = record.closure, record.prices.departure
     closes = left.low <= 0
     judged = "they close" if closes else "more than noise: some effect has no price"
@@ -104,7 +124,7 @@ def closure(record):
     )
 
 
-def _rungs(record):
+def _rungs(record: Cost) -> Rows:
     first = "first run (preparing)"
     yield "method", "samples", "median", "interval", first, "mean ΔE2000", "RMSE", ""
     for point in record.points:
@@ -119,12 +139,12 @@ def _rungs(record):
         )
 
 
-def _first(point):
+def _first(point: Measured) -> str:
     prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
     return f"{_time(point.first_s)}{prepared}"
 
 
-def _equal_time(record):
+def _equal_time(record: Cost) -> Rows:
     yield "within", "method", "samples", "mean ΔE2000", "takes", "interval"
     for row in record.equal_time:
         best = row.best
@@ -134,26 +154,26 @@ def _equal_time(record):
         )
 
 
-def _point(point):
+def _point(point: Measured) -> tuple[str, ...]:
     error = f"{point.error:.3f} ± {point.error_stderr:.3f}"
     return point.rung, f"{point.spp}", error, *_timed(point.seconds.median, point.seconds)
 
 
-def _equal_error(record):
+def _equal_error(record: Cost) -> Rows:
     aims = record.reached_by(record.equal_error[0].method) if record.equal_error else ()
     yield "method", *(f"{aim.error:g}" for aim in aims)
     for method in dict.fromkeys(row.method for row in record.equal_error):
         yield method, *map(_reached, record.reached_by(method))
 
 
-def _reached(row):
+def _reached(row: Reached) -> str:
     if row.seconds is None:
         return "not reached"
     time, interval = _timed(row.seconds.value, row.seconds)
     return f"{'at most ' if row.at_most else ''}{time} ({interval})"
 
 
-def _prices(record):
+def _prices(record: Cost) -> Rows:
     yield "effect", "removed", "95 % interval", "alone", "last", "adds", "95 % interval"
     for price in record.prices.effects:
         removes = price.removes
@@ -167,29 +187,29 @@ def _prices(record):
         )
 
 
-def _parts(record):
+def _parts(record: Cost) -> Rows:
     yield "part", "mean", "standard error", "RMS", "mean ΔE2000"
     for part in (*record.split.parts, record.split.departure):
         numbers = f"{part.mean:+.3g}", f"{part.mean_stderr:.1g}", f"{part.rms:.3g}"
         yield part.name, *numbers, f"{part.dE2000:.3g}"
 
 
-def _all_names(record, name):
-    """Return a rung's name, with those of the methods that the scene cannot tell from it."""
+def _all_names(record: Cost, name: str) -> str:
+    """Return a rung's name, with the methods that give the same image in this scene."""
     (names,) = [rung.names for rung in record.rungs if rung.name == name]
     others = ", ".join(other for other in names if other != name)
     return f"{name} (= {others})" if others else name
 
 
-def _time(seconds):
+def _time(seconds: float) -> str:
     return f"{seconds:.3g} s" if abs(seconds) >= 1 else f"{seconds * 1e3:.3g} ms"
 
 
-def _timed(seconds, interval):
+def _timed(seconds: float, interval: Interval | Range | Estimated) -> tuple[str, str]:
     return _time(seconds), f"{_time(interval.low)} to {_time(interval.high)}"
 
 
-def _section(title, rows):
+def _section(title: str, rows: Rows) -> Iterator[str]:
     yield ""
     yield title
     yield from printed(rows)

@@ -1,13 +1,20 @@
 """Plans and their verification, as lines for a terminal."""
 
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
 from comparisons import record
 from comparisons.comparison import Simulation
 from comparisons.records import VERSION, Amount, Record
 from reports.terminal.tables import printed
 
+if TYPE_CHECKING:
+    from comparisons.compare import Prepared
+    from comparisons.verification import Factor, Verification
+
 
 class PlannedEffect(Record):
-    """Whether a scene calls for an effect, why, and what it would take on either side."""
+    """Whether a scene calls for an effect, why, and what simulates it on either side."""
 
     name: str
     called_for: bool
@@ -19,7 +26,7 @@ class PlannedEffect(Record):
 
 
 class PlanReport(Simulation, kw_only=True):
-    """What ``fotismos plan --json`` prints."""
+    """The output of ``fotismos plan --json``."""
 
     scene: str
     variant: str
@@ -29,7 +36,7 @@ class PlanReport(Simulation, kw_only=True):
     record_version: int = VERSION
 
 
-def report(scene, ready, variant):
+def report(scene: str, ready: "Prepared", variant: str) -> PlanReport:
     """Return the plan of a prepared comparison."""
     effects = (
         PlannedEffect(
@@ -53,8 +60,8 @@ def report(scene, ready, variant):
     )
 
 
-def lines(plan):
-    """Yield the lines of a plan: the table of effects, then what will be simulated."""
+def lines(plan: PlanReport) -> Iterator[str]:
+    """Yield the lines of a plan: the table of effects, then the simulation."""
     yield from printed(_effects(plan))
     yield ""
     if plan.rules:
@@ -64,56 +71,56 @@ def lines(plan):
     rays = "" if plan.shadows else ", no shadow rays"
     rays += ", environment from a table" if plan.tabulated_environment else ""
     picks = plan.light_samples
-    rays += f", {picks} lights a sample in proportion to what they give" if picks else ""
+    rays += f", {picks} lights per sample in proportion to their light" if picks else ""
     reads = ", ".join(plan.heuristic_reads) or "nothing"
     yield f"heuristic     {plan.shading}, which reads {reads}"
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.integrator}{rays}"
     yield f"depth         {depth}"
-    yield f"samples       {plan.spp} a pixel in {plan.passes} passes, {plan.sampler}"
+    yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
 
 
-def verification_lines(results):
+def verification_lines(results: Sequence["Verification"]) -> Iterator[str]:
     """Yield a table of verifications: differences, noise, and time at equal noise."""
     yield from printed(_verifications(results))
     yield "significant: pixels that differ by more than both sides' noise"
-    yield "kernel: largest difference that the terms left out of the kernel make"
+    yield "kernel: largest difference from omitting terms from the kernel"
     yield "faster: how many times sooner the plan reaches the same noise"
     yield ""
     yield from printed(_factors(results))
-    yield "sampler: the plan's in place of the independent one"
-    yield "integrator: the plan's, with nothing left out; pruning: what it leaves out"
+    yield "sampler: the plan's, compared with the independent one"
+    yield "integrator: the plan's, with nothing left out; pruning: leaving effects out"
     yield "all: their product; in brackets 95 % intervals"
 
 
-def _effects(plan):
-    yield "effect", "called for", "rule", "evidence", "what it costs"
+def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "effect", "called for", "rule", "evidence", "cost"
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost
 
 
-def _factors(results):
+def _factors(results: Sequence["Verification"]) -> Iterator[Sequence[str]]:
     yield "scene", *(factor.name for factor in results[0].factors)
     for result in results:
         yield result.scene, *(_interval(factor) for factor in result.factors)
 
 
-def _interval(factor):
+def _interval(factor: "Factor") -> str:
     if factor.low == factor.high:
         return "no change"
     return f"{factor.value:.3g} x ({factor.low:.3g} to {factor.high:.3g})"
 
 
-def _rules(plan):
-    yield "rule of pruning", "applies", "premise that is not known to hold", "evidence"
+def _rules(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "pruning rule", "applies", "premise not known to hold", "evidence"
     for rule in plan.rules:
         yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
 
 
-def _verifications(results):
+def _verifications(results: Sequence["Verification"]) -> Iterator[Sequence[str]]:
     yield "scene", "planned", "significant", "of pixels", "kernel", "faster", "planning"
     for result in results:
         yield (

@@ -8,12 +8,12 @@ from markupsafe import Markup
 
 from comparisons.departure.statistics import Summary
 
-#: A departure of this size, in the metric by which scenes are judged, can be seen.
+#: A departure of this size, in the leading metric, can be seen.
 NOTICEABLE = 1.0
 
 
 def number(value: float | None) -> str:
-    """Three significant digits, in powers of ten below 0.001 and from a million on."""
+    """Three significant digits, as a power of ten below 0.001 and from a million."""
     if value is None:
         return "–"
     size = abs(float(f"{value:.2e}"))  # rounded first: 9.999 is 10.0, not 10.00
@@ -27,7 +27,7 @@ def number(value: float | None) -> str:
 
 
 def difference(value: float | None) -> str:
-    """A colour difference as `number` does, but nobody sees a hundredth of one: "< 0.01"."""
+    """A colour difference like `number`, but "< 0.01" where nobody sees it."""
     if value and abs(value) < 0.01:
         return "< 0.01" if value > 0 else "> −0.01"
     return number(value)
@@ -63,12 +63,12 @@ def code_spans(text: str) -> Markup:
 
 
 def about_noise(metric: Summary) -> bool:
-    """Whether a mean is nothing but noise: it may be 0, and is no more than `NOTICEABLE`."""
+    """Whether a mean may be only noise: it may be 0, and is at most `NOTICEABLE`."""
     return may_be_none(metric) and metric.high <= NOTICEABLE
 
 
 def may_be_none(metric: Summary) -> bool:
-    """Whether a mean may be 0 without its noise, be it that noise hides a departure or not."""
+    """Whether a mean may be 0 without its noise, which may also hide a departure."""
     return metric.noise_floor > 0 and metric.low == 0
 
 

@@ -1,4 +1,4 @@
-"""Tables that every command prints alike, and a run's metrics as CSV and Markdown."""
+"""Tables on the terminal, the same for every command, and a run's metrics as CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -20,19 +20,20 @@ from reports.terminal.printing import number, percent
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
 
-#: Characters to a line of a printed table; longer cells are folded.
+#: Characters per line of a printed table; longer cells are folded.
 WIDTH = 120
 
 
 def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator[str]:
-    """Yield the lines of a table as a terminal shows them, the same to a file as to a screen.
+    """Return the lines of a table, the same on a terminal and in a file.
 
-    The first row has the headings. Cells are set to the right from column ``right`` on.
+    The first row has the headings. Columns from number ``right`` are aligned right.
     """
     headings, *others = rows
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for place, heading in enumerate(headings):
-        justify = "left" if right is None or place < right else "right"
+        is_left = right is None or place < right
+        justify: Literal["left", "right"] = "left" if is_left else "right"
         table.add_column(heading, overflow="fold", justify=justify)
     for row in others:
         table.add_row(*row)
@@ -43,9 +44,9 @@ def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator
 
 
 def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
-    """Yield the lines of a table in Markdown, set to the right from a column on.
+    """Yield the lines of a table in Markdown.
 
-    The first row has the headings.
+    The first row has the headings. Columns from number ``right`` are aligned right.
     """
     headings, *others = rows
     yield _row(headings)
@@ -55,7 +56,7 @@ def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
 
 
 def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
-    """Write ``metrics.csv`` and ``metrics.md`` of the records of a run to a folder."""
+    """Write a run's ``metrics.csv`` and ``metrics.md`` to a folder."""
     ownership.folder(folder)
     records = list(records)
     ownership.write(folder / "metrics.csv", metrics_csv(records))
@@ -63,7 +64,7 @@ def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
 
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the methods and the prices of a study of cost: ``name-cost`` and ``name-prices``."""
+    """Write the methods and prices of a study of cost: ``name-cost`` and ``name-prices``."""
     ownership.folder(folder)
     for part, rows in {"cost": [*methods(record)], "prices": [*prices(record)]}.items():
         ownership.write(folder / f"{name}-{part}.csv", comma_separated(rows))
@@ -82,7 +83,7 @@ def methods(record: Cost) -> Iterator[Sequence[Any]]:
 
 
 def prices(record: Cost) -> Iterator[Sequence[Any]]:
-    """Yield the rows of the effects: mean ΔE2000 that each removes, seconds it adds."""
+    """Yield the rows of the effects: the mean ΔE2000 that each removes, the seconds it adds."""
     yield "effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s"
     for price in record.prices.effects:
         removes = price.removes.value, price.removes.low, price.removes.high
@@ -92,7 +93,7 @@ def prices(record: Cost) -> Iterator[Sequence[Any]]:
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
     """Return a line for each scene and metric, with every number of the record in full.
 
-    Columns are named as in ``comparison.json``; ``after_exposure.`` begins those of the shape.
+    Columns are named as in ``comparison.json``; the shape's begin with ``after_exposure.``.
     """
     rows = [
         {"scene": record.scene, "metric": name}
@@ -121,14 +122,14 @@ def comma_separated(rows: Iterable[Sequence[Any]]) -> str:
 
 
 def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
-    """Yield the lines of a table of a run: each metric's mean, its shape and its noise floor."""
+    """Yield the lines of a run's table: each metric's mean, its shape and its noise floor."""
     yield from markdown(_metrics(records))
     yield ""
     yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
-    yield "that makes it smallest, and what the reference's noise alone would give."
+    yield "that makes it smallest, and the mean that the reference's noise alone would give."
 
 
-def _metrics(records):
+def _metrics(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
     labels = [metric.label for metric in METRICS.values()]
     yield "scene", *labels, "significant", "samples per pixel"
     for record in records:

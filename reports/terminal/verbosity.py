@@ -1,57 +1,60 @@
 """How much a command says: results on standard output, everything else on standard error."""
 
 import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
 
 import click
 
 LEVEL = "fotismos.verbosity"
-"""Key of the number in click's context: -1 quiet, 0 as usual, 1 verbose."""
+"""Key of the level in click's context: -1 quiet, 0 normal, 1 verbose."""
 
 
-def _remember(context, parameter, given):
+def _remember(context: click.Context, parameter: click.Parameter, given: bool) -> None:
     if given:
         context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
 
 
-def _option(letter, name, help):
+def _option(letter: str, name: str, help: str) -> Callable[[Any], Any]:
     return click.option(
         letter, name, is_flag=True, expose_value=False, callback=_remember, help=help
     )
 
 
-quiet_option = _option("-q", "--quiet", "No progress and no tables: only where the results are.")
+quiet_option = _option("-q", "--quiet", "Print only where the results are, no progress or tables.")
 verbose_option = _option(
     "-v",
     "--verbose",
-    "Say more: what is simulated, how lights are paired, what is missed, where time goes.",
+    "Also print the simulation, the pairing of lights, warnings, and times.",
 )
 
 
-def level():
+def level() -> int:
     """Return -1 for a quiet command, 1 for a verbose one, else 0."""
     context = click.get_current_context(silent=True)
     return context.meta.get(LEVEL, 0) if context else 0
 
 
-def is_quiet():
-    """Tell whether the command was asked to be quiet."""
+def is_quiet() -> bool:
+    """Return whether the command is quiet."""
     return level() < 0
 
 
-def tell(lines):
+def tell(lines: Iterable[str]) -> None:
     """Print lines of a result, unless the command is quiet."""
     if not is_quiet():
         for line in lines:
             click.echo(line)
 
 
-def tell_where(path):
-    """Print where the results are; of a quiet command it is all that is printed."""
-    name = os.fsencode(path)  # as it is, also where it is not in UTF-8
+def tell_where(path: Path) -> None:
+    """Print where the results are; a quiet command prints nothing else."""
+    name = os.fsencode(path)  # unchanged, even if it is not in UTF-8
     click.echo(name if is_quiet() else b"\n" + name)
 
 
-def remark(lines):
+def remark(lines: Iterable[str]) -> None:
     """Print lines on standard error, if the command is verbose."""
     if level() > 0:
         for line in lines:

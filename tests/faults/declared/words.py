@@ -34,7 +34,7 @@ def _scene_options() -> Iterator[tuple[str, str, str]]:
         ("--interpolation", "gourad"), ("--pairing", "exact"), ("-D", "x"), ("-D", "=1"),
         ("-D", "nosuch=1"),
     ):  # fmt: skip
-        yield option, value, r"did you mean phong|choose|one of|is no parameter|nosuch"
+        yield option, value, r"did you mean phong|choose|one of|is not a definition|nosuch"
 
 
 SMALL_WORDS = (
