@@ -1,6 +1,8 @@
 """The record's schema, and the page: its numbers are the record's and it loads nothing."""
 
 import copy
+import re
+from collections import Counter
 from html.parser import HTMLParser
 
 import jsonschema
@@ -257,6 +259,15 @@ def test_the_package_holds_its_templates():
         assert (folder / name).is_file()
     assert {path.stem for path in (folder / "viewer").iterdir()} == set(page.SCRIPTS)
     assert {path.stem for path in (folder / "styles").iterdir()} == set(page.STYLES)
+
+
+def test_scripts_declare_each_name_once():
+    """They are joined into one module, where a second declaration is a syntax error."""
+    declared = re.compile(r"^(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
+    sources = ((page.TEMPLATES / "viewer" / f"{name}.js").read_text() for name in page.SCRIPTS)
+    found = Counter(name for source in sources for name in declared.findall(source))
+    assert len(found) > 50
+    assert [name for name, count in found.items() if count > 1] == []
 
 
 def test_the_index_of_equations_is_printed_with_code_and_escaped(record, pictures):

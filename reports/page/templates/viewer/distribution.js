@@ -39,7 +39,7 @@ class Distribution {
     this.part("title").textContent = `${map.title} in ${box ? "the selection" : "the whole image"}`;
     this.showChart(map, top, all, some);
     const lines = box ? [...linesOf(map, some), ["Cause", causeText(causesIn(painter, scene, map, box))]] : linesOf(map, some).slice(0, 2);
-    this.part("numbers").replaceChildren(...lines.map(([name, text]) => row(name, text)));
+    this.part("numbers").replaceChildren(...lines.map(([name, text]) => numberRow(name, text)));
     this.showBand(map, box, all.size);
     this.part("hint").hidden = Boolean(box && view.band);
     this.part("actions").hidden = !box && !view.band;
@@ -143,7 +143,7 @@ function causeText(causes) {
 }
 
 /** @param {string} name @param {string} text */
-function row(name, text) {
+function numberRow(name, text) {
   const line = document.createElement("div");
   const [term, value] = ["dt", "dd"].map((tag) => document.createElement(tag));
   term.textContent = name;

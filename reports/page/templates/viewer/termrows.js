@@ -1,7 +1,7 @@
 // The rows of the table of terms, and the words below its figure.
 
 /** @param {string} name @param {string} words @param {string[]} values @param {string} kind */
-function row(name, words, values, kind = "") {
+function termRow(name, words, values, kind = "") {
   const line = Object.assign(document.createElement("tr"), { className: kind });
   const head = Object.assign(document.createElement("th"), { scope: "row" });
   head.append(...rich(name));
@@ -41,10 +41,10 @@ function colourText(colour) {
 function termRows(point) {
   const { material } = point;
   const rows = [];
-  if (material.k_i.some(Boolean)) rows.push(row("emission", `k_{i} = ${colourText(material.k_i)}`, material.k_i.map(amount)));
-  rows.push(row("ambient", `I_{a} k_{a} = ${colourText(material.ambient)} × ${colourText(material.k_a)}`, point.ambient.map(amount)));
+  if (material.k_i.some(Boolean)) rows.push(termRow("emission", `k_{i} = ${colourText(material.k_i)}`, material.k_i.map(amount)));
+  rows.push(termRow("ambient", `I_{a} k_{a} = ${colourText(material.ambient)} × ${colourText(material.k_a)}`, point.ambient.map(amount)));
   for (const light of point.lights) rows.push(...lightRows(light, material));
-  if (point.others) rows.push(row("other lights", "diffuse and specular", point.others.map(amount)));
+  if (point.others) rows.push(termRow("other lights", "diffuse and specular", point.others.map(amount)));
   return rows;
 }
 
@@ -57,9 +57,9 @@ function lightRows(light, material) {
   const behind = `N·L = ${factor(light.cosIncidence)}: the light is behind the surface`;
   const power = `${factor(cosine, 4)}^{${factor(material.n)}}`;
   return [
-    row(light.name, `I_{p0} f_{att} = ${arriving}`, ["", "", ""], "light"),
-    row("diffuse", isLit ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}` : behind, light.diffuse.map(amount)),
-    row("specular", isLit ? `× k_{s} (${base})^{n} = × ${colourText(material.k_s)} × ${power}` : "", light.specular.map(amount)),
+    termRow(light.name, `I_{p0} f_{att} = ${arriving}`, ["", "", ""], "light"),
+    termRow("diffuse", isLit ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}` : behind, light.diffuse.map(amount)),
+    termRow("specular", isLit ? `× k_{s} (${base})^{n} = × ${colourText(material.k_s)} × ${power}` : "", light.specular.map(amount)),
   ];
 }
 
@@ -68,8 +68,8 @@ function sumRows(point, images) {
   const [x, y] = point.pixel;
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
-  const rows = point.material ? [row("textbook", "the sum of the terms", point.total.map(amount), "total")] : [];
-  rows.push(row("physical", `± ${shown("standard_error")} in its noisiest channel`, ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)), "reference"));
+  const rows = point.material ? [termRow("textbook", "the sum of the terms", point.total.map(amount), "total")] : [];
+  rows.push(termRow("physical", `± ${shown("standard_error")} in its noisiest channel`, ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)), "reference"));
   return rows;
 }
 
