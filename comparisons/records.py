@@ -8,7 +8,7 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 import inspect
 import json
 import re
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import msgspec
 import numpy as np
@@ -31,6 +31,7 @@ Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in 
 Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
 
 
+@dataclass_transform(frozen_default=True, field_specifiers=(msgspec.field,))
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Something that is written as a JSON object."""
 

@@ -44,8 +44,9 @@ def rows(records: Sequence[Cost]) -> list[Row]:
     return [Row(record, _cells(record, names), _best(record)) for record in records]
 
 
-def _cells(record, names):
-    cells, seen = [], set()
+def _cells(record: Cost, names: Sequence[str]) -> tuple[Cell | None, ...]:
+    cells: list[Cell | None] = []
+    seen: set[str] = set()
     for name in names:
         rung = next((rung.name for rung in record.rungs if name in rung.names), None)
         if rung is None:
@@ -57,7 +58,7 @@ def _cells(record, names):
     return tuple(cells)
 
 
-def _best(record):
+def _best(record: Cost) -> Price | None:
     """Return the effect that removes most of those that surely remove something, or None."""
     sure = [price for price in record.prices.effects if price.removes.low > 0]
     return max(sure, key=lambda price: price.removes.value, default=None)

@@ -114,7 +114,7 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
 
 def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
     """The codes of planes, by name, as `Embedded.data` has them."""
-    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)
+    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base or "")) for plane in planes)
     # Level 4: a third of the time of 6, for 1 % more.
     return base64.b64encode(zlib.compress(raw, 4)).decode("ascii")
 

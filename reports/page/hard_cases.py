@@ -43,5 +43,5 @@ GROUPS = {
 
 def grey(image: ArrayLike) -> bytes:
     """The PNG of an image (H, W) of values from 0 to 1, enlarged pixel by pixel."""
-    planes = np.repeat(np.nan_to_num(np.float32(image))[..., None], 3, axis=2)
+    planes = np.repeat(np.nan_to_num(np.asarray(image, np.float32))[..., None], 3, axis=2)
     return images.png(images.tonemap(planes).resize((320, 320), Image.Resampling.NEAREST))

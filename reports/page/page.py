@@ -143,7 +143,7 @@ def render(
 
 def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[str, Any]:
     """What few pages show, by modules that the others do without."""
-    shown = {"cost_rows": (), "hard_cases": hard_cases}
+    shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases}
     if costs:
         from reports.page import cost_overview
 
@@ -160,7 +160,7 @@ def _scene(view: SceneView, taken: set[str]) -> Scene:
     return Scene(
         **structs.asdict(view),
         id=overview.identifier(view.record.scene, taken),
-        histograms=histograms.figures(view.record),
+        histograms=tuple(histograms.figures(view.record)),
     )
 
 

@@ -43,8 +43,8 @@ class CostView(Record):
 
     @property
     def switchboard(self) -> dict[str, Any]:
-        """What the script of the switchboard needs, where there is a sheet."""
-        return switchboard.data(self.record, self.sheet)
+        """The data of the switchboard's script; empty without a sheet."""
+        return switchboard.data(self.record, self.sheet) if self.sheet else {}
 
 
 class SceneView(Record):
@@ -88,10 +88,10 @@ class Making:
     is_interrupted: bool = False
 
 
-def picture_name(kind, name):
+def picture_name(kind: str, name: str) -> str:
     """Return the name of a picture's file, without its ending, such as cost-part-transport."""
     return f"cost-{kind}-{_plain(name)}"
 
 
-def _plain(name):
+def _plain(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")

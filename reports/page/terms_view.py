@@ -7,7 +7,7 @@ images are (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from msgspec import field
@@ -19,6 +19,8 @@ from comparisons.terms.term_grid import TermGrid
 from reports.page.embedding import Embedded, Plane, packed
 
 LARGEST = 65535
+
+View = TypeVar("View", bound=Record)
 
 
 class MaterialView(Record):
@@ -106,7 +108,7 @@ def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
     )
 
 
-def _of(kind: type, source: object) -> Any:
+def _of(kind: type[View], source: object) -> View:
     return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
 
 

@@ -7,7 +7,7 @@ of them may kill. The page is written as soon as there is a picture, and again a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +22,14 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from reports.page.scene_view import SceneView
+    from reports.run.growing import Growing
     from reports.run.stages import Run
     from reports.terminal.progress import Bar
 
 More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
 Judge = Callable[[Path, Sequence["SceneView"]], None]
+Calls = Mapping[str, tuple[str, Path, str, Wanted]]
+"""The arguments of :func:`reports.run.single.compare` for each place."""
 
 SKETCH, WHOLE, MORE = 1.0, 8.0, 3.0
 """About how long a scene takes in each part of a run, for the time that is left."""
@@ -117,7 +120,7 @@ def run(
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _verdict(views):
+def _verdict(views: Sequence[SceneView]) -> list[str]:
     """Return the lines that say what was found."""
     from reports import verdict
 
@@ -125,7 +128,7 @@ def _verdict(views):
     return ["", *verdict.sentences(found), *verdict.advice(found)]
 
 
-def _tasks(function, each, bar):
+def _tasks(function: Callable[..., object], each: Calls, bar: Bar) -> Iterator[Task]:
     from comparisons.case import name_of
 
     return (
@@ -133,7 +136,7 @@ def _tasks(function, each, bar):
     )
 
 
-def _sketch(pool, growing, each, bar):
+def _sketch(pool: Pool, growing: Growing, each: Calls, bar: Bar) -> None:
     """Collect coarse views of the scenes; those that are finished already are taken as they are."""
     bar.begin("first pictures", len(each), SKETCH)
     for task, outcome in pool.each(_tasks(single.sketch, each, bar)):
@@ -150,7 +153,7 @@ def _sketch(pool, growing, each, bar):
         growing.offer()
 
 
-def _compare(pool, record, growing, each, bar):
+def _compare(pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar) -> None:
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from reports.terminal import carrier_lines, progress
 
@@ -176,7 +179,13 @@ def _compare(pool, record, growing, each, bar):
         growing.offer()
 
 
-def _write(run, growing, with_figures, shown, is_interrupted=False):
+def _write(
+    run: Run,
+    growing: Growing,
+    with_figures: bool,
+    shown: dict[str, Any],
+    is_interrupted: bool = False,
+) -> None:
     """Write what is about all scenes, in the order of their places, and say what came of them."""
     from reports.run import output
     from reports.terminal import carrier_lines, progress, tables

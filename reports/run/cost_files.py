@@ -1,6 +1,10 @@
 """The files of a study of cost, and what a page shows of it."""
 
+from __future__ import annotations
+
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from comparisons import records
 from comparisons.effects.dominance import dominating
@@ -10,6 +14,10 @@ from reports.page import switchboard
 from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.terminal.cost_tables import closure, noise
 
+if TYPE_CHECKING:
+    from comparisons.cost.cost import Study
+    from comparisons.cost.cost_record import Cost
+
 DIGITS = "0123456789"
 """Of the map of effects in the page: the place of each effect."""
 
@@ -18,7 +26,7 @@ NO_EFFECT, UNCOUNTED = ".", "-"
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
 
-def documents(study):
+def documents(study: Study) -> dict[str, bytes]:
     """Return the files of a study by name: chart, pictures of rungs, parts and effects.
 
     Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
@@ -45,7 +53,7 @@ def documents(study):
     return made
 
 
-def write(place, study):
+def write(place: Path, study: Study) -> None:
     """Write the files of a study to a folder, each atomically; what else is there stays.
 
     The record comes last: where it is, its pictures are its own.
@@ -55,7 +63,7 @@ def write(place, study):
         ownership.write(place / name, content)
 
 
-def figures(record):
+def figures(record: Cost) -> list[vega.Figure]:
     """Return the charts of a :class:`Cost`: error against time, and the prices of effects."""
     from reports.charts import error_over_time, price_chart
 
@@ -72,7 +80,7 @@ def figures(record):
     return made
 
 
-def view(study, made):
+def view(study: Study, made: dict[str, bytes]) -> CostView:
     """Return the :class:`CostView` of a study, whose :func:`documents` are ``made``."""
     return CostView(
         record=study.record,
@@ -92,7 +100,7 @@ def view(study, made):
     )
 
 
-def _effect_map(study):
+def _effect_map(study: Study) -> EffectMap:
     places = dominating(study.effects, study.counted)
     letters = {-1: NO_EFFECT, -2: UNCOUNTED} | dict(enumerate(DIGITS))
     return EffectMap(

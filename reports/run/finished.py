@@ -5,7 +5,10 @@ of the files that the page links to, and the key of all that it depends on. It i
 other results, atomically.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -15,10 +18,13 @@ from comparisons.store import Entry
 from heuristic.errors import InputError
 from reports.page.scene_view import SceneView
 
+if TYPE_CHECKING:
+    from comparisons.options import Options
+
 FILE = "view.json"
 
 
-def key_of(passes, options, with_cost, figures):
+def key_of(passes: str, options: Options, with_cost: bool, figures: bool) -> str:
     """Return what a result depends on: its passes, where they stop, and what else is written.
 
     ``passes`` is what `reports.run.kept.key_of` returns.

@@ -1,15 +1,18 @@
 """Writing the results of a run atomically, and never at the cost of an earlier result."""
 
-from collections.abc import Callable, Iterator, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
 from comparisons import atomic
+from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import drawn
-from comparisons.record import Comparison
+from comparisons.record import Comparison, Images
 from comparisons.records import to_json
 from heuristic.errors import OutputError
 from reports.files import exr, holding, images, ownership
@@ -18,6 +21,10 @@ from reports.page.lit import lit
 from reports.page.scene_view import SceneView
 from reports.run import finished
 from reports.run.places import FIGURES, PAGE, RUN, TABLES
+from reports.run.stages import RunRecord
+
+if TYPE_CHECKING:
+    from comparisons.cost.cost import Study
 
 
 @contextmanager
@@ -55,7 +62,7 @@ def below(folder: Path, command: str) -> Path:
     return ownership.folder(folder / command)
 
 
-def require_free(folder, places, with_figures=False):
+def require_free(folder: Path, places: Iterable[str], with_figures: bool = False) -> None:
     """Ensure, before anything is rendered, that a run will replace nothing but earlier results.
 
     Raises
@@ -98,7 +105,13 @@ def as_far_as_possible(*steps: Callable[[], object]) -> None:
         raise errors[0]
 
 
-def write_scene(folder, name, comparison, study=None, key=None):
+def write_scene(
+    folder: Path,
+    name: str,
+    comparison: Comparison,
+    study: Study | None = None,
+    key: str | None = None,
+) -> SceneView:
     """Write the files of one comparison to ``folder/name``, in place of an earlier result.
 
     With a study of cost its files are written as well.
@@ -146,17 +159,17 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     )
 
 
-def write_page(folder, views, **shown):
+def write_page(folder: Path, views: Sequence[SceneView], **shown: Any) -> None:
     """Write ``index.html`` for the scenes of a run, and what else `page.render` shows."""
     ownership.write(folder / PAGE, page.render(views, **shown))
 
 
-def write_run(folder, record):
+def write_run(folder: Path, record: RunRecord) -> None:
     """Write ``run.json``: the command, where its time went, machine and versions."""
     ownership.write(folder / RUN, to_json(record))
 
 
-def _layers(shown):
+def _layers(shown: Images) -> dict[str, Any]:
     return {
         "heuristic": shown.heuristic,
         "reference": shown.reference,
@@ -168,8 +181,8 @@ def _layers(shown):
     }
 
 
-def _header(record):
-    header = {
+def _header(record: ComparisonRecord) -> dict[str, str]:
+    header: dict[str, object] = {
         "scene": record.scene,
         "variant": record.variant,
         "seed": record.seed,

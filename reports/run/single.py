@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 if TYPE_CHECKING:
-    from comparisons.case import Request
+    from comparisons.case import Case, Request
+    from comparisons.compare import Progress
+    from comparisons.cost.cost import Study
+    from comparisons.record import Comparison
     from reports.page.scene_view import SceneView
+    from reports.run.kept import KeptPasses
     from reports.run.stages import Stages
-
 
 SKETCH_WIDTH, SKETCH_SPP = 64, 8
 """Pixels and samples per pixel of a scene's first, coarse pictures."""
@@ -36,7 +39,7 @@ class Wanted:
 
 
 def compare(
-    name: str, folder: Path, place: str, wanted: Wanted, progress
+    name: str, folder: Path, place: str, wanted: Wanted, progress: Progress
 ) -> tuple[SceneView, Stages]:
     """Compare a scene and write its files to ``folder/place``, unless they are there already.
 
@@ -79,7 +82,7 @@ def compare(
     return view, spent
 
 
-def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress) -> SceneView:
+def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress: Progress) -> SceneView:
     """Return the view of a finished scene, or else a coarse one, without causes and files."""
     from comparisons.case import open_case
     from comparisons.compare import compare
@@ -96,7 +99,9 @@ def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Sce
     return structs.replace(output.view_of(made), is_coarse=True)
 
 
-def _finished(case, folder, place, wanted):
+def _finished(
+    case: Case, folder: Path, place: str, wanted: Wanted
+) -> tuple[KeptPasses, str, SceneView | None]:
     """Return the kept passes of a scene, the key of its result, and that if it is finished."""
     from reports.run import finished, kept
 
@@ -105,7 +110,9 @@ def _finished(case, folder, place, wanted):
     return passes, key, None if wanted.fresh else finished.load(folder / place, key)
 
 
-def _explained(case, progress, comparison):
+def _explained(
+    case: Case, progress: Progress, comparison: Comparison
+) -> tuple[Comparison, Study | None]:
     """Return a comparison and what accuracy costs; without it where that cannot be studied."""
     from heuristic.errors import FotismosError
 
@@ -117,7 +124,7 @@ def _explained(case, progress, comparison):
         return replace(comparison, record=record), None
 
 
-def _priced(case, progress, comparison):
+def _priced(case: Case, progress: Progress, comparison: Comparison) -> tuple[Comparison, Study]:
     """Study what accuracy costs, and name the effects that dominate; say how long it took."""
     from comparisons.comparison import CAUSES
     from comparisons.cost.cost import quick

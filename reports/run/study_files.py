@@ -1,18 +1,26 @@
 """What a study leaves behind: the dataset, its figures, lines for the terminal, and findings."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jinja2
 
 from comparisons import atomic
 from comparisons.study import dataset, query
-from comparisons.study.running import POINTS
+from comparisons.study.design import Study
+from comparisons.study.running import POINTS, Outcome
 from heuristic.errors import InputError
 from reports.charts import study_charts, vega
 from reports.files import ownership
 
 FIGURES = "figures"
+
+Table = Any
+"""A ``pyarrow.Table``: a dataset of points."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +32,7 @@ class Page:
     dataset: Path
 
 
-def page(study, file, findings):
+def page(study: Study, file: Path, findings: Path | None) -> Page | None:
     """Check a study's figures, and find the template of its findings if it is asked for.
 
     Raises
@@ -48,7 +56,7 @@ def page(study, file, findings):
     return Page(template, findings, file.with_suffix(".parquet"))
 
 
-def write(study, outcome, folder, page=None):
+def write(study: Study, outcome: Outcome, folder: Path, page: Page | None = None) -> Iterator[str]:
     """Write dataset, figures, and the page of findings if there is one; yields where they are."""
     place, figures = folder / f"{study.name}.parquet", folder / FIGURES
     ownership.write(place, dataset.file_of(outcome.table))
@@ -66,7 +74,7 @@ def write(study, outcome, folder, page=None):
         yield str(page.file)
 
 
-def prepare(study, folder):
+def prepare(study: Study, folder: Path) -> Path:
     """Make a study's folder, and ensure that it will replace nothing but its own results.
 
     Raises
@@ -85,7 +93,7 @@ def prepare(study, folder):
     return folder
 
 
-def drawn(study, table):
+def drawn(study: Study, table: Table) -> Iterator[tuple[str, bytes]]:
     """Yield the names and contents of a study's figures; parts without a result are left out."""
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in (*study.figures, *study_charts.default_figures(study)):
@@ -94,7 +102,7 @@ def drawn(study, table):
             yield f"{figure['name']}.svg", vega.paper(spec)
 
 
-def findings(study, table, page):
+def findings(study: Study, table: Table, page: Page) -> str:
     """Return the page of findings.
 
     The template asks the dataset through the functions of :class:`comparisons.study.query.Facts`,
@@ -104,12 +112,12 @@ def findings(study, table, page):
     names = [figure["name"] for figure in study.figures]
     folder = page.file.stem
 
-    def number(name):
+    def number(name: str) -> str:
         if name not in names:
             raise InputError(f"{page.template}: there is no figure {name!r}.")
         return f"figure {names.index(name) + 1}"
 
-    def picture(name, text):
+    def picture(name: str, text: str) -> str:
         return f"![{number(name).capitalize()}: {text}]({folder}/{name}.svg)"
 
     environment = jinja2.Environment(
@@ -122,11 +130,12 @@ def findings(study, table, page):
     return template.render(**functions, figure=number, picture=picture, study=study)
 
 
-def summary(study, outcome):
+def summary(study: Study, outcome: Outcome) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the departure."""
     width = max(4, *(len(part.name) for part in study.parts))
     yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
-    rows = outcome.table.to_pylist()
+    table: Table = outcome.table
+    rows = table.to_pylist()
     for part in study.parts:
         own = [row for row in rows if row["part"] == part.name]
         good = sorted(row["dE2000"] for row in own if row["error"] is None)
