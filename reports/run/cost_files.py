@@ -1,4 +1,4 @@
-"""The files of a study of cost, and what a page shows of it."""
+"""The files of a study of cost, and its part of a page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
 
 DIGITS = "0123456789"
-"""Of the map of effects in the page: the place of each effect."""
+"""Codes of the effects in the page's map, by their places."""
 
 NO_EFFECT, UNCOUNTED = ".", "-"
 
@@ -27,10 +27,10 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 
 def documents(study: Study) -> dict[str, bytes]:
-    """Return the files of a study by name: chart, pictures of rungs, parts and effects.
+    """Return the named files of a study: chart, pictures of rungs, parts and effects.
 
-    Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
-    brighter, over the range that the record's ``pictures`` states; effects are errors removed.
+    Pictures of rungs have the record's exposure; parts are signed, red where the later image is
+    brighter, over the range in the record's ``pictures``; effects are errors removed.
     """
     from reports.charts import prediction_chart
     from reports.charts.error_over_time import error_over_time
@@ -54,9 +54,9 @@ def documents(study: Study) -> dict[str, bytes]:
 
 
 def write(place: Path, study: Study) -> None:
-    """Write the files of a study to a folder, each atomically; what else is there stays.
+    """Write the files of a study to a folder, each atomically; other files stay.
 
-    The record comes last: where it is, its pictures are its own.
+    The record comes last, so its pictures are never those of another study.
     """
     ownership.folder(place)
     for name, content in documents(study).items():
@@ -75,13 +75,13 @@ def figures(record: Cost) -> list[vega.Figure]:
         )
     ]
     if record.prices.effects:
-        note = "Circle: what it removes where it is added first; stroke: last."
+        note = "Circle: error removed if added first; stroke: if added last."
         made.append(vega.figure("Price of an effect", price_chart.price_chart(record), note))
     return made
 
 
 def view(study: Study, made: dict[str, bytes]) -> CostView:
-    """Return the :class:`CostView` of a study, whose :func:`documents` are ``made``."""
+    """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
     return CostView(
         record=study.record,
         images={

@@ -23,11 +23,11 @@ Cells = Sequence[str]
 """One row of a table."""
 
 SMALLEST_TILE = 256
-"""Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
+"""Pixels; smaller images are enlarged by a whole factor, so each pixel stays square."""
 
 GAP, CAPTION = 8, 22
 FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
-"""Matplotlib's own; that of Pillow has no Greek."""
+"""Matplotlib's, since Pillow's has no Greek."""
 
 
 def write(folder: Path, fit: Fit) -> None:
@@ -38,9 +38,9 @@ def write(folder: Path, fit: Fit) -> None:
 
 
 def picture(fit: Fit) -> bytes:
-    """Return the PNG of a fit: paired parameters, reference, fitted parameters, and what is left.
+    """Return the PNG of a fit: paired, reference, fitted, and the error left.
 
-    Pictures as a display shows them; the map is over the metric's fixed range.
+    The pictures are tone-mapped; the map has the metric's fixed range.
     """
     exposure = fit.record.viewing.exposure
     high, residual = LEADING.map_range[1], fit.images.maps[LEADING.name]
@@ -87,16 +87,16 @@ def markdown(records: Sequence[FitRecord], scenes: Sequence[str]) -> Iterator[st
     yield f"Made by `./run fit {names} --markdown docs/fit-figures.md`."
     yield ""
     yield (
-        "Mean colour difference from the reference with the paired parameters (*before*) and with"
-        " the best ones of the best form (*after*), and what the reference's noise alone would"
-        " give (*floor*). *Parameter error* and *model error* are of the loss, which is minimised:"
-        " what the best parameters remove of it, and what they leave. A metric is not minimised,"
-        " and other parameters may leave less of it."
+        "Mean colour difference from the reference with the paired parameters (*before*), with the"
+        " best parameters of the best form (*after*), and from the reference's noise alone"
+        " (*floor*). *Parameter error* and *model error* are the parts of the minimised loss that"
+        " the best parameters remove and leave. Metrics are not minimised: other parameters may"
+        " leave less of them."
     )
     yield ""
     yield from tables.markdown(_scene_rows(records), right=2)
     yield ""
-    yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
+    yield "Paired → fitted parameters; a dash if the image does not determine them."
     yield ""
     yield from tables.markdown(_material_rows(records), right=7)
 
@@ -189,7 +189,7 @@ def _described(reference: Mapping[str, Any]) -> str:
 
 
 def _three(value: float) -> str:
-    """Three decimals, and no sign where they are all 0."""
+    """Three decimals, without a sign if all are 0."""
     return f"{value:.3f}".replace("-0.000", "0.000")
 
 

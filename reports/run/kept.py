@@ -1,8 +1,8 @@
-"""Passes of a long run, kept in a file so that an interruption loses little.
+"""Passes of a long run, kept in a file that an interrupted run resumes from.
 
-``.SCENE.fotismos-passes.npz`` lies beside the folder of a scene's results. It is written
-atomically, belongs to one scene, one set of options and one set of versions, and goes away when the
-run succeeds.
+``.SCENE.fotismos-passes.npz``, next to the folder of a scene's results, is written atomically,
+belongs to one scene, one set of options and one set of versions, and is deleted when the run
+succeeds.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from reference.scene.source import Source
 
 INTERVAL_S = 10.0
-"""Seconds from one writing to the next, at least: short runs write nothing."""
+"""Least seconds between writings: short runs write nothing."""
 
 SHARE = 0.05
-"""Of the time, at most, that writing may take."""
+"""Greatest share of the time that writing may take."""
 
 
 class KeptPasses(Entry):
@@ -36,9 +36,9 @@ class KeptPasses(Entry):
     Parameters
     ----------
     path, key
-        As for :class:`comparisons.store.Entry`; :func:`key_of` makes the key.
+        See :class:`comparisons.store.Entry`; :func:`key_of` makes the key.
     interval
-        Seconds between writings, at least.
+        Least seconds between writings.
     """
 
     def __init__(self, path: str | Path, key: str, interval: float = INTERVAL_S) -> None:
@@ -47,7 +47,7 @@ class KeptPasses(Entry):
         self._next = perf_counter() + interval
 
     def offer(self, count: int, state: Callable[[], Mapping[str, Any]]) -> None:
-        """Write ``state()`` if it is time to; ``count`` is the number of passes that it holds."""
+        """Write ``state()``, which holds ``count`` passes, if it is due."""
         begin = perf_counter()
         if begin < self._next:
             return
@@ -59,7 +59,7 @@ class KeptPasses(Entry):
 def of_scene(folder: Path, name: str, case: Case) -> KeptPasses:
     """Return the :class:`KeptPasses` of a comparison whose results go to ``folder/name``.
 
-    The file lies beside that folder, which a finished result replaces as a whole.
+    The file is next to that folder, which a finished result replaces.
     """
     from comparisons import record
 
@@ -78,8 +78,8 @@ def key_of(source: Source, options: Options, variant: str, versions: Mapping[str
     """Return a digest of all that the passes of a comparison depend on.
 
     These are the scene with the content of every file that it reads
-    (:func:`reference.scene.identity.digest`), the code of the heuristic, the pictures in its place,
-    the options but for the ones that only say how long to go on, variant and versions.
+    (:func:`reference.scene.identity.digest`), the code of the heuristic or the pictures in its
+    place, the options except how long to continue, variant and versions.
     """
     told: dict[str, Any] = {
         name: str(value) for name, value in vars(options).items() if name != "noise"

@@ -1,4 +1,4 @@
-"""What a study leaves behind: the dataset, its figures, lines for the terminal, and findings."""
+"""The output of a study: dataset, figures, lines for the terminal, and findings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Table = Any
 
 @dataclass(frozen=True)
 class Page:
-    """A page of findings that is asked for: its template, its file, and the dataset's file."""
+    """A requested page of findings: its template, its file, and the dataset's file."""
 
     template: Path
     file: Path
@@ -33,12 +33,12 @@ class Page:
 
 
 def page(study: Study, file: Path, findings: Path | None) -> Page | None:
-    """Check a study's figures, and find the template of its findings if it is asked for.
+    """Check a study's figures, and find the template of its findings if requested.
 
     Raises
     ------
     InputError
-        Before anything is rendered: for a figure that cannot be drawn, or no template.
+        Before anything is rendered, if a figure cannot be drawn or the template is missing.
     """
     for figure in study.figures:
         try:
@@ -50,14 +50,14 @@ def page(study: Study, file: Path, findings: Path | None) -> Page | None:
     template = file.with_suffix(".md.j2")
     if not template.is_file():
         raise InputError(
-            f"{template}: there is no such file. A page of findings needs a template there; leave"
-            " --findings out to have dataset and figures alone."
+            f"{template}: there is no such file. Write this template of the findings, or"
+            " omit --findings."
         )
     return Page(template, findings, file.with_suffix(".parquet"))
 
 
 def write(study: Study, outcome: Outcome, folder: Path, page: Page | None = None) -> Iterator[str]:
-    """Write dataset, figures, and the page of findings if there is one; yields where they are."""
+    """Write dataset, figures, and any page of findings; yields their paths."""
     place, figures = folder / f"{study.name}.parquet", folder / FIGURES
     ownership.write(place, dataset.file_of(outcome.table))
     for name, svg in drawn(study, outcome.table):
@@ -75,14 +75,14 @@ def write(study: Study, outcome: Outcome, folder: Path, page: Page | None = None
 
 
 def prepare(study: Study, folder: Path) -> Path:
-    """Make a study's folder, and ensure that it will replace nothing but its own results.
+    """Make a study's folder, and ensure that the study will replace only its own results.
 
     Raises
     ------
     InputError
-        Before anything is rendered, naming what is not fotismos's.
+        Before anything is rendered, naming what fotismos did not make.
     OutputError
-        When the folder cannot be made.
+        If the folder cannot be made.
     """
     ownership.require_free_folder(folder)
     ownership.folder(folder)
@@ -94,7 +94,7 @@ def prepare(study: Study, folder: Path) -> Path:
 
 
 def drawn(study: Study, table: Table) -> Iterator[tuple[str, bytes]]:
-    """Yield the names and contents of a study's figures; parts without a result are left out."""
+    """Yield the names and contents of a study's figures, except of parts without a result."""
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in (*study.figures, *study_charts.default_figures(study)):
         if figure["part"] in with_result:
@@ -105,8 +105,8 @@ def drawn(study: Study, table: Table) -> Iterator[tuple[str, bytes]]:
 def findings(study: Study, table: Table, page: Page) -> str:
     """Return the page of findings.
 
-    The template asks the dataset through the functions of :class:`comparisons.study.query.Facts`,
-    so that no number is written by hand. ``figure(name)`` is the number of a figure, and
+    The template takes all numbers from the dataset, by the functions of
+    :class:`comparisons.study.query.Facts`. ``figure(name)`` is the number of a figure, and
     ``picture(name, text)`` the picture itself.
     """
     names = [figure["name"] for figure in study.figures]
@@ -114,7 +114,9 @@ def findings(study: Study, table: Table, page: Page) -> str:
 
     def number(name: str) -> str:
         if name not in names:
-            raise InputError(f"{page.template}: there is no figure {name!r}.")
+            raise InputError(
+                f"{page.template}: figure {name!r} is unknown; choose of {', '.join(names)}."
+            )
         return f"figure {names.index(name) + 1}"
 
     def picture(name: str, text: str) -> str:
