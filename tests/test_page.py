@@ -113,7 +113,7 @@ def test_the_numbers_on_the_page_are_the_records(record, pictures):
     assert ("4.33", 4.327) in {(text, value) for value, text in shown.values}
     assert ("63.2 %", 0.632) in {(text, value) for value, text in shown.values}
     assert ("2.79 s", 2.79) in {(text, value) for value, text in shown.values}
-    for text in ("Seed 7", "unlimited depth", "256 samples a pixel", "k_d > 0", "mitsuba 3.9.1"):
+    for text in ("Seed 7", "unlimited depth", "256 samples per pixel", "k_d > 0", "mitsuba 3.9.1"):
         assert text in shown.text
     (unrepresentable,) = record["unrepresentable"]
     for text in (*unrepresentable.values(), *record["warnings"], record["command"]):

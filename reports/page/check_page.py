@@ -23,27 +23,27 @@ from reports.terminal.printing import percent
 TEMPLATES = Path(__file__).parent / "templates"
 
 SHOWN = 12
-"""Quantities that a scene's table has, and objects that carry a change."""
+"""Greatest number of rows in a scene's tables of quantities and of objects."""
 
 TITLES = {"heuristic": "Textbook half", "reference": "Reference"}
 
 KINDS = {
     "-before": "Before",
     "": "Now",
-    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} and more (light)",
+    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} or more (light)",
     "-change": "Change of luminance, by block",
-    "-p": "Chance of this though nothing changed, by block",
+    "-p": "Chance of this if nothing changed, by block",
 }
-"""Captions of the pictures of a half, by the ending of their names."""
+"""Captions of a half's pictures, by the endings of their names."""
 
 
 def render(results: Sequence[Result], level: float) -> str:
-    """Return the page of all results of a check, those that failed in full.
+    """Return the page of all results of a check, with failures in full.
 
     Parameters
     ----------
     results
-        Of :mod:`reports.ci.checks`; the pictures of a failure are read from its folder.
+        From :mod:`reports.ci.checks`; the pictures of a failure are read from its folder.
     level
         Significance of the whole command.
     """
@@ -73,7 +73,7 @@ def write(folder: Path, results: Sequence[Result], level: float) -> Path | None:
 
 
 def _failure(result: Result) -> dict[str, Any]:
-    """Return what the template shows of one baseline."""
+    """Return the template's data of one baseline."""
     check, folder = result.check, result.folder
     assert check is not None  # a failure has both
     assert folder is not None
