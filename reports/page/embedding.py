@@ -2,8 +2,8 @@
 
 Every value is rounded to three significant decimal digits, the standard error to two, and stored as
 a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
-bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one 8-bit
-level.
+bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one
+8-bit level.
 
 A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
 to the left neighbour, and split into low and high bytes; all planes are deflated together.

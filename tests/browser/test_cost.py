@@ -66,7 +66,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
     page = visitor.open(f"{SCENE}&mode=error&map=effects&boxes=0&pixel={pixel[0]},{pixel[1]}")
     study = report.study
     known = dominating(study.effects, study.counted)[place(*pixel)]
-    names = [*study.effects, "", "none to be seen"]
+    names = [*study.effects, "", "none visible"]
     colours = [*map(theme.EFFECT_COLOURS.get, study.effects), "#82888f", theme.NO_EFFECT]
     shown = visitor.inspected()["effect"]
     assert shown == (names[known] or "–") or (shown == "" and not names[known])
@@ -78,7 +78,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
 def test_the_legend_names_every_effect_of_the_scene(visitor, report):
     page = visitor.open(f"{SCENE}&mode=side&map=effects")
     keys = page.locator("[data-legend=effects] .key").all_text_contents()
-    assert keys == [*report.study.effects, "none to be seen"]
+    assert keys == [*report.study.effects, "none visible"]
 
 
 def test_a_scene_without_prices_has_no_map_of_effects(visitor):
