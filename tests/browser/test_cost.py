@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from comparisons.departure.metrics import drawn
 from comparisons.effects.dominance import dominating
 from reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
@@ -11,13 +12,17 @@ from tests.cost_records import WIDTH as COLUMNS
 
 SCENE = f"#scene={NOISY_ID}"
 
+CHARTS = len(drawn()) + 2
+"""A histogram per metric, error against time, and prices."""
+
 
 def enlivened(visitor):
     page = visitor.open(SCENE)
     for charts in page.locator(".scene.open .charts").all():
         charts.scroll_into_view_if_needed()
     page.wait_for_function(
-        "() => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === 5"
+        "count => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === count",
+        arg=CHARTS,
     )
     return page
 
@@ -28,7 +33,7 @@ def bytes_of(css):
 
 def test_charts_come_alive(visitor):
     page = enlivened(visitor)
-    assert page.locator(".scene.open .chart svg").count() == 5
+    assert page.locator(".scene.open .chart svg").count() == CHARTS
     titles = page.locator(".scene.open .charts.wide figcaption").all_text_contents()
     assert titles == ["Error against time", "Price of an effect"]
 
