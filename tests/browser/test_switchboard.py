@@ -34,7 +34,7 @@ def press(page, name, way):
 
 
 def gain(page):
-    return page.locator(".scene.open .gain").text_content()
+    return page.locator(".scene.open .switchboard .gain").text_content()
 
 
 def colour(page, canvas, x=0.5, y=0.5):
