@@ -31,7 +31,8 @@ Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in 
 Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
 
 
-@dataclass_transform(frozen_default=True)  # mypy does not know that `frozen` is inherited
+# mypy does not know that `frozen` is inherited.
+@dataclass_transform(frozen_default=True, field_specifiers=(msgspec.field,))
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A type that is written as a JSON object."""
 

@@ -74,7 +74,7 @@ def test_a_page_in_the_making_says_so(tmp_path):
     page.views["a"] = view("a")
     page.offer()
     text = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "In the making: 1 of 2 scenes are refined" in text
+    assert "In progress: 1 of 2 scenes are refined" in text
     assert text.count("<b>Preview:</b>") == 1
     page.write(making=page.making(is_interrupted=True))
     text = (tmp_path / "index.html").read_text(encoding="utf-8")

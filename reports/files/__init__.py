@@ -1,1 +1,1 @@
-"""Files: who made them, layers, pictures."""
+"""Files: ownership, layers, pictures."""

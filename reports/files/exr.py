@@ -25,19 +25,24 @@ HALF_MAX = 65_504.0
 
 
 def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str, str]) -> None:
-    """Write `layers` to `path` as one scanline part, ZIP-compressed.
+    """Write layers to a file atomically, as one scanline part, ZIP-compressed.
 
+    Parameters
+    ----------
     layers
         Name → image, all of one height and width. (H, W, 3) becomes ``name.R``, ``name.G``,
         ``name.B``, or ``.X``, ``.Y``, ``.Z`` for "P" and "N"; (H, W), also boolean, becomes
-        ``name.Y``. Layers in `FULL_PRECISION` are float32, others half, unless a value exceeds
-        half's range of 65,504: such a layer is float32 too.
+        ``name.Y``. Layers in `FULL_PRECISION`, and those with values beyond half's 65,504, are
+        float32; the others are half.
     header
         Metadata as strings, e.g. seed, samples and versions. BT.709's chromaticities are added.
 
-    The file is written atomically (:mod:`comparisons.atomic`).
-    Raises `InputError` if layers differ in size or have another number of channels, `OutputError`
-    if the place cannot be written.
+    Raises
+    ------
+    InputError
+        If layers differ in size or have another number of channels.
+    OutputError
+        If the file cannot be written.
     """
     import OpenEXR
 
@@ -49,7 +54,7 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         "chromaticities": BT709,
     }
     file = OpenEXR.File(attributes, channels(layers))
-    # Given a path, the bindings do not say when its end could not be written.
+    # Given a path, the bindings do not report that its end could not be written.
     with file, atomic.replacing(path) as partial, partial.open("wb") as stream:
         file.write(stream)
 
@@ -63,7 +68,9 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
         suffixes = _suffixes(name, image)
         size = size or image.shape[:2]
         if image.shape[:2] != size:
-            raise InputError(f"EXR layer {name} is {image.shape[:2]}, but the first is {size}")
+            raise InputError(
+                f"EXR layer {name} is {image.shape[:2]}, the first {size}: make all the same size."
+            )
         precision = _precision(name, image)
         planes = image[..., None] if image.ndim == 2 else image
         for index, suffix in enumerate(suffixes):
@@ -77,7 +84,7 @@ def _suffixes(name: str, image: np.ndarray) -> str:
         return "Y"
     if image.ndim == 3 and image.shape[2] == 3:
         return "XYZ" if name in VECTORS else "RGB"
-    raise InputError(f"EXR layer {name} has shape {image.shape}: want (H, W) or (H, W, 3)")
+    raise InputError(f"EXR layer {name} has shape {image.shape}: make it (H, W) or (H, W, 3).")
 
 
 def _precision(name: str, image: np.ndarray) -> type[np.floating]:

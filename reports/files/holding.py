@@ -1,4 +1,4 @@
-"""One command at a time in an output folder: a lock that the system gives up with its process."""
+"""One command at a time in an output folder: a lock that the system releases with its process."""
 
 import errno
 import json
@@ -20,20 +20,20 @@ PATIENCE_S = 0.5
 """Seconds to wait for a command that is just ending."""
 
 WITHOUT_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
-"""Errors of file systems that have no locks; there, nobody is kept out."""
+"""Errors of file systems without locks, where no command is kept out."""
 
 
 @contextmanager
 def held(folder: Path, command: str) -> Iterator[None]:
     """Keep other commands out of a folder while the block runs.
 
-    ``command`` is what they are told of this one. Where nothing was made in the folder, nothing of
-    the lock is left.
+    ``command`` names this one in their error message. If nothing is made in the folder, the lock
+    leaves no trace.
 
     Raises
     ------
     OutputError
-        Saying which process holds the folder, or why it cannot be written to.
+        If another process holds the folder, which is named, or it cannot be written to.
     """
     path = folder / LOCK
     for own in (path, folder / listing.MARK):
@@ -71,7 +71,7 @@ def _held_by_another(folder: Path) -> str:
         holder = json.loads((folder / LOCK).read_text(encoding="utf-8"))
         who = "process {pid} on {host}, since {since}: {command}".format(**holder)
     except (OSError, ValueError, KeyError, TypeError):
-        who = "which did not say what it is"
+        who = "an unknown process"
     return (
         f"{atomic.printable(folder)}: another command writes there ({who}). Wait until it ends, or"
         " choose another output folder with -o."

@@ -1,8 +1,8 @@
 """8-bit pictures (Pillow) of linear images and of maps, and their colour bars.
 
 Colour maps are Matplotlib's tables, read without pyplot: magma for errors, RdBu for signed values
-(both readable with the common colour-vision deficiencies). Ranges are fixed by the caller and
-printed beside the picture; values beyond them take the colour of the end.
+(both readable with common colour-vision deficiencies). The caller fixes the ranges, which are
+printed next to the picture; values beyond them take the end's colour.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Bytes = NDArray[np.uint8]
 #: Colour maps by purpose.
 ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
 
-#: Pixels of a thumbnail's longer side, which a card shows at two thirds of that.
+#: Pixels of a thumbnail's longer side; cards show it at two thirds of that size.
 THUMBNAIL = 160
 
 #: Colours of `mask_map`: marked, not marked, not counted, undetermined (sRGB).
@@ -49,9 +49,9 @@ def signed_map(values: ArrayLike, limit: float, colormap: str = SIGNED_COLOURS) 
 
 
 def mask_map(marked: ArrayLike, counted: ArrayLike | None = None) -> Image.Image:
-    """A map (H, W) of marks, 1, 0.5 or 0: orange where marked, pale where left open, else grey.
+    """A map (H, W) of marks, 1, 0.5 or 0: orange if marked, pale if undetermined, else grey.
 
-    Pixels that are not counted are of a darker grey.
+    Pixels that are not counted are a darker grey.
     """
     marked = np.asarray(marked, np.float64)
     index = np.where(marked == marks.MARKED, np.uint8(0), np.uint8(1))
@@ -70,7 +70,7 @@ def colour_bar(colormap: str, stops: int = 17) -> str:
 
 
 def colour_table(colormap: str) -> str:
-    """The 256 colours of a map as hexadecimal digits, six a colour."""
+    """The 256 colours of a map as hexadecimal digits, six per colour."""
     return _table(colormap).tobytes().hex()
 
 
@@ -82,13 +82,12 @@ def css_colour(colour: ArrayLike) -> str:
 def png(picture: Image.Image, longest: int | None = None) -> bytes:
     """The PNG file of a picture, pixel for pixel; the bytes depend on the pixels alone.
 
-    With `longest`, a picture whose longer side exceeds it is averaged down to that; smaller ones
-    stay exact.
+    A picture whose longer side exceeds `longest` is averaged down to it.
     """
     if longest is not None and max(picture.size) > longest:
         scale = longest / max(picture.size)
-        size = tuple(max(1, round(side * scale)) for side in picture.size)
-        picture = picture.convert("RGB").resize(size, Image.Resampling.BOX)
+        width, height = (max(1, round(side * scale)) for side in picture.size)
+        picture = picture.convert("RGB").resize((width, height), Image.Resampling.BOX)
     buffer = BytesIO()
     # Level 4: half the time of 6 for files 5 % larger.
     picture.save(buffer, "PNG", compress_level=4)
@@ -96,7 +95,7 @@ def png(picture: Image.Image, longest: int | None = None) -> bytes:
 
 
 def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
-    """The PNG files of a comparison by name, each map over the fixed range of its metric."""
+    """The named PNG files of a comparison, each map over the fixed range of its metric."""
     made = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
@@ -109,7 +108,7 @@ def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
 
 
 def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
-    """Small PNG files of both halves and of the map by which scenes are judged, for cards."""
+    """Small PNG files for cards: both halves, and the map of the leading metric."""
     made = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),

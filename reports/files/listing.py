@@ -1,10 +1,9 @@
 """The list of what fotismos made in a folder, ``.fotismos``, in that folder.
 
-A line is a name; later lines go before earlier ones. A line that begins with ``{`` is JSON:
-``{"gone": NAME}`` takes a name off, ``{"coming": NAME, "as": ID}`` announces a file that is about
-to get its name, and ``{"place": NAME, "of": SCENE}`` says what a folder is for. While
-commands run lines are only added, so that processes which write to one folder lose nothing of each
-other's.
+A line is a name; later lines override earlier ones. A line that begins with ``{`` is JSON:
+``{"gone": NAME}`` removes a name, ``{"coming": NAME, "as": ID}`` announces a file that is about
+to get its name, and ``{"place": NAME, "of": SCENE}`` assigns a folder to a scene. Running commands
+only add lines, so processes that share a folder lose nothing.
 """
 
 import errno
@@ -24,16 +23,16 @@ LARGEST = 2**28
 
 @dataclass(frozen=True)
 class Listed:
-    """What the list of a folder says.
+    """The list of a folder.
 
     Attributes
     ----------
     made
         Names of what fotismos made.
     coming
-        Names that were announced and not confirmed, with the identity of the file.
+        Names announced but not confirmed, with the file's identity.
     places
-        Names of folders, with the scenes that they are for.
+        Names of folders, with their scenes.
     """
 
     made: set[str] = field(default_factory=set)
@@ -41,12 +40,12 @@ class Listed:
     places: dict[str, str] = field(default_factory=dict)
 
     def is_empty(self) -> bool:
-        """Tell whether fotismos neither made anything nor was about to."""
+        """Return whether fotismos made nothing and announced nothing."""
         return not self.made and not self.coming
 
 
 def read(folder: Path) -> Listed:
-    """Return what the list of a folder says; nothing where there is none."""
+    """Return the list of a folder, empty if there is none."""
     found = Listed()
     for line in _lines(folder / MARK):
         _apply(line, found)
@@ -54,19 +53,19 @@ def read(folder: Path) -> Listed:
 
 
 def confirm(folder: Path, *names: str) -> None:
-    """Add names of what fotismos made; the folder has a list from then on."""
+    """Add names of what fotismos made, creating the list if needed."""
     made = read(folder).made
     _append(folder, [_name_line(name) for name in names if name not in made])
 
 
 def announce(folder: Path, name: str, identity: str) -> None:
-    """Say that a file with this identity is about to get a name, if the name is not listed."""
+    """Announce that a file is about to get a name, unless the name is listed."""
     if name not in read(folder).made:
         _append(folder, [json.dumps({"coming": name, "as": identity})])
 
 
 def withdraw(folder: Path, *names: str) -> None:
-    """Take names off the list."""
+    """Remove names from the list."""
     listed = read(folder)
     known = listed.made | listed.coming.keys()
     if gone := [json.dumps({"gone": name}) for name in names if name in known]:
@@ -74,7 +73,7 @@ def withdraw(folder: Path, *names: str) -> None:
 
 
 def assign(folder: Path, places: dict[str, str]) -> None:
-    """Say which scenes folders are for."""
+    """Assign folders to scenes."""
     known = read(folder).places
     new = {place: scene for place, scene in places.items() if known.get(place) != scene}
     if new:
@@ -82,9 +81,9 @@ def assign(folder: Path, places: dict[str, str]) -> None:
 
 
 def tidy(folder: Path) -> None:
-    """Settle what was announced, drop what is not there, and write the list anew if it changed.
+    """Settle announcements, drop missing files, and rewrite the list if it changed.
 
-    For the only process that writes to the folder.
+    No other process may be writing to the folder.
     """
     if not (folder / MARK).is_file():
         return
@@ -100,9 +99,9 @@ def tidy(folder: Path) -> None:
 
 
 def identity_of(path: Path) -> str:
-    """Return what tells a file from others that may get its name; empty where there is none.
+    """Return what identifies a file among those that may get its name; empty if there is none.
 
-    A folder is known by the list in it.
+    A folder is identified by its list.
     """
     try:
         stat = path.lstat()
@@ -114,13 +113,13 @@ def identity_of(path: Path) -> str:
 
 
 def _lines(path: Path) -> list[str]:
-    """Return the whole lines of a list; one that a full disk cut short has no end."""
-    if not path.is_file():  # a pipe would be waited for
+    """Return the complete lines of a list; a full disk may have cut the last one short."""
+    if not path.is_file():  # reading a pipe would block
         return []
     if path.stat().st_size > LARGEST:
         raise OutputError(
-            f"{atomic.printable(path)}: the list of what fotismos made has more than {LARGEST}"
-            " bytes, which it never has. Move it away, or choose another output folder with -o."
+            f"{atomic.printable(path)}: fotismos did not make this list, which exceeds {LARGEST}"
+            " bytes. Move it away, or choose another output folder with -o."
         )
     try:
         return path.read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
@@ -134,7 +133,7 @@ def _apply(line: str, found: Listed) -> None:
     except ValueError:
         return
     match said:
-        # What would lead out of the folder, fotismos never wrote.
+        # fotismos never writes names that lead out of the folder.
         case {"gone": str(name)} | {"coming": str(name)} | {"place": str(name)} | str(name) if (
             not _is_name(name)
         ):
@@ -156,12 +155,12 @@ def _is_name(name: str) -> bool:
 
 
 def _name_line(name: str) -> str:
-    """Return the line of a name: itself, or as JSON where a line could not hold it."""
+    """Return the line of a name: itself, or JSON if a line cannot hold it."""
     return name if name.isprintable() and name[:1] not in ("{", '"') else json.dumps(name)
 
 
 def _append(folder: Path, lines: list[str]) -> None:
-    """Add whole lines, or none."""
+    """Add all lines or none."""
     content = "".join(f"{line}\n" for line in lines).encode()
     flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
     descriptor = os.open(folder / MARK, flags, 0o666)

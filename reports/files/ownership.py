@@ -1,7 +1,7 @@
 """Writing to folders that may hold other people's files: only what fotismos made is replaced.
 
-A folder that fotismos writes to holds a list of what was made there (:mod:`reports.files.listing`).
-What is not in the list is not touched, and neither is a folder without such a list in it.
+Each folder that fotismos writes to lists what it made there (:mod:`reports.files.listing`).
+Unlisted files, and folders without a list, are not touched.
 """
 
 import os
@@ -22,23 +22,23 @@ def made(folder: Path) -> set[str]:
 
 
 def require_free(path: Path) -> None:
-    """Refuse a file that fotismos did not make.
+    """Reject a file that fotismos did not make.
 
     Raises
     ------
     InputError
-        Naming it, or what is there in its place.
+        Naming what is there.
     """
     _require(path, path.is_file() and path.name in made(path.parent))
 
 
 def require_free_folder(path: Path) -> None:
-    """Refuse a folder that fotismos did not make, unless it is empty.
+    """Reject a folder that fotismos did not make, unless it is empty.
 
     Raises
     ------
     InputError
-        Naming it, or what is there in its place.
+        Naming what is there.
     """
     is_own = path.name in made(path.parent) and (path / MARK).is_file()
     _require(path, is_own or _is_empty(path))
@@ -52,18 +52,18 @@ def _require(path: Path, is_free: bool) -> None:
     if path.is_symlink() or (path.exists() and not is_free):
         kind = "folder" if path.is_dir() else "file"
         raise InputError(
-            f"{atomic.printable(path)}: this {kind} was not made by fotismos, and is left as it is."
-            " Choose another output folder with -o, or move it away."
+            f"{atomic.printable(path)}: this {kind} was not made by fotismos. Move it away, or"
+            " choose another output folder with -o."
         )
 
 
 def folder(path: Path) -> Path:
-    """Make a folder for single results, or use one that is there, whatever else is in it.
+    """Make a folder for single results, or use an existing one, whatever else it holds.
 
     Raises
     ------
     OutputError
-        Where it cannot be made or written to.
+        If it cannot be made or written to.
     """
     with atomic.explained(path):
         path.mkdir(exist_ok=True)
@@ -74,7 +74,7 @@ def folder(path: Path) -> Path:
 
 
 def clear(path: Path, names: Iterable[str]) -> None:
-    """Delete those of some files that fotismos made, and their folder once it is empty."""
+    """Delete the named files that fotismos made, and their folder if it is empty then."""
     if not path.is_dir():
         return
     with atomic.explained(path):
@@ -86,7 +86,7 @@ def clear(path: Path, names: Iterable[str]) -> None:
 
 
 def leave(path: Path) -> None:
-    """Delete the list of a folder in which fotismos made nothing, and the folder if it is empty."""
+    """Delete a folder's list if fotismos made nothing there, and the folder if it is empty."""
     if not listing.read(path).is_empty():
         return
     (path / MARK).unlink(missing_ok=True)
@@ -96,7 +96,7 @@ def leave(path: Path) -> None:
 
 
 def leave_empty(folder: Path) -> None:
-    """Delete the lists in the folders of a folder in which nothing was made, and empty folders."""
+    """Apply :func:`leave` to the folders in a folder."""
     for inner in folder.iterdir():
         if (inner / MARK).is_file() and not inner.is_symlink():
             leave(inner)
@@ -108,9 +108,9 @@ def write(path: Path, content: str | bytes) -> None:
     Raises
     ------
     InputError
-        Where the place holds something that fotismos did not make.
+        If the place holds something that fotismos did not make.
     OutputError
-        Where it cannot be written to.
+        If it cannot be written to.
     """
     with replacing(path) as partial:
         partial.write_bytes(atomic.encoded(content))
@@ -118,12 +118,12 @@ def write(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a file to write to, and put it in the place of an earlier result at the end.
+    """Yield a file to write to, which replaces an earlier result at the end.
 
     Raises
     ------
     InputError, OutputError
-        As for :func:`write`.
+        See :func:`write`.
     """
     require_free(path)
     with _withdrawing(path), atomic.replacing(path) as partial:
@@ -135,18 +135,18 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def replacing_folder(place: Path) -> Iterator[Path]:
-    """Give a new folder to fill, and put it in the place of an earlier result at the end.
+    """Yield a new folder to fill, which replaces an earlier result at the end.
 
-    The old folder steps aside and is deleted last: at every moment one of the two is whole. What
-    others put into it is kept.
+    The old folder steps aside and is deleted last: at every moment one of the two is complete.
+    Other people's files in it are kept.
 
     Raises
     ------
     InputError
-        Where the place holds something that fotismos did not make, or would have to replace
-        something that others put into an earlier result.
+        If the place holds something that fotismos did not make, or a new file has the name of one
+        that others put into an earlier result.
     OutputError
-        Where it cannot be written to; the earlier result is in its place then.
+        If it cannot be written to; the earlier result stays in place.
     """
     require_free_folder(place)
     new, old = atomic.beside(place), atomic.beside(place, "old")
@@ -158,10 +158,10 @@ def replacing_folder(place: Path) -> Iterator[Path]:
             listing.confirm(new, *sorted(path.name for path in new.iterdir()))
             was_there = _put(new, place, old)
         finally:
-            with suppress(OSError):  # what stays is cleared away by the next run
+            with suppress(OSError):  # the next run clears away what stays
                 atomic.remove(new)
         listing.confirm(place.parent, place.name)
-    with suppress(OSError):  # as above; what is half deleted has not the name of what is whole
+    with suppress(OSError):  # as above; a half deleted folder never has the name of a complete one
         if was_there:
             old.rename(new)
             atomic.remove(new)
@@ -170,7 +170,7 @@ def replacing_folder(place: Path) -> Iterator[Path]:
 def recover(folder: Path) -> None:
     """Clear away what dead processes left half written, and restore what they were replacing.
 
-    In the folders that fotismos made as well. For the only process that writes there.
+    Includes folders that fotismos made. No other process may be writing there.
     """
     for partial, _ in atomic.abandoned(folder):
         atomic.remove(partial)
@@ -185,26 +185,26 @@ def recover(folder: Path) -> None:
     for name in made(folder):
         inner = folder / name
         if (inner / MARK).is_file() and not inner.is_symlink():
-            with suppress(OSError, OutputError):  # without rights it is not in this run's way
+            with suppress(OSError, OutputError):  # an inaccessible folder does not hinder this run
                 recover(inner)
 
 
 @contextmanager
 def _withdrawing(path: Path) -> Iterator[None]:
-    """Take what was announced off the list if the block fails and it is not there."""
+    """Withdraw an announcement if the block fails and the file is not there."""
     try:
         yield
     except BaseException:
         if not os.path.lexists(path):
-            with suppress(OSError):  # without it, the identity tells what comes from what came
+            with suppress(OSError):  # without it, its identity shows that the file never came
                 listing.withdraw(path.parent, path.name)
         raise
 
 
 def _put(new: Path, place: Path, old: Path) -> bool:
-    """Put a new folder in the place of an old one, with what others put into that.
+    """Replace an old folder with a new one, keeping other people's files.
 
-    Returns whether there was one.
+    Returns whether there was an old one.
     """
     listing.announce(place.parent, place.name, listing.identity_of(new))
     if not place.exists():
@@ -222,7 +222,7 @@ def _put(new: Path, place: Path, old: Path) -> bool:
 
 
 def _keep(place: Path, new: Path) -> None:
-    """Copy from an old folder what is not fotismos's."""
+    """Copy other people's files from an old folder."""
     ours = made(place) | {MARK}
     for path in place.iterdir():
         is_result = path.name in ours or atomic.LEFT.fullmatch(path.name)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from comparisons.check.measurement import HALVES
+from comparisons.check.moved import Move
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from heuristic import program
 from reports.ci import lines
@@ -21,27 +23,27 @@ from reports.terminal.printing import percent
 TEMPLATES = Path(__file__).parent / "templates"
 
 SHOWN = 12
-"""Quantities that a scene's table has, and objects that carry a change."""
+"""Greatest number of rows in a scene's tables of quantities and of objects."""
 
 TITLES = {"heuristic": "Textbook half", "reference": "Reference"}
 
 KINDS = {
     "-before": "Before",
     "": "Now",
-    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} and more (light)",
+    "-error": f"{LEADING.label}, from 0 (black) to {LARGEST_ERROR:g} or more (light)",
     "-change": "Change of luminance, by block",
-    "-p": "Chance of this though nothing changed, by block",
+    "-p": "Chance of this if nothing changed, by block",
 }
-"""Captions of the pictures of a half, by the ending of their names."""
+"""Captions of a half's pictures, by the endings of their names."""
 
 
 def render(results: Sequence[Result], level: float) -> str:
-    """Return the page of all results of a check, those that failed in full.
+    """Return the page of all results of a check, with failures in full.
 
     Parameters
     ----------
     results
-        Of :mod:`reports.ci.checks`; the pictures of a failure are read from its folder.
+        From :mod:`reports.ci.checks`; the pictures of a failure are read from its folder.
     level
         Significance of the whole command.
     """
@@ -70,11 +72,15 @@ def write(folder: Path, results: Sequence[Result], level: float) -> Path | None:
     return folder / PAGE
 
 
-def _failure(result):
-    """Return what the template shows of one baseline."""
-    halves = [_half(result, half) for half in HALVES]
-    sides = result.check.before, result.check.after
-    sides = result.check.before, result.check.after
+def _failure(result: Result) -> dict[str, Any]:
+    """Return the template's data of one baseline."""
+    check, folder = result.check, result.folder
+    assert check is not None  # a failure has both
+    assert folder is not None
+    moved = {move.half for move in check.moved}
+    objects = result.objects or {}
+    halves = [_half(half, folder, half in moved, objects.get(half, {})) for half in HALVES]
+    sides = check.before, check.after
     before, after = (measured.metrics[LEADING.name].value for measured in sides)
     return {
         "result": result,
@@ -82,29 +88,28 @@ def _failure(result):
         "after": f"{after:.3f}",
         "versions": lines.versions_line(result),
         "halves": [half for half in halves if half["moved"]] or halves,
-        "moved": [_cells(move) for move in result.check.moved[:SHOWN]],
+        "moved": [_cells(move) for move in check.moved[:SHOWN]],
         "update": program.command("check", result.path, "--update"),
     }
 
 
-def _cells(move):
+def _cells(move: Move) -> tuple[str, ...]:
     """Return the cells of a row, metrics by their labels."""
     name, *numbers = lines.moved_cells(move)
-    labels = {metric.name: metric.label for metric in (*METRICS.values(), RATIO)}
+    labels = {metric.name: metric.label for metric in METRICS.values()} | {RATIO.name: RATIO.label}
     return labels.get(name, name), *(number.replace("-", "−") for number in numbers)
 
 
-def _half(result, half):
-    paths = {kind: result.folder / f"{half}{kind}.png" for kind in KINDS}
-    objects = (result.objects or {}).get(half, {})
+def _half(half: str, folder: Path, moved: bool, objects: dict[str, float]) -> dict[str, Any]:
+    paths = {kind: folder / f"{half}{kind}.png" for kind in KINDS}
     return {
         "title": TITLES[half],
-        "moved": any(move.half == half for move in result.check.moved),
+        "moved": moved,
         "pictures": [(KINDS[kind], _uri(path)) for kind, path in paths.items() if path.is_file()],
         "has_before": paths["-before"].is_file(),
         "objects": list(objects.items())[:SHOWN],
     }
 
 
-def _uri(path):
+def _uri(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")

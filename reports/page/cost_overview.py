@@ -1,4 +1,4 @@
-"""The cost of accuracy over all scenes: what each method takes, and the error that it leaves."""
+"""The cost of accuracy over all scenes: the time of each method, and the error that it leaves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from comparisons.cost.rungs import rungs
 class Cell:
     """A method on one scene: its point of most samples.
 
-    A method that the scene cannot tell from another one shares its rung; all cells of the rung but
+    Methods between which the scene makes no difference share a rung; all cells of the rung except
     the first are ``merged``.
     """
 
@@ -23,7 +23,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A scene: a cell for each method, None where it has none, and the effect worth most."""
+    """A scene: a cell for each method, None if it has none, and the effect worth most."""
 
     record: Cost
     cells: tuple[Cell | None, ...]
@@ -34,7 +34,7 @@ def methods(records: Sequence[Cost]) -> tuple[str, ...]:
     """Return the names of all methods of some records, in the order of the ladder."""
     places = {rung.name: place for place, rung in enumerate(rungs())}
     names = dict.fromkeys(name for each in records for rung in each.rungs for name in rung.names)
-    # The name of a kernel that another heuristic shades goes on behind a colon.
+    # If another heuristic shades a kernel, the kernel's name continues after a colon.
     return tuple(sorted(names, key=lambda name: places.get(name.partition(":")[0], len(places))))
 
 
@@ -44,8 +44,9 @@ def rows(records: Sequence[Cost]) -> list[Row]:
     return [Row(record, _cells(record, names), _best(record)) for record in records]
 
 
-def _cells(record, names):
-    cells, seen = [], set()
+def _cells(record: Cost, names: Sequence[str]) -> tuple[Cell | None, ...]:
+    cells: list[Cell | None] = []
+    seen: set[str] = set()
     for name in names:
         rung = next((rung.name for rung in record.rungs if name in rung.names), None)
         if rung is None:
@@ -57,7 +58,7 @@ def _cells(record, names):
     return tuple(cells)
 
 
-def _best(record):
-    """Return the effect that removes most of those that surely remove something, or None."""
+def _best(record: Cost) -> Price | None:
+    """Return the effect that removes most, among those surely above 0, or None."""
     sure = [price for price in record.prices.effects if price.removes.low > 0]
     return max(sure, key=lambda price: price.removes.value, default=None)

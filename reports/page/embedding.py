@@ -1,13 +1,13 @@
 """A comparison's images inside the page, as numbers: exact to the digits that the page prints.
 
-Every value is rounded to three significant decimal digits, the standard error to two, and kept as
-a 16-bit code. Half floats would need more bits for their noise and still print another last digit
-now and then; this way what the page prints is the EXR's own value, rounded once. Steps between
-codes are at most 1 %, one 8-bit level near white.
+Every value is rounded to three significant decimal digits, the standard error to two, and stored as
+a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
+bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one
+8-bit level.
 
 A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
-to the left neighbour, and split into low and high bytes; all planes are deflated together. What
-this does not say in words, ``templates/viewer/decoding.js`` says in reverse.
+to the left neighbour, and split into low and high bytes; all planes are deflated together.
+``templates/viewer/decoding.js`` reverses this.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DIGITS, ERROR_DIGITS = 3, 2
 #: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
 EXPONENTS = (-18, 16)
 
-#: Added to the code of a magnitude where the value is negative.
+#: Added to the code of a magnitude if the value is negative.
 NEGATIVE = 0x8000
 
 #: Pixels; longer images are averaged over square blocks inside the page, never in the files.
@@ -42,7 +42,7 @@ SIGNIFICANT, COUNTED, UNDETERMINED = 1, 2, 4
 
 Codes = NDArray[np.uint16]
 
-#: Looked up, since powers take longer than all else of the encoding.
+#: Looked up, since powers would dominate the time of encoding.
 _TENS = 10.0 ** np.arange(EXPONENTS[1] - EXPONENTS[0] + DIGITS)
 
 
@@ -58,9 +58,9 @@ class Embedded(Record):
     """The images of a comparison, for the page.
 
     width, height
-        Of the planes. `block` pixels of the image in each direction are averaged to one of theirs.
+        Of the planes. Their pixels are means over `block` × `block` pixels of the image.
     planes
-        What `data` holds, in order.
+        The content of `data`, in order.
     data
         The planes, deflated (RFC 1950), in base64.
     """
@@ -72,18 +72,20 @@ class Embedded(Record):
     data: str
 
     def manifest(self) -> dict[str, Any]:
-        """What is needed to read `data`, as plain data."""
+        """The description needed to read `data`, as plain data."""
         return plain(structs.replace(self, data=""))
 
 
 def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     """Encode the images of a comparison.
 
+    Parameters
+    ----------
     channels
-        As `exr.channels` gives them, (H, W) each: what the page shows is what the file
-        holds. Of the standard error, the largest of the three channels is kept.
+        From :func:`reports.files.exr.channels`, (H, W) each, so page and file agree. Of the
+        standard error, the largest of the three channels is kept.
     counted
-        Boolean (H, W): the pixels that the statistics are over.
+        Boolean (H, W): the pixels in the statistics.
     """
     height, width = np.shape(counted)
     block = -(-max(height, width) // LONGEST)
@@ -113,8 +115,8 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
 
 
 def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
-    """The codes of planes, by name, as `Embedded.data` has them."""
-    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base)) for plane in planes)
+    """The named codes of planes as in `Embedded.data`."""
+    raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base or "")) for plane in planes)
     # Level 4: a third of the time of 6, for 1 % more.
     return base64.b64encode(zlib.compress(raw, 4)).decode("ascii")
 
@@ -139,12 +141,12 @@ def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:
 
 
 def _scaled(size: NDArray, power: NDArray) -> NDArray:
-    # By powers of ten that are exact, so that a tie stays one; one of the two factors is 1.
+    # Powers of ten are exact, so ties stay ties; one of the two factors is 1.
     return size * _TENS[np.maximum(power, 0)] / _TENS[np.maximum(-power, 0)]
 
 
 def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:
-    """Means over square blocks; those at the right and at the bottom may be smaller."""
+    """Means over square blocks, which may be smaller at the right and bottom edges."""
     image = np.asarray(image, np.float64)
     if block == 1:
         return image

@@ -13,9 +13,9 @@ from reports.files import images
 
 @dataclass(frozen=True)
 class Group:
-    """Cases under one heading, and what their two errors are of, where that needs saying.
+    """Cases under one heading, with a note on their two errors.
 
-    Without a note they are of the formula as printed and of the kernel.
+    Without a note they are errors of the formula as printed and of the kernel.
     """
 
     title: str
@@ -30,9 +30,9 @@ GROUPS = {
     "shading": Group("Shading"),
     "reference": Group(
         "The reference",
-        "Where Mitsuba’s own formula breaks as printed, “ours” is Mitsuba’s value. Where Mitsuba is"
-        " at fault, the error is what would be booked on the heuristic: naively of every pixel,"
-        " ours without those that are counted as limits of the reference.",
+        "If Mitsuba’s own formula breaks as printed, “ours” is Mitsuba’s value. If Mitsuba is at"
+        " fault, the error is the part attributed to the heuristic: naively over all pixels, ours"
+        " without those counted as limits of the reference.",
     ),
     "colour": Group(
         "Colour",
@@ -43,5 +43,5 @@ GROUPS = {
 
 def grey(image: ArrayLike) -> bytes:
     """The PNG of an image (H, W) of values from 0 to 1, enlarged pixel by pixel."""
-    planes = np.repeat(np.nan_to_num(np.float32(image))[..., None], 3, axis=2)
+    planes = np.repeat(np.nan_to_num(np.asarray(image, np.float32))[..., None], 3, axis=2)
     return images.png(images.tonemap(planes).resize((320, 320), Image.Resampling.NEAREST))

@@ -1,4 +1,4 @@
-"""What the colours of each map mean: its bar, its labels and a sentence."""
+"""The legend of each map: its bar, labels and a sentence."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from reports.files import images
 
 @dataclass(frozen=True)
 class Legend:
-    """A map: how it is drawn, its colour bar, labels from low to high, and a sentence.
+    """A map: its kind, colour bar, labels from low to high, and a sentence.
 
-    ``kind`` is ``error``, ``ratio`` or ``mask``; ``top`` the end of the bar.
+    ``kind`` is ``error``, ``ratio`` or ``mask``; ``top`` is the end of the bar.
     """
 
     name: str

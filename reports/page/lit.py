@@ -1,4 +1,4 @@
-"""What lights up in the page: which shape and which material each pixel sees, in a small size."""
+"""Highlighting in the page: small maps of the shape and the material that each pixel sees."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from comparisons.records import Record, plain
 from reports.files.images import THUMBNAIL, tonemap
 from reports.page.switchboard import webp
 
-#: The place of pixels that belong to nothing.
+#: The place of pixels without a shape.
 NOTHING = 255
 
 
@@ -26,7 +26,7 @@ class Lit(Record):
     picture
         A WebP file of `width` by `height` pixels.
     maps
-        A byte per pixel, the place of its shape in the record; then the same of materials.
+        A byte per pixel, the place of its shape in the record; then the same for materials.
         Deflated (RFC 1950), in base64.
     """
 
@@ -36,7 +36,7 @@ class Lit(Record):
     maps: str
 
     def data(self) -> dict[str, Any]:
-        """Return the same for the page's script."""
+        """Return the data of the page's script."""
         picture = "data:image/webp;base64," + base64.b64encode(self.picture).decode("ascii")
         return plain(structs.replace(self, picture=b"")) | {"picture": picture}
 

@@ -1,4 +1,4 @@
-"""The page's overview: the columns that scenes are compared by, and the names that scenes go by."""
+"""The page's overview: its columns, and the scenes' names in the address."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from reports.terminal.printing import about_noise
 
 @dataclass(frozen=True)
 class Column:
-    """What scenes can be sorted by: a key, its words, its number, and how that is shown.
+    """A sort key of scenes: its title, its number, and the number's form.
 
-    ``form`` is one of the macro ``value``, ``style`` a class; the ``leading`` column is the one in
-    which scenes are judged.
+    ``form`` is one of the macro ``value``, ``style`` a class; scenes are judged by the ``leading``
+    column.
     """
 
     key: str
@@ -30,7 +30,7 @@ class Column:
 
     @property
     def heading(self) -> Markup:
-        """The words as a heading of a narrow column."""
+        """The title as a heading of a narrow column."""
         return escape(self.title[0].upper() + self.title[1:]).replace(", ", Markup(",<br>"))
 
 
@@ -77,12 +77,12 @@ def _mean(metric: Metric) -> Callable[[ComparisonRecord], float]:
 
 
 def keys(record: ComparisonRecord) -> dict[str, float]:
-    """What each of `columns` sorts a scene by."""
+    """A scene's number in each of `columns`."""
     return {column.key: column.value(record) for column in columns()}
 
 
 def is_significant(record: ComparisonRecord) -> bool:
-    """Whether a scene departs by more than noise: in some pixels, and in its mean."""
+    """Whether a scene departs by more than noise in some pixels and in its mean."""
     return record.significant.fraction > 0 and not about_noise(record.metrics[LEADING.name])
 
 

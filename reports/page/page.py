@@ -1,12 +1,11 @@
 """The report: one offline HTML file with the pictures, maps and numbers of a run.
 
-`render` reads records and images that are encoded already; it computes nothing that is not in them
-but how to print a number.
+`render` only prints the numbers of records and of images that are encoded already.
 Names and messages come from users' files, so everything is escaped, and the page may load nothing:
-a content security policy allows the page's own scripts, by their hashes, and forbids the rest.
+a content security policy allows only the page's own scripts, by their hashes.
 
 Without JavaScript the page has small pictures, numbers and charts, one scene after another. With
-it, ``templates/viewer`` shows one scene at a time, by its embedded numbers, and the others wait as
+it, ``templates/viewer`` shows one scene at a time from its embedded numbers, and the others wait as
 text.
 """
 
@@ -45,7 +44,7 @@ from reports.terminal.printing import (
     seconds,
 )
 
-if TYPE_CHECKING:  # for what few pages show
+if TYPE_CHECKING:  # few pages need these
     from comparisons.cost.cost_record import Cost
     from comparisons.hard.collection import HardCases
     from comparisons.verification import Verification
@@ -57,12 +56,12 @@ TITLE = "Textbook shading against physically based rendering"
 #: Pictures narrower than this are enlarged without smoothing.
 PIXELATED_BELOW = 400
 
-#: How a value is printed, by the name of its form.
+#: How values are printed, by the names of forms.
 FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
 
 TEMPLATES = Path(__file__).parent / "templates"
 
-#: The parts of the page's style and of its script, in their order.
+#: The parts of the page's style and of its script, in order.
 STYLES = ("base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "print")
 SCRIPTS = (
     "page", "numbers", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
@@ -71,15 +70,15 @@ SCRIPTS = (
     "terms", "switchboard", "objects", "lazy", "main",
 )  # fmt: skip
 
-#: Run before anything is drawn: what is for scripts alone is shown only where they run.
+#: Runs before anything is drawn: content that needs scripts is shown only if they run.
 EARLY = 'document.documentElement.className = "js";'
 
-#: Tells the page that the module before it has run, of which inline ones say nothing.
+#: Tells the page that the module before it has run; inline modules have no such event.
 LOADED = '\nwindow.dispatchEvent(new Event("vega"));'
 
 
 class Scene(SceneView, kw_only=True):
-    """A scene in the page: what is shown of it, and its name in the page's address."""
+    """A scene in the page, and its name in the page's address."""
 
     id: str
     histograms: tuple[vega.Figure, ...]
@@ -101,11 +100,11 @@ def render(
     run: Run | None = None,
     making: Making | None = None,
 ) -> str:
-    """One HTML page of all scenes, in the order given.
+    """One HTML page of all scenes, in the given order.
 
     `equations` is the index of `heuristic.equations`; it, `verifications` and `hard_cases` are
-    sections of their own, left out where they are empty. `failures` are the scenes that could not
-    be compared. `run` says where the time went, `making` how far a run is that has not ended.
+    separate sections, omitted if empty. `failures` are the scenes that could not be compared. `run`
+    says where the time went, `making` how far an unfinished run is.
     """
     taken: set[str] = set()
     scenes = [_scene(view, taken) for view in views]
@@ -142,8 +141,8 @@ def render(
 
 
 def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[str, Any]:
-    """What few pages show, by modules that the others do without."""
-    shown = {"cost_rows": (), "hard_cases": hard_cases}
+    """Content of few pages, made by modules that the others do not import."""
+    shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases}
     if costs:
         from reports.page import cost_overview
 
@@ -160,12 +159,12 @@ def _scene(view: SceneView, taken: set[str]) -> Scene:
     return Scene(
         **structs.asdict(view),
         id=overview.identifier(view.record.scene, taken),
-        histograms=histograms.figures(view.record),
+        histograms=tuple(histograms.figures(view.record)),
     )
 
 
 def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[str, Any]:
-    """What the page's script needs: the scenes, and how maps are drawn."""
+    """The data of the page's script: the scenes, and how maps are drawn."""
     return {
         "scenes": [
             *map(_scene_data, scenes),

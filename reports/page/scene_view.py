@@ -1,4 +1,4 @@
-"""What the page shows of one scene."""
+"""The page's data of one scene."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class EffectMap(Record):
 
 
 class CostView(Record):
-    """What a page shows of a study; ``images`` are PNG by file name without its ending."""
+    """A page's data of a study; ``images`` are PNG files by name without suffix."""
 
     record: Cost
     images: dict[str, bytes]
@@ -43,29 +43,31 @@ class CostView(Record):
 
     @property
     def switchboard(self) -> dict[str, Any]:
-        """What the script of the switchboard needs, where there is a sheet."""
-        return switchboard.data(self.record, self.sheet)
+        """The data of the switchboard's script; empty without a sheet."""
+        return switchboard.data(self.record, self.sheet) if self.sheet else {}
 
 
 class SceneView(Record):
     """A comparison as the page shows it.
 
+    Attributes
+    ----------
     record
         The content of ``comparison.json``.
     thumbnails
-        Small PNG bytes by name, of both halves and of the map by which scenes are judged.
+        Small named PNG files, of both halves and of the leading metric's map.
     embedded
-        The images as numbers, without which the scene has no pictures but the thumbnails.
+        The images as numbers; without them the scene has only the thumbnails.
     files
-        Paths relative to the page by label, shown as links.
+        Labels and paths relative to the page, shown as links.
     charts, cost
-        Of what accuracy costs, where that was studied.
+        The study of cost, if there is one.
     is_coarse
-        Whether it is a small preview, which a later writing of the page replaces.
+        Whether it is a small preview, which the page replaces later.
     terms
-        Of equation 8.10 at a grid of pixels.
+        The terms of equation 8.10 at a grid of pixels.
     lit
-        Which shape and which material each pixel sees.
+        The shape and the material that each pixel sees.
     """
 
     record: ComparisonRecord
@@ -81,17 +83,17 @@ class SceneView(Record):
 
 @dataclass(frozen=True)
 class Making:
-    """How many of the scenes of a run are refined, where the page is not finished yet."""
+    """The number of refined scenes of an unfinished run."""
 
     done: int
     total: int
     is_interrupted: bool = False
 
 
-def picture_name(kind, name):
-    """Return the name of a picture's file, without its ending, such as cost-part-transport."""
+def picture_name(kind: str, name: str) -> str:
+    """Return the name of a picture's file without suffix, such as cost-part-transport."""
     return f"cost-{kind}-{_plain(name)}"
 
 
-def _plain(name):
+def _plain(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")

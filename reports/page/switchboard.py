@@ -13,13 +13,13 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.terminal.printing import number, seconds
 
-#: Of the WebP file, from 0 to 100.
+#: Quality of the WebP file, from 0 to 100.
 QUALITY = 80
 
 #: Previews in a row of the picture.
 COLUMNS = 4
 
-#: ΔE2000: smaller means are rounding, or what is left of noise.
+#: ΔE2000: smaller means are rounding or remaining noise.
 LEAST = 0.01
 
 
@@ -32,7 +32,7 @@ class Sheet(Record):
 
 
 def sheet(previews: Sequence[Image.Image]) -> Sheet | None:
-    """Return the sheet of previews of one size, in their order; None of fewer than two."""
+    """Return the sheet of previews of one size, in order; None for fewer than two."""
     if len(previews) < 2:
         return None
     width, height = previews[0].size
@@ -52,7 +52,7 @@ def webp(picture: Image.Image) -> bytes:
 
 
 def data(record: Cost, shown: Sheet) -> dict[str, Any]:
-    """Return what the page's script needs: the sheet, and what each of its pictures stands for."""
+    """Return the data of the page's script: the sheet, and the meaning of its pictures."""
     effects = [price.effect for price in record.prices.effects]
     return {
         "sheet": "data:image/webp;base64," + base64.b64encode(shown.webp).decode("ascii"),

@@ -1,13 +1,13 @@
-"""The terms of a scene for the page: 16-bit codes of what the kernel's terms are products of.
+"""The terms of a scene for the page: 16-bit codes of the factors of the kernel's terms.
 
-A cosine ``c`` has the code ``65535 (1 + c) / 2``; what is 0 or more has ``65535 sqrt(v / top)``,
-with the plane's ``top``, and is off by at most ``top`` / 65000. The planes are packed as those of
-images are (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them.
+A cosine ``c`` has the code ``65535 (1 + c) / 2``; a value ``v`` ≥ 0 has ``65535 sqrt(v / top)``,
+with the plane's ``top``, and is off by at most ``top`` / 65000. The planes are packed like those of
+images (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from msgspec import field
@@ -19,6 +19,8 @@ from comparisons.terms.term_grid import TermGrid
 from reports.page.embedding import Embedded, Plane, packed
 
 LARGEST = 65535
+
+View = TypeVar("View", bound=Record)
 
 
 class MaterialView(Record):
@@ -42,14 +44,16 @@ class LightView(Record):
 
 
 class TermsView(Record):
-    """What the page holds of the terms of a scene.
+    """The page's data of the terms of a scene.
 
+    Attributes
+    ----------
     grid
-        Planes over the grid of pixels; None where there are no terms.
+        Planes over the grid of pixels; None without terms.
     tops
-        Of the planes that are 0 or more, by name.
+        Of the named planes of values ≥ 0.
     lobes
-        Planes over incidences and directions of view, by the number of the material.
+        Planes over incidences and directions of view, by the material's number.
     missing
         Why there are no terms.
     """
@@ -62,7 +66,7 @@ class TermsView(Record):
     missing: str = ""
 
     def manifest(self) -> dict[str, Any]:
-        """What the page's script needs beside the data of the grid, as plain data."""
+        """The data of the page's script, except the grid's planes, as plain data."""
         found = plain(self)
         return found | {
             "grid": self.grid.manifest() if self.grid else None,
@@ -73,7 +77,7 @@ class TermsView(Record):
 
 
 def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
-    """Return what the page holds of a grid of terms, or of why there is none."""
+    """Return the page's data of a grid of terms, or the reason why there is none."""
     if grid is None:
         return TermsView(missing=missing) if missing else None
     tops: dict[str, float] = {}
@@ -106,7 +110,7 @@ def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
     )
 
 
-def _of(kind: type, source: object) -> Any:
+def _of(kind: type[View], source: object) -> View:
     return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
 
 

@@ -9,11 +9,11 @@ from reports import verdict
 from reports.charts.theme import EFFECT_COLOURS
 
 ROOM = 1.04
-"""The longest bar, and a little more, is the width of all."""
+"""Width of the bars, relative to the longest."""
 
 
 def context(scenes: Sequence[Any]) -> dict[str, Any]:
-    """Return what the template shows of scenes, each with ``record`` and ``cost``."""
+    """Return the template's data of scenes, each with ``record`` and ``cost``."""
     found = [verdict.finding(s.record, s.cost.record if s.cost else None) for s in scenes]
     rows = sorted(zip(scenes, found, strict=True), key=lambda row: -row[1].mean)
     names = verdict.ranked(found)

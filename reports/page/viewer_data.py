@@ -1,4 +1,4 @@
-"""What the viewer needs besides a scene's images: how maps are drawn, and where regions are."""
+"""The viewer's data besides a scene's images: how maps are drawn, and where regions are."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from reports.charts import theme
 from reports.files import images
 from reports.page.legends import legends
 
-#: A region that is opened from its link gets about so many screen pixels.
+#: Approximate screen pixels of a region that is opened from its link.
 REGION_SIZE = 420
 
 
 def drawing() -> dict[str, Any]:
-    """Maps, their colours, and the matrix from linear RGB to XYZ, as the script calls them."""
+    """Maps, their colours, and the matrix from linear RGB to XYZ, under the script's names."""
     keys = ("name", "title", "kind", "top")
     maps = [{key: getattr(item, key) for key in keys} for item in legends()]
     effects = {"name": "effects", "title": theme.EFFECTS_TITLE, "kind": "effects", "top": 1}

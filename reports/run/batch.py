@@ -1,13 +1,13 @@
 """Comparing scenes one after another, and writing their results and the page.
 
-A scene that cannot be compared does not keep the others from it: the page names it with its error,
-and the command ends with that error's exit code. Scenes are compared in a process apart, which one
-of them may kill. The page is written as soon as there is a picture, and again as the run goes on.
+A scene that cannot be compared does not stop the others: the page names it with its error, and the
+command ends with that error's exit code. Scenes are compared in a separate process, which one of
+them may kill. The page is written with the first picture, and again as the run continues.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,14 +22,17 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from reports.page.scene_view import SceneView
+    from reports.run.growing import Growing
     from reports.run.stages import Run
     from reports.terminal.progress import Bar
 
 More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
 Judge = Callable[[Path, Sequence["SceneView"]], None]
+Calls = Mapping[str, tuple[str, Path, str, Wanted]]
+"""The arguments of :func:`reports.run.single.compare` for each place."""
 
 SKETCH, WHOLE, MORE = 1.0, 8.0, 3.0
-"""About how long a scene takes in each part of a run, for the time that is left."""
+"""Relative times that a scene takes in each part of a run, to estimate the time left."""
 
 
 def run(
@@ -41,29 +44,29 @@ def run(
     seen: Callable[[Path], object] = lambda _: None,
     judge: Judge | None = None,
 ) -> None:
-    """Compare scenes, and write the results of each, then page and tables of all.
+    """Compare scenes, and write the results of each, then the page and tables of all.
 
     Parameters
     ----------
     names
-        Of built-in scenes, files and folders.
+        Built-in scenes, files and folders.
     folder
         For the results.
     wanted
-        What of each scene.
+        What to do with each scene.
     pool
-        Where they are compared; it is ended.
+        Processes that compare the scenes; it is ended.
     more
-        Does what else the page shows in the pool, counts its time, and returns it in a dictionary.
+        Makes further content of the page in the pool, counts its time, and returns the content.
     seen
-        Called with the page's path when it is there for the first time.
+        Called with the page's path once the page exists.
     judge
-        Called in the end, with the output folder and the views of the scenes that were compared.
+        Called at the end with the output folder and the views of the compared scenes.
 
     Raises
     ------
     FotismosError
-        The gravest of the errors that kept a scene from being compared.
+        The gravest error among scenes that could not be compared.
     """
     with pool as pool:
         pool.start()
@@ -97,7 +100,7 @@ def run(
                         growing.offer(at_once=True)
                         shown = more(pool, record, bar)
             except KeyboardInterrupt:
-                pool.end()  # before its half written files are cleared away
+                pool.end()  # before clearing away its half written files
                 ownership.recover(folder)
                 if growing.has_begun:
                     _write(record, growing, wanted.figures, shown, is_interrupted=True)
@@ -117,15 +120,15 @@ def run(
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _verdict(views):
-    """Return the lines that say what was found."""
+def _verdict(views: Sequence[SceneView]) -> list[str]:
+    """Return the lines of the verdict and its advice."""
     from reports import verdict
 
     found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
     return ["", *verdict.sentences(found), *verdict.advice(found)]
 
 
-def _tasks(function, each, bar):
+def _tasks(function: Callable[..., object], each: Calls, bar: Bar) -> Iterator[Task]:
     from comparisons.case import name_of
 
     return (
@@ -133,8 +136,8 @@ def _tasks(function, each, bar):
     )
 
 
-def _sketch(pool, growing, each, bar):
-    """Collect coarse views of the scenes; those that are finished already are taken as they are."""
+def _sketch(pool: Pool, growing: Growing, each: Calls, bar: Bar) -> None:
+    """Collect coarse views of the scenes, or the final views of finished ones."""
     bar.begin("first pictures", len(each), SKETCH)
     for task, outcome in pool.each(_tasks(single.sketch, each, bar)):
         try:
@@ -142,7 +145,7 @@ def _sketch(pool, growing, each, bar):
         except LostProcessError as error:  # it would be lost again
             growing.failures[task.name] = error
         except FotismosError:
-            continue  # at its own size it may be another matter
+            continue  # the full size may succeed
         else:
             (growing.coarse if view.is_coarse else growing.views)[task.name] = view
         finally:
@@ -150,7 +153,7 @@ def _sketch(pool, growing, each, bar):
         growing.offer()
 
 
-def _compare(pool, record, growing, each, bar):
+def _compare(pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar) -> None:
     """Collect the views of the scenes that are compared, and the errors of the others."""
     from reports.terminal import carrier_lines, progress
 
@@ -176,8 +179,14 @@ def _compare(pool, record, growing, each, bar):
         growing.offer()
 
 
-def _write(run, growing, with_figures, shown, is_interrupted=False):
-    """Write what is about all scenes, in the order of their places, and say what came of them."""
+def _write(
+    run: Run,
+    growing: Growing,
+    with_figures: bool,
+    shown: dict[str, Any],
+    is_interrupted: bool = False,
+) -> None:
+    """Write the page, record and tables of all scenes, and report the results."""
     from reports.run import output
     from reports.terminal import carrier_lines, progress, tables
 

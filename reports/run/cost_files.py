@@ -1,6 +1,10 @@
-"""The files of a study of cost, and what a page shows of it."""
+"""The files of a study of cost, and its part of a page."""
+
+from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from comparisons import records
 from comparisons.effects.dominance import dominating
@@ -10,19 +14,23 @@ from reports.page import switchboard
 from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.terminal.cost_tables import closure, noise
 
+if TYPE_CHECKING:
+    from comparisons.cost.cost import Study
+    from comparisons.cost.cost_record import Cost
+
 DIGITS = "0123456789"
-"""Of the map of effects in the page: the place of each effect."""
+"""Codes of the effects in the page's map, by their places."""
 
 NO_EFFECT, UNCOUNTED = ".", "-"
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
 
-def documents(study):
-    """Return the files of a study by name: chart, pictures of rungs, parts and effects.
+def documents(study: Study) -> dict[str, bytes]:
+    """Return the named files of a study: chart, pictures of rungs, parts and effects.
 
-    Pictures of rungs are exposed as the record says; parts are signed, red where the later image is
-    brighter, over the range that the record's ``pictures`` states; effects are errors removed.
+    Pictures of rungs have the record's exposure; parts are signed, red where the later image is
+    brighter, over the range in the record's ``pictures``; effects are errors removed.
     """
     from reports.charts import prediction_chart
     from reports.charts.error_over_time import error_over_time
@@ -45,17 +53,17 @@ def documents(study):
     return made
 
 
-def write(place, study):
-    """Write the files of a study to a folder, each atomically; what else is there stays.
+def write(place: Path, study: Study) -> None:
+    """Write the files of a study to a folder, each atomically; other files stay.
 
-    The record comes last: where it is, its pictures are its own.
+    The record comes last, so its pictures are never those of another study.
     """
     ownership.folder(place)
     for name, content in documents(study).items():
         ownership.write(place / name, content)
 
 
-def figures(record):
+def figures(record: Cost) -> list[vega.Figure]:
     """Return the charts of a :class:`Cost`: error against time, and the prices of effects."""
     from reports.charts import error_over_time, price_chart
 
@@ -67,13 +75,13 @@ def figures(record):
         )
     ]
     if record.prices.effects:
-        note = "Circle: what it removes where it is added first; stroke: last."
+        note = "Circle: error removed if added first; stroke: if added last."
         made.append(vega.figure("Price of an effect", price_chart.price_chart(record), note))
     return made
 
 
-def view(study, made):
-    """Return the :class:`CostView` of a study, whose :func:`documents` are ``made``."""
+def view(study: Study, made: dict[str, bytes]) -> CostView:
+    """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
     return CostView(
         record=study.record,
         images={
@@ -92,7 +100,7 @@ def view(study, made):
     )
 
 
-def _effect_map(study):
+def _effect_map(study: Study) -> EffectMap:
     places = dominating(study.effects, study.counted)
     letters = {-1: NO_EFFECT, -2: UNCOUNTED} | dict(enumerate(DIGITS))
     return EffectMap(

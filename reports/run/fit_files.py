@@ -1,7 +1,11 @@
 """Fits as tables for a terminal and in Markdown, and the files of one fit."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from PIL import Image, ImageDraw, ImageFont
@@ -11,25 +15,32 @@ from comparisons.records import to_json
 from reports.files import images, ownership
 from reports.terminal import tables
 
+if TYPE_CHECKING:
+    from comparisons.fit.fit_record import FitRecord, Fitted, FittedMaterial, FormFit
+    from comparisons.fit.summary import Fit
+
+Cells = Sequence[str]
+"""One row of a table."""
+
 SMALLEST_TILE = 256
-"""Pixels; smaller images are enlarged by a whole factor, so that each pixel stays a square."""
+"""Pixels; smaller images are enlarged by a whole factor, so each pixel stays square."""
 
 GAP, CAPTION = 8, 22
 FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
-"""Matplotlib's own; that of Pillow has no Greek."""
+"""Matplotlib's, since Pillow's has no Greek."""
 
 
-def write(folder, fit):
+def write(folder: Path, fit: Fit) -> None:
     """Write ``fit.json`` and ``fit.png`` to a folder."""
     ownership.folder(folder)
     ownership.write(folder / "fit.png", picture(fit))
     ownership.write(folder / "fit.json", to_json(fit.record))
 
 
-def picture(fit):
-    """Return the PNG of a fit: paired parameters, reference, fitted parameters, and what is left.
+def picture(fit: Fit) -> bytes:
+    """Return the PNG of a fit: paired, reference, fitted, and the error left.
 
-    Pictures as a display shows them; the map is over the metric's fixed range.
+    The pictures are tone-mapped; the map has the metric's fixed range.
     """
     exposure = fit.record.viewing.exposure
     high, residual = LEADING.map_range[1], fit.images.maps[LEADING.name]
@@ -54,7 +65,7 @@ def picture(fit):
     return buffer.getvalue()
 
 
-def lines(record):
+def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
     best = record.nearest
     yield f"{record.scene}: {record.loss.name} loss, {_form(best)} comes nearest"
@@ -68,7 +79,7 @@ def lines(record):
     yield ""
 
 
-def markdown(records, scenes):
+def markdown(records: Sequence[FitRecord], scenes: Sequence[str]) -> Iterator[str]:
     """Yield the lines of a Markdown page: departures of scenes before and after their fits."""
     names = " ".join(scenes)
     yield "# Fits: departure before and after"
@@ -76,21 +87,21 @@ def markdown(records, scenes):
     yield f"Made by `./run fit {names} --markdown docs/fit-figures.md`."
     yield ""
     yield (
-        "Mean colour difference from the reference with the paired parameters (*before*) and with"
-        " the best ones of the best form (*after*), and what the reference's noise alone would"
-        " give (*floor*). *Parameter error* and *model error* are of the loss, which is minimised:"
-        " what the best parameters remove of it, and what they leave. A metric is not minimised,"
-        " and other parameters may leave less of it."
+        "Mean colour difference from the reference with the paired parameters (*before*), with the"
+        " best parameters of the best form (*after*), and from the reference's noise alone"
+        " (*floor*). *Parameter error* and *model error* are the parts of the minimised loss that"
+        " the best parameters remove and leave. Metrics are not minimised: other parameters may"
+        " leave less of them."
     )
     yield ""
     yield from tables.markdown(_scene_rows(records), right=2)
     yield ""
-    yield "Fitted parameters beside the paired ones; a dash where the image does not tell."
+    yield "Paired → fitted parameters; a dash if the image does not determine them."
     yield ""
     yield from tables.markdown(_material_rows(records), right=7)
 
 
-def _scene_rows(records):
+def _scene_rows(records: Sequence[FitRecord]) -> Iterator[Cells]:
     labels = (f"{metric.label}: before → after (floor)" for metric in drawn().values())
     errors = ("parameter error (loss)", "model error (loss)")
     yield "scene", "best form", *labels, *errors, "seconds"
@@ -101,7 +112,7 @@ def _scene_rows(records):
         yield record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"
 
 
-def _material_rows(records):
+def _material_rows(records: Sequence[FitRecord]) -> Iterator[Cells]:
     yield "scene", "form", "k_a", "k_d", "k_s", "n", "reference"
     for record in records:
         for fit in record.fits:
@@ -109,18 +120,18 @@ def _material_rows(records):
                 yield record.scene, fit.form, *_material_cells(material)
 
 
-def _material_cells(material):
+def _material_cells(material: FittedMaterial) -> Cells:
     found = {p.name: f"{p.paired:.3g} → {_value(p)}" for p in material.parameters}
     reference = _described(material.reference or {"plugin": ""})
     return [*(found.get(name, "") for name in ("k_a", "k_d", "k_s", "n")), reference]
 
 
-def _form(fit):
+def _form(fit: FormFit) -> str:
     return fit.form + (" (normalised)" if fit.normalised else "")
 
 
-def _departures(record):
-    def row(name, form, field, loss=""):
+def _departures(record: FitRecord) -> Iterator[Cells]:
+    def row(name: str, form: FormFit, field: str, loss: str = "") -> Cells:
         means = (getattr(form.departure[metric], field) for metric in drawn())
         return name, *map(_three, means), loss
 
@@ -136,7 +147,7 @@ def _departures(record):
     yield "model error", *blank, f"{nearest.loss:.4g}"
 
 
-def _parameters(fit):
+def _parameters(fit: FormFit) -> Iterator[Cells]:
     yield "material or light", "parameter", "paired", "fitted", "95 %, by noise", ""
     for owner in fit.materials:
         for parameter in owner.parameters:
@@ -147,7 +158,7 @@ def _parameters(fit):
         yield light.light, *_parameter_cells(light)
 
 
-def _parameter_cells(parameter):
+def _parameter_cells(parameter: Fitted) -> Cells:
     interval = parameter.interval
     note = parameter.reason and f"not identifiable: {parameter.reason}"
     if parameter.partners:
@@ -164,11 +175,11 @@ def _parameter_cells(parameter):
     )
 
 
-def _value(parameter):
+def _value(parameter: Fitted) -> str:
     return "–" if parameter.fitted is None else f"{parameter.fitted:.4g}"
 
 
-def _described(reference):
+def _described(reference: Mapping[str, Any]) -> str:
     words = [
         f"{key} {_number(value)}"
         for key, value in reference.items()
@@ -177,12 +188,12 @@ def _described(reference):
     return " ".join([reference["plugin"], ", ".join(words)]).strip()
 
 
-def _three(value):
-    """Three decimals, and no sign where they are all 0."""
+def _three(value: float) -> str:
+    """Three decimals, without a sign if all are 0."""
     return f"{value:.3f}".replace("-0.000", "0.000")
 
 
-def _number(value):
+def _number(value: Any) -> str:
     if isinstance(value, list):
         return "(" + ", ".join(f"{component:.3g}" for component in value) + ")"
     return f"{value:.3g}" if isinstance(value, float) else str(value)

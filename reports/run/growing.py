@@ -1,4 +1,4 @@
-"""The page of a run, written again and again while its scenes are made."""
+"""The page of a run, rewritten while its scenes are made."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from reports.page.scene_view import Making, SceneView
 from reports.run.stages import Failure
 
 INTERVAL_S = 4.0
-"""Seconds between two writings, at least."""
+"""Least seconds between two writings."""
 
 SHARE = 0.1
-"""Of the time, at most, that writing may take."""
+"""Greatest share of the time that writing may take."""
 
 
 @dataclass
 class Growing:
-    """What is known of the scenes of a run, by the names of their places.
+    """The results so far of a run's scenes, by the names of their places.
 
-    ``seen`` is called with the page's path once it is there. ``coarse`` are views at a small size,
-    which those in ``views`` replace.
+    ``seen`` is called with the page's path once the page exists. ``coarse`` are small previews,
+    which ``views`` replace.
     """
 
     folder: Path
@@ -43,7 +43,7 @@ class Growing:
         return bool(self.views or self.coarse or self.failures)
 
     def shown(self) -> list[SceneView]:
-        """The views in the order of their places, whichever process was ready first."""
+        """The views in the order of their places."""
         best = self.coarse | self.views
         return [best[place] for place in self.places if place in best]
 
@@ -58,12 +58,12 @@ class Growing:
         return len(self.views) + len(self.failures) == len(self.places)
 
     def making(self, is_interrupted: bool = False) -> Making:
-        """How far the run is."""
+        """The progress of the run."""
         done = len(self.views) + len(self.failures)
         return Making(done, len(self.places), is_interrupted)
 
     def offer(self, at_once: bool = False) -> None:
-        """Write the page if it is time to; one that cannot be written now is left for later."""
+        """Write the page if it is due; a failure is left for the next time."""
         begin = monotonic()
         if len(self.places) == 1 or (begin < self._next and not at_once):
             return
@@ -73,12 +73,12 @@ class Growing:
         self._next = end + max(INTERVAL_S, (end - begin) * (1.0 / SHARE - 1.0))
 
     def write(self, **shown: Any) -> None:
-        """Write the page with what else `page.render` shows.
+        """Write the page with more arguments of :func:`reports.page.page.render`.
 
         Raises
         ------
         OutputError
-            When it cannot be written.
+            If it cannot be written.
         """
         from reports.run import output
 

@@ -1,23 +1,33 @@
-"""Passes of a long run, kept in a file so that an interruption loses little.
+"""Passes of a long run, kept in a file that an interrupted run resumes from.
 
-``.SCENE.fotismos-passes.npz`` lies beside the folder of a scene's results. It is written
-atomically, belongs to one scene, one set of options and one set of versions, and goes away when the
-run succeeds.
+``.SCENE.fotismos-passes.npz``, next to the folder of a scene's results, is written atomically,
+belongs to one scene, one set of options and one set of versions, and is deleted when the run
+succeeds.
 """
+
+from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 from comparisons.store import Entry
 from heuristic.heuristics import named
 from reference.scene.identity import digest
 
+if TYPE_CHECKING:
+    from comparisons.case import Case
+    from comparisons.options import Options
+    from reference.scene.source import Source
+
 INTERVAL_S = 10.0
-"""Seconds from one writing to the next, at least: short runs write nothing."""
+"""Least seconds between writings: short runs write nothing."""
 
 SHARE = 0.05
-"""Of the time, at most, that writing may take."""
+"""Greatest share of the time that writing may take."""
 
 
 class KeptPasses(Entry):
@@ -26,18 +36,18 @@ class KeptPasses(Entry):
     Parameters
     ----------
     path, key
-        As for :class:`comparisons.store.Entry`; :func:`key_of` makes the key.
+        See :class:`comparisons.store.Entry`; :func:`key_of` makes the key.
     interval
-        Seconds between writings, at least.
+        Least seconds between writings.
     """
 
-    def __init__(self, path, key, interval=INTERVAL_S):
+    def __init__(self, path: str | Path, key: str, interval: float = INTERVAL_S) -> None:
         super().__init__(path, key)
         self.interval = interval
         self._next = perf_counter() + interval
 
-    def offer(self, count, state):
-        """Write ``state()`` if it is time to; ``count`` is the number of passes that it holds."""
+    def offer(self, count: int, state: Callable[[], Mapping[str, Any]]) -> None:
+        """Write ``state()``, which holds ``count`` passes, if it is due."""
         begin = perf_counter()
         if begin < self._next:
             return
@@ -46,10 +56,10 @@ class KeptPasses(Entry):
         self._next = end + max(self.interval, (end - begin) / SHARE)
 
 
-def of_scene(folder, name, case):
+def of_scene(folder: Path, name: str, case: Case) -> KeptPasses:
     """Return the :class:`KeptPasses` of a comparison whose results go to ``folder/name``.
 
-    The file lies beside that folder, which a finished result replaces as a whole.
+    The file is next to that folder, which a finished result replaces.
     """
     from comparisons import record
 
@@ -57,21 +67,23 @@ def of_scene(folder, name, case):
     return KeptPasses(folder / f".{name}.fotismos-passes.npz", key)
 
 
-def _digest(word):
+def _digest(word: str) -> str:
     from comparisons.pictures.picture_files import path_of
 
     path = path_of(word)
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
-def key_of(source, options, variant, versions):
+def key_of(source: Source, options: Options, variant: str, versions: Mapping[str, str]) -> str:
     """Return a digest of all that the passes of a comparison depend on.
 
     These are the scene with the content of every file that it reads
-    (:func:`reference.scene.identity.digest`), the code of the heuristic, the pictures in its place,
-    the options but for the ones that only say how long to go on, variant and versions.
+    (:func:`reference.scene.identity.digest`), the code of the heuristic or the pictures in its
+    place, the options except how long to continue, variant and versions.
     """
-    told = {name: str(value) for name, value in vars(options).items() if name != "noise"}
+    told: dict[str, Any] = {
+        name: str(value) for name, value in vars(options).items() if name != "noise"
+    }
     told |= {"until noise": options.noise is not None, "variant": variant, "versions": versions}
     told["heuristic code"] = named(options.heuristic).digest()
     told["pictures"] = [_digest(word) for word in options.image]

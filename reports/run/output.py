@@ -1,15 +1,18 @@
-"""Writing the results of a run atomically, and never at the cost of an earlier result."""
+"""Writing the results of a run atomically, and never replacing anything but earlier results."""
 
-from collections.abc import Callable, Iterator, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
 from comparisons import atomic
+from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import drawn
-from comparisons.record import Comparison
+from comparisons.record import Comparison, Images
 from comparisons.records import to_json
 from heuristic.errors import OutputError
 from reports.files import exr, holding, images, ownership
@@ -18,18 +21,22 @@ from reports.page.lit import lit
 from reports.page.scene_view import SceneView
 from reports.run import finished
 from reports.run.places import FIGURES, PAGE, RUN, TABLES
+from reports.run.stages import RunRecord
+
+if TYPE_CHECKING:
+    from comparisons.cost.cost import Study
 
 
 @contextmanager
 def held(folder: str | Path, command: str) -> Iterator[Path]:
     """Make the output folder, keep other commands out of it, and clear away what killed ones left.
 
-    ``command`` is what other commands are told.
+    ``command`` names this one to other commands.
 
     Raises
     ------
     OutputError
-        When it cannot be written to, or another command writes there.
+        If it cannot be written to, or another command is writing there.
     """
     folder = Path(folder)
     with atomic.explained(folder):
@@ -45,23 +52,23 @@ def held(folder: str | Path, command: str) -> Iterator[Path]:
 
 
 def below(folder: Path, command: str) -> Path:
-    """Return the folder for the results of one command in a folder that is held.
+    """Return the folder for the results of one command in a held folder.
 
     Raises
     ------
     OutputError
-        When it cannot be made.
+        If it cannot be made.
     """
     return ownership.folder(folder / command)
 
 
-def require_free(folder, places, with_figures=False):
-    """Ensure, before anything is rendered, that a run will replace nothing but earlier results.
+def require_free(folder: Path, places: Iterable[str], with_figures: bool = False) -> None:
+    """Ensure, before anything is rendered, that a run will replace only earlier results.
 
     Raises
     ------
     InputError
-        Naming what is not fotismos's.
+        Naming what fotismos did not make.
     """
     for name in (PAGE, RUN):
         ownership.require_free(folder / name)
@@ -69,19 +76,19 @@ def require_free(folder, places, with_figures=False):
 
 
 def require_free_folders(folder: Path, *names: str) -> None:
-    """Ensure that a command will replace nothing but earlier results in folders of these names.
+    """Ensure that a command will replace only earlier results in the named folders.
 
     Raises
     ------
     InputError
-        Naming what is not fotismos's.
+        Naming what fotismos did not make.
     """
     for name in names:
         ownership.require_free_folder(folder / name)
 
 
 def as_far_as_possible(*steps: Callable[[], object]) -> None:
-    """Take each step, whether or not the others can be written.
+    """Take every step, even if others cannot write.
 
     Raises
     ------
@@ -98,16 +105,22 @@ def as_far_as_possible(*steps: Callable[[], object]) -> None:
         raise errors[0]
 
 
-def write_scene(folder, name, comparison, study=None, key=None):
+def write_scene(
+    folder: Path,
+    name: str,
+    comparison: Comparison,
+    study: Study | None = None,
+    key: str | None = None,
+) -> SceneView:
     """Write the files of one comparison to ``folder/name``, in place of an earlier result.
 
-    With a study of cost its files are written as well.
-    With a key, `reports.run.finished.load` finds the result again by it.
+    The files of a study of cost are written with them. With a key,
+    :func:`reports.run.finished.load` finds the result again.
 
     Returns
     -------
     SceneView
-        What the page needs of it.
+        The scene's part of the page.
     """
     record, shown = comparison.record, comparison.images
     if study:
@@ -137,7 +150,7 @@ def write_scene(folder, name, comparison, study=None, key=None):
 
 
 def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> SceneView:
-    """Return what the page shows of a comparison without its files; ``layers`` are its images."""
+    """Return a comparison's part of the page without links; ``layers`` are its images."""
     shown = comparison.images
     return SceneView(
         record=comparison.record,
@@ -146,17 +159,17 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     )
 
 
-def write_page(folder, views, **shown):
-    """Write ``index.html`` for the scenes of a run, and what else `page.render` shows."""
+def write_page(folder: Path, views: Sequence[SceneView], **shown: Any) -> None:
+    """Write ``index.html``; ``shown`` are arguments of :func:`reports.page.page.render`."""
     ownership.write(folder / PAGE, page.render(views, **shown))
 
 
-def write_run(folder, record):
+def write_run(folder: Path, record: RunRecord) -> None:
     """Write ``run.json``: the command, where its time went, machine and versions."""
     ownership.write(folder / RUN, to_json(record))
 
 
-def _layers(shown):
+def _layers(shown: Images) -> dict[str, Any]:
     return {
         "heuristic": shown.heuristic,
         "reference": shown.reference,
@@ -168,8 +181,8 @@ def _layers(shown):
     }
 
 
-def _header(record):
-    header = {
+def _header(record: ComparisonRecord) -> dict[str, str]:
+    header: dict[str, object] = {
         "scene": record.scene,
         "variant": record.variant,
         "seed": record.seed,

@@ -1,4 +1,4 @@
-"""Which folder the results of a scene go to: the same one each time, and one scene's alone."""
+"""The folder of a scene's results: the same each time, and for one scene only."""
 
 import os
 import pkgutil
@@ -11,7 +11,7 @@ from comparisons.case import file_of, name_of
 from reports.files import listing
 
 TABLES, FIGURES = "tables", "figures"
-"""Folders of a run beside those of its scenes."""
+"""Folders of a run next to those of its scenes."""
 
 PAGE, RUN = "index.html", "run.json"
 
@@ -19,26 +19,26 @@ RESERVED = frozenset(
     {TABLES, FIGURES, PAGE, RUN, "assets", "departures"}
     | {module.name for module in pkgutil.iter_modules(reports.commands.__path__)}
 )
-"""Names that no scene's folder takes."""
+"""Names that no scene's folder may have."""
 
 LONGEST = 100
-"""Bytes of a name: what is written there has longer ones."""
+"""Bytes of a name; those of files that are written there may be longer."""
 
 Wanted = tuple[str, Path | None]
-"""A name, and the file that it is of; None for what is built in."""
+"""A name and its file, None if built in."""
 
 
 def places(folder: Path, scenes: Iterable[str]) -> dict[str, str]:
-    """Return the names of the folders for some scenes, with the words that name the scenes.
+    """Return the names of the scenes' folders, with the words that name the scenes.
 
-    A folder is of one scene, which finds it again in every later command.
+    A folder belongs to one scene, also in later commands.
 
     Raises
     ------
     InputError
-        For a scene that is not there.
+        If a scene does not exist.
     OutputError
-        When the folder's list cannot be written to.
+        If the folder's list cannot be written to.
     """
     scenes = list(scenes)
     found = assigned(folder, [(name_of(scene), file_of(scene)) for scene in scenes])
@@ -46,12 +46,12 @@ def places(folder: Path, scenes: Iterable[str]) -> dict[str, str]:
 
 
 def assigned(folder: Path, wanted: Iterable[Wanted]) -> list[str]:
-    """Return a folder's name for each of some results, and note in ``folder`` what they are of.
+    """Return a folder's name for each result, and list the subjects in ``folder``.
 
     Raises
     ------
     OutputError
-        When that cannot be noted.
+        If the list cannot be written to.
     """
     known = listing.read(folder).places
     found: dict[str, str] = {}
@@ -80,7 +80,7 @@ def _candidates(name: str) -> Iterable[str]:
 
 
 def _place(name: str, subject: str, known: dict[str, str], found: dict[str, str]) -> str:
-    """Return the folder that is the subject's already, or else a new one."""
+    """Return the subject's folder, or else a new one."""
     own = {place for place, of in known.items() if of == subject} - found.keys()
     if own:
         return min(own, key=lambda place: (len(place), place))
@@ -88,12 +88,12 @@ def _place(name: str, subject: str, known: dict[str, str], found: dict[str, str]
 
 
 def _folded(name: str) -> str:
-    """Return a name as file systems see it that do not tell case or composition apart."""
+    """Return a name as seen by file systems that ignore case and composition."""
     return unicodedata.normalize("NFC", name).casefold()
 
 
 def _subject(name: str, file: Path | None, folder: Path) -> str:
-    """Return what a result is of: its file as seen from the folder, so that both may move."""
+    """Return a result's subject: its file relative to the folder, so both may move."""
     if file is None:
         return f"built-in {name}"
     return os.path.relpath(file.resolve(), folder.resolve())

@@ -1,4 +1,4 @@
-"""One scene of a command: compared, its files written, or found finished."""
+"""One scene of a command: compared and written, or found finished."""
 
 from __future__ import annotations
 
@@ -10,21 +10,24 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 if TYPE_CHECKING:
-    from comparisons.case import Request
+    from comparisons.case import Case, Request
+    from comparisons.compare import Progress
+    from comparisons.cost.cost import Study
+    from comparisons.record import Comparison
     from reports.page.scene_view import SceneView
+    from reports.run.kept import KeptPasses
     from reports.run.stages import Stages
 
-
 SKETCH_WIDTH, SKETCH_SPP = 64, 8
-"""Pixels and samples per pixel of a scene's first, coarse pictures."""
+"""Pixels and samples per pixel of a scene's coarse first pictures."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a command wants of each of its scenes.
+    """The work that a command requests for each of its scenes.
 
     ``request`` says how; ``sketched`` begins with all scenes at a small size; ``fresh`` renders
-    what is finished, too; ``with_scripts`` runs the scripts that are found in folders.
+    finished scenes again; ``with_scripts`` runs scripts found in folders.
     """
 
     request: Request
@@ -36,20 +39,20 @@ class Wanted:
 
 
 def compare(
-    name: str, folder: Path, place: str, wanted: Wanted, progress
+    name: str, folder: Path, place: str, wanted: Wanted, progress: Progress
 ) -> tuple[SceneView, Stages]:
-    """Compare a scene and write its files to ``folder/place``, unless they are there already.
+    """Compare a scene and write its files to ``folder/place``, unless they exist already.
 
     Parameters
     ----------
     name
-        Of a built-in scene or a file.
-    progress : callable
-        ``progress(stage, done, total)``, called after each pass.
+        A built-in scene or a file.
+    progress
+        Called as ``progress(stage, done, total)`` after each pass.
 
     Returns
     -------
-        What the page needs of the scene, and where the time went.
+        The scene's part of the page, and where the time went.
     """
     from comparisons.case import open_case
     from comparisons.compare import compare
@@ -70,7 +73,7 @@ def compare(
         with spent.timing("cost"):
             result, study = _explained(case, progress, result)
     with spent.timing("files"):
-        if wanted.figures:  # first, since a scene with its folder is finished
+        if wanted.figures:  # first, since the folder marks the scene as finished
             from reports.charts import figures
 
             figures.write_scene(folder / output.FIGURES, place, result)
@@ -79,8 +82,8 @@ def compare(
     return view, spent
 
 
-def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress) -> SceneView:
-    """Return the view of a finished scene, or else a coarse one, without causes and files."""
+def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress: Progress) -> SceneView:
+    """Return the view of a finished scene, or a coarse one without causes and files."""
     from comparisons.case import open_case
     from comparisons.compare import compare
     from comparisons.cost.effort import reduced
@@ -96,8 +99,10 @@ def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress) -> Sce
     return structs.replace(output.view_of(made), is_coarse=True)
 
 
-def _finished(case, folder, place, wanted):
-    """Return the kept passes of a scene, the key of its result, and that if it is finished."""
+def _finished(
+    case: Case, folder: Path, place: str, wanted: Wanted
+) -> tuple[KeptPasses, str, SceneView | None]:
+    """Return a scene's kept passes, the key of its result, and the result if finished."""
     from reports.run import finished, kept
 
     passes = kept.of_scene(folder, place, case)
@@ -105,20 +110,22 @@ def _finished(case, folder, place, wanted):
     return passes, key, None if wanted.fresh else finished.load(folder / place, key)
 
 
-def _explained(case, progress, comparison):
-    """Return a comparison and what accuracy costs; without it where that cannot be studied."""
+def _explained(
+    case: Case, progress: Progress, comparison: Comparison
+) -> tuple[Comparison, Study | None]:
+    """Return a comparison with its study of cost, None if that fails."""
     from heuristic.errors import FotismosError
 
     try:
         return _priced(case, progress, comparison)
     except FotismosError as error:
-        warnings = (*comparison.record.warnings, f"Causes are not known: {error}")
+        warnings = (*comparison.record.warnings, f"The causes are unknown: {error}")
         record = structs.replace(comparison.record, warnings=warnings)
         return replace(comparison, record=record), None
 
 
-def _priced(case, progress, comparison):
-    """Study what accuracy costs, and name the effects that dominate; say how long it took."""
+def _priced(case: Case, progress: Progress, comparison: Comparison) -> tuple[Comparison, Study]:
+    """Study what accuracy costs, name the dominating effects, and record the time."""
     from comparisons.comparison import CAUSES
     from comparisons.cost.cost import quick
     from comparisons.effects.naming import named

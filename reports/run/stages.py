@@ -1,4 +1,4 @@
-"""Where the time of a run went, and the record of it, ``run.json``."""
+"""Where the time of a run went, and its record, ``run.json``."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ START = perf_counter()
 
 
 class Failure(Record):
-    """A scene that could not be compared; ``scene`` is the folder that its results would be in."""
+    """A scene that could not be compared; ``scene`` is the folder for its results."""
 
     scene: str
     error: str
 
 
 class RunRecord(Record, kw_only=True):
-    """What one command did, beside the records of its scenes: ``run.json``."""
+    """What one command did, besides the records of its scenes: ``run.json``."""
 
     command: str
     stages: Annotated[
         dict[str, float],
-        Meta(description="Wall time in seconds, added up over processes at the same time."),
+        Meta(description="Wall time in seconds, summed over simultaneous processes."),
     ]
     failures: tuple[Failure, ...]
     machine: Machine
@@ -39,7 +39,7 @@ class RunRecord(Record, kw_only=True):
 
 
 class Stages:
-    """Wall time by stage, in seconds, added up over processes at the same time."""
+    """Wall time by stage, in seconds, summed over simultaneous processes."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -56,10 +56,9 @@ class Stages:
         self.add(stage, perf_counter() - begin)
 
     def compared(self, time: TimeSpent, seconds: float) -> None:
-        """Count a comparison that took so long, by what its record says of its time.
+        """Count the seconds of a comparison, split by its record of time.
 
-        Passes that an interrupted run had rendered took their time then: rendering is at most what
-        passed now.
+        Passes of an interrupted run took their time then, so rendering is limited to the time now.
         """
         preparing = sum(
             time.stages.get(name, 0.0) for name in ("scene and pairing", "planning", "geometry")
@@ -74,7 +73,7 @@ class Stages:
 class Run(Stages):
     """The stages of one run, from the start of the program.
 
-    To be made when start-up is over. `failures` are the scenes that could not be compared.
+    Made when start-up is over. `failures` are the scenes that could not be compared.
     """
 
     def __init__(self, command: str) -> None:
@@ -88,11 +87,11 @@ class Run(Stages):
         self._page: float | None = None
 
     def begin_page(self) -> None:
-        """Say that from now on the page is written, which ends the run."""
+        """Begin the last stage, writing the page."""
         self._page = perf_counter()
 
     def stages(self) -> dict[str, float]:
-        """The seconds of each stage; the page's, from its beginning to the first call of this."""
+        """The seconds of each stage; the page's stage ends with the first call of this."""
         if self._page is not None:
             now = perf_counter()
             self.add("page", now - self._page)

@@ -1,36 +1,44 @@
-"""What a study leaves behind: the dataset, its figures, lines for the terminal, and findings."""
+"""The output of a study: dataset, figures, lines for the terminal, and findings."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jinja2
 
 from comparisons import atomic
 from comparisons.study import dataset, query
-from comparisons.study.running import POINTS
+from comparisons.study.design import Study
+from comparisons.study.running import POINTS, Outcome
 from heuristic.errors import InputError
 from reports.charts import study_charts, vega
 from reports.files import ownership
 
 FIGURES = "figures"
 
+Table = Any
+"""A ``pyarrow.Table``: a dataset of points."""
+
 
 @dataclass(frozen=True)
 class Page:
-    """A page of findings that is asked for: its template, its file, and the dataset's file."""
+    """A requested page of findings: its template, its file, and the dataset's file."""
 
     template: Path
     file: Path
     dataset: Path
 
 
-def page(study, file, findings):
-    """Check a study's figures, and find the template of its findings if it is asked for.
+def page(study: Study, file: Path, findings: Path | None) -> Page | None:
+    """Check a study's figures, and find the template of its findings if requested.
 
     Raises
     ------
     InputError
-        Before anything is rendered: for a figure that cannot be drawn, or no template.
+        Before anything is rendered, if a figure cannot be drawn or the template is missing.
     """
     for figure in study.figures:
         try:
@@ -42,14 +50,14 @@ def page(study, file, findings):
     template = file.with_suffix(".md.j2")
     if not template.is_file():
         raise InputError(
-            f"{template}: there is no such file. A page of findings needs a template there; leave"
-            " --findings out to have dataset and figures alone."
+            f"{template}: there is no such file. Write this template of the findings, or"
+            " omit --findings."
         )
     return Page(template, findings, file.with_suffix(".parquet"))
 
 
-def write(study, outcome, folder, page=None):
-    """Write dataset, figures, and the page of findings if there is one; yields where they are."""
+def write(study: Study, outcome: Outcome, folder: Path, page: Page | None = None) -> Iterator[str]:
+    """Write dataset, figures, and any page of findings; yields their paths."""
     place, figures = folder / f"{study.name}.parquet", folder / FIGURES
     ownership.write(place, dataset.file_of(outcome.table))
     for name, svg in drawn(study, outcome.table):
@@ -66,15 +74,15 @@ def write(study, outcome, folder, page=None):
         yield str(page.file)
 
 
-def prepare(study, folder):
-    """Make a study's folder, and ensure that it will replace nothing but its own results.
+def prepare(study: Study, folder: Path) -> Path:
+    """Make a study's folder, and ensure that the study will replace only its own results.
 
     Raises
     ------
     InputError
-        Before anything is rendered, naming what is not fotismos's.
+        Before anything is rendered, naming what fotismos did not make.
     OutputError
-        When the folder cannot be made.
+        If the folder cannot be made.
     """
     ownership.require_free_folder(folder)
     ownership.folder(folder)
@@ -85,8 +93,8 @@ def prepare(study, folder):
     return folder
 
 
-def drawn(study, table):
-    """Yield the names and contents of a study's figures; parts without a result are left out."""
+def drawn(study: Study, table: Table) -> Iterator[tuple[str, bytes]]:
+    """Yield the names and contents of a study's figures, except of parts without a result."""
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in (*study.figures, *study_charts.default_figures(study)):
         if figure["part"] in with_result:
@@ -94,22 +102,24 @@ def drawn(study, table):
             yield f"{figure['name']}.svg", vega.paper(spec)
 
 
-def findings(study, table, page):
+def findings(study: Study, table: Table, page: Page) -> str:
     """Return the page of findings.
 
-    The template asks the dataset through the functions of :class:`comparisons.study.query.Facts`,
-    so that no number is written by hand. ``figure(name)`` is the number of a figure, and
+    The template takes all numbers from the dataset, by the functions of
+    :class:`comparisons.study.query.Facts`. ``figure(name)`` is the number of a figure, and
     ``picture(name, text)`` the picture itself.
     """
     names = [figure["name"] for figure in study.figures]
     folder = page.file.stem
 
-    def number(name):
+    def number(name: str) -> str:
         if name not in names:
-            raise InputError(f"{page.template}: there is no figure {name!r}.")
+            raise InputError(
+                f"{page.template}: figure {name!r} is unknown; choose of {', '.join(names)}."
+            )
         return f"figure {names.index(name) + 1}"
 
-    def picture(name, text):
+    def picture(name: str, text: str) -> str:
         return f"![{number(name).capitalize()}: {text}]({folder}/{name}.svg)"
 
     environment = jinja2.Environment(
@@ -122,11 +132,12 @@ def findings(study, table, page):
     return template.render(**functions, figure=number, picture=picture, study=study)
 
 
-def summary(study, outcome):
+def summary(study: Study, outcome: Outcome) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the departure."""
     width = max(4, *(len(part.name) for part in study.parts))
     yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
-    rows = outcome.table.to_pylist()
+    table: Table = outcome.table
+    rows = table.to_pylist()
     for part in study.parts:
         own = [row for row in rows if row["part"] == part.name]
         good = sorted(row["dE2000"] for row in own if row["error"] is None)

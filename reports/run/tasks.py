@@ -1,4 +1,4 @@
-"""What commands ask of the process that reads and renders scenes, one function per task."""
+"""Tasks for the process that reads and renders scenes, one function each."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def verified(
 ) -> Verification:
     """Compare the plan of a scene with everything simulated.
 
-    ``level`` is the chance that a right plan is marked; None takes the usual one. ``steps`` also
-    measures what each step of planning gives.
+    ``level`` is the chance that a right plan is marked; None takes the default. ``steps`` also
+    measures the gain of each step of planning.
     """
     from comparisons.case import open_case
     from comparisons.verification import LEVEL, verify
@@ -75,7 +75,7 @@ def priced(
 ) -> Cost:
     """Study what each step of accuracy costs, and write the study's files.
 
-    ``at`` is a size to predict for, and ``figures`` the folder for those for print; None for none.
+    ``at`` is a size to predict for, ``figures`` the folder for figures for print; None for none.
     """
     from comparisons.case import open_case
     from comparisons.cost.cost import Effort, cost
@@ -94,7 +94,7 @@ def priced(
 
 
 def exported(name: str, request: Request, place: Path) -> None:
-    """Write what another program needs to render a scene."""
+    """Write the files that another program needs to render a scene."""
     from comparisons.case import open_case
     from comparisons.exports.exported import exported
     from reports.exports import export_files
@@ -114,7 +114,7 @@ def fitted(
 ) -> FitRecord:
     """Fit the heuristic to a scene, and write the fit's files.
 
-    ``words`` are the options of the command by name, for the record.
+    ``words`` are the named options of the command, for the record.
     """
     from comparisons.case import open_case
     from comparisons.fit.fit import fit

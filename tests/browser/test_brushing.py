@@ -119,7 +119,7 @@ def test_the_cause_is_that_of_the_priced_effects_or_of_the_regions(visitor, repo
     assert numbers(page)["Cause"] == "extended lights"
     visitor.open(f"#scene={EXACT}&box=40,20,4,4")
     visitor.settle()
-    assert numbers(page)["Cause"] == "not known"
+    assert numbers(page)["Cause"] == "unknown"
 
 
 def test_the_address_brings_a_selection_to_somebody_else(visitor):

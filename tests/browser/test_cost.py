@@ -11,16 +11,18 @@ from tests.cost_records import HEIGHT as ROWS
 from tests.cost_records import WIDTH as COLUMNS
 
 SCENE = f"#scene={NOISY_ID}"
-CHARTS = 2 + len(drawn())
-"""Error against time, prices, and a histogram per metric."""
+CHARTS = len(drawn()) + 2
+"""A histogram per metric, error against time, and prices."""
 
 
 def enlivened(visitor):
     page = visitor.open(SCENE)
     for charts in page.locator(".scene.open .charts").all():
         charts.scroll_into_view_if_needed()
-    live = "() => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === CHARTS"
-    page.wait_for_function(live.replace("CHARTS", str(CHARTS)))
+    page.wait_for_function(
+        "count => document.querySelectorAll('.scene.open .chart.vega-embed svg').length === count",
+        arg=CHARTS,
+    )
     return page
 
 
@@ -68,7 +70,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
     page = visitor.open(f"{SCENE}&mode=error&map=effects&boxes=0&pixel={pixel[0]},{pixel[1]}")
     study = report.study
     known = dominating(study.effects, study.counted)[place(*pixel)]
-    names = [*study.effects, "", "none to be seen"]
+    names = [*study.effects, "", "none visible"]
     colours = [*map(theme.EFFECT_COLOURS.get, study.effects), "#82888f", theme.NO_EFFECT]
     shown = visitor.inspected()["effect"]
     assert shown == (names[known] or "–") or (shown == "" and not names[known])
@@ -80,7 +82,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel
 def test_the_legend_names_every_effect_of_the_scene(visitor, report):
     page = visitor.open(f"{SCENE}&mode=side&map=effects")
     keys = page.locator("[data-legend=effects] .key").all_text_contents()
-    assert keys == [*report.study.effects, "none to be seen"]
+    assert keys == [*report.study.effects, "none visible"]
 
 
 def test_a_scene_without_prices_has_no_map_of_effects(visitor):

@@ -1,10 +1,10 @@
-// Where the view is kept: in the address, so that it can be sent and the browser's arrows work.
+// The view is kept in the address: it can be sent, and the browser's arrows work.
 
 /**
  * @typedef {object} Address
  * @property {() => string} read                    the fragment
- * @property {(fragment: string) => void} go        see another view; the way back leads here
- * @property {(fragment: string) => void} replace   keep another view, without a step back
+ * @property {(fragment: string) => void} go        show another view; the browser's back button returns here
+ * @property {(fragment: string) => void} replace   keep another view, without an entry in the history
  * @property {(seen: () => void) => void} listen    call after each step
  */
 
@@ -23,7 +23,7 @@ function ofPage() {
   };
 }
 
-/** A frame in a notebook has no address of its own: the notebook's must not change. @returns {Address} */
+/** In a notebook's frame, which must not change the notebook's address. @returns {Address} */
 function insideFrame() {
   let fragment = "";
   /** @type {() => void} */

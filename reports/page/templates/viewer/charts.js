@@ -1,6 +1,6 @@
-// Charts: the pictures in the page made live by Vega, once they are seen.
+// Charts: Vega makes the page's pictures live once they are seen.
 
-/** Vega is text until the first chart needs it. @type {Promise<any> | undefined} */
+/** Vega, which is text until a chart needs it. @type {Promise<any> | undefined} */
 let vega;
 
 /** @returns {Promise<any>} */
@@ -31,7 +31,7 @@ async function enliven(chart) {
   const embed = await loadVega();
   chart.classList.add("live");
   const spec = JSON.parse(chart.closest("figure")?.querySelector("script")?.textContent ?? "{}");
-  // Expressions are interpreted: the page's policy forbids code made of text.
+  // Expressions are interpreted, since the page's policy forbids code made from text.
   await embed(chart, spec, { ast: true, renderer: "svg", actions: false, mode: "vega-lite" });
-  chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart's label says it
+  chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart has a label
 }

@@ -1,4 +1,4 @@
-// The viewer's controls: they say what is to be seen, and show what is. Those that would do nothing are disabled.
+// The viewer's controls set the view and show it. Those without an effect are disabled.
 
 class Controls {
   /** @param {Viewer} viewer */
@@ -25,7 +25,7 @@ class Controls {
     return /** @type {HTMLButtonElement} */ (this.element.querySelector(`[data-action=${name}]`));
   }
 
-  /** Whether a control does something now: keys do what buttons do, and no more. @param {string} name */
+  /** Whether a control has an effect now; keys do no more than buttons. @param {string} name */
   enabled(name) {
     const control = /** @type {HTMLButtonElement | null} */ (this.element.querySelector(`[data-control=${name}], [data-action=${name}]`));
     return Boolean(control && !control.disabled && !control.closest("[hidden]"));
@@ -48,7 +48,7 @@ class Controls {
     this.disable();
   }
 
-  /** What the best exposure does to the mean. */
+  /** The means before and after the best exposure. */
   showGain() {
     const { view, scene } = this.viewer;
     const { factor, mean, after } = bestOf(scene, view.map);
@@ -56,7 +56,7 @@ class Controls {
     /** @type {HTMLElement} */ (this.element.querySelector(".gain")).textContent = view.best && view.mode !== "error" ? text : "";
   }
 
-  /** What does nothing in this mode, for this scene, or at this zoom. */
+  /** Disable controls without an effect in this mode, for this scene, or at this zoom. */
   disable() {
     const { view, scene, viewport } = this.viewer;
     const [rendered, zoom, fit] = [view.mode !== "error", viewport.zoom(view), viewport.fit];
@@ -68,12 +68,12 @@ class Controls {
     for (const [name, enabled] of Object.entries(useful)) {
       const control = /** @type {HTMLButtonElement} */ (this.element.querySelector(`[data-control=${name}], [data-action=${name}]`));
       control.disabled = !enabled;
-      // A control that disables itself must not take the keyboard's place with it.
+      // A control that disables itself must not lose the keyboard's focus.
       if (!enabled && control === focused) /** @type {HTMLElement} */ (this.element.querySelector("button[data-mode][aria-pressed=true]")).focus();
     }
   }
 
-  /** The colour bars of what is seen, with the values at their ends. */
+  /** The colour bars of the maps shown, with the values at their ends. */
   showLegend() {
     const { view } = this.viewer;
     const seen = view.mode === "error" || view.mode === "side" ? [view.map] : [];
@@ -87,7 +87,7 @@ class Controls {
     range.hidden = !seen.includes(view.map) || !hasRange(mapOf(page, view.map));
   }
 
-  /** The ranges that the map can have: the automatic one, its own, and that of the address. */
+  /** The ranges of the map: the automatic one, its own, and the address's. */
   showRanges() {
     const { view } = this.viewer;
     const map = this.viewer.measure();
@@ -98,7 +98,7 @@ class Controls {
   }
 }
 
-/** What a control that was set changes; another map has other units. @param {HTMLInputElement} control @returns {Partial<View>} */
+/** The changes that a control makes; another map has other units. @param {HTMLInputElement} control @returns {Partial<View>} */
 function changeOf({ value, dataset }) {
   if (dataset.control === "map") return { map: value, top: null, band: null };
   if (dataset.control === "top") return { top: value ? Number(value) : null, band: null };

@@ -1,4 +1,4 @@
-// Embedded images back to numbers; reports/page/embedding.py says what was done to them.
+// Embedded images back to numbers; reports/page/embedding.py encodes them.
 
 /**
  * @typedef {{name: string, digits: number, base: string | null}} Plane
@@ -6,11 +6,11 @@
  * @typedef {Manifest & {codes: Record<string, Uint16Array>}} Images
  */
 
-/** Images that were decoded, by the id of their scene. @type {Map<string, Promise<Images>>} */
+/** Decoded images by the ids of their scenes. @type {Map<string, Promise<Images>>} */
 const decoded = new Map();
 
 /**
- * The images of a scene, decoded when they are first asked for.
+ * The images of a scene, decoded when first requested.
  * @param {string} id
  * @param {Manifest} manifest
  */

@@ -1,6 +1,6 @@
-// The panel of brushing: how a metric is spread over the selection, and which of its values are lit up.
+// The panel of brushing: a metric's distribution over the selection, and the values lit up.
 
-/** Draws numbers of the shown map, and asks the viewer to light up what is dragged over. */
+/** Shows numbers of the map, and has the viewer light up the values dragged over. */
 class Distribution {
   /** @param {HTMLElement} panel @param {Viewer} viewer */
   constructor(panel, viewer) {
@@ -45,7 +45,7 @@ class Distribution {
     this.part("actions").hidden = !box && !view.band;
   }
 
-  /** The whole image's numbers, kept until another map is shown. @param {any} map @param {number} top @returns {Summary} */
+  /** The whole image's numbers, kept until the map changes. @param {any} map @param {number} top @returns {Summary} */
   whole(map, top) {
     const { painter } = this.viewer;
     if (this.kept?.painter !== painter || this.kept?.name !== map.name || this.kept?.top !== top) {
@@ -80,7 +80,7 @@ class Distribution {
     this.part("lit").textContent = `Lit up: ${count.toLocaleString("en")} pixels with ${percentText(whole ? size / whole : 0)} of the departure.`;
   }
 
-  /** Whole bars are lit up; the outer ones hold all that is beyond. */
+  /** Whole bars are lit up; the outer ones include all values beyond. */
   listenToDrags() {
     /** @type {number | null} */
     let start = null;
@@ -138,7 +138,7 @@ function linesOf(map, found) {
 
 /** @param {{name: string, part: number | null}[]} causes */
 function causeText(causes) {
-  if (!causes.length) return "not known";
+  if (!causes.length) return "unknown";
   return causes.slice(0, 3).map(({ name, part }) => (part === null ? name : `${name} ${percentText(part)}`)).join(", ");
 }
 

@@ -1,20 +1,20 @@
-// The viewer's canvas: pictures through the viewport, and what lies over them.
+// The viewer's canvas: pictures through the viewport, and their overlays.
 
-/** Words over a pane. @type {Record<string, string>} */
+/** Titles of panes. @type {Record<string, string>} */
 const PANE_TITLES = { heuristic: "textbook", reference: "physical" };
 
-/** Colours of what lies over a picture, legible on any of them. */
+/** Colours of overlays, legible on any picture. */
 const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", selection: "#ffd84a", label: "#000b" };
 
-/** From so many screen pixels on, a pixel of the image has its values printed in it. */
+/** Pixels of the image at least this large on the screen have their values printed. */
 const PRINTED_FROM = 40;
 
 /**
- * Besides the view: `map` with its `end` and the `measure` that bands are of, `gain` on the textbook's image.
+ * Besides the view: `map` with its `end` and the `measure` of bands, `gain` on the textbook's image.
  * @typedef {{swapped: boolean, regions: any[], box: number[] | null, map: any, gain: number}} Extra
  */
 
-/** Draws a view of a scene; knows nothing of events. */
+/** Draws a view of a scene, without handling events. */
 class Drawing {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
@@ -43,7 +43,7 @@ class Drawing {
     panes.forEach((content, place) => this.titles(viewport.panes[place], content));
   }
 
-  /** What each pane shows: one picture, or two divided. @param {Extra} extra */
+  /** The pictures of each pane: one, or two divided. @param {Extra} extra */
   contents({ swapped, map, gain }) {
     const error = { picture: "map", title: gain === 1 ? map.title : `${map.title}, without that exposure` };
     const halves = ["heuristic", "reference"].map((half) => ({ picture: half, title: PANE_TITLES[half] }));
@@ -106,7 +106,7 @@ class Drawing {
     this.context.drawImage(source, left, top, right - left, bottom - top);
   }
 
-  /** The values of each pixel in it: three of a rendering, one of a map. @param {Box} pane @param {string} name */
+  /** Print each pixel's values: three of a rendering, one of a map. @param {Box} pane @param {string} name */
   print(pane, name) {
     const { view, viewport, painter, context } = this;
     const { block, width } = painter.images;
@@ -134,7 +134,7 @@ class Drawing {
     return hasRange(extra.map) ? [differenceText(extra.map, painter.values(extra.map.name)[place], 2).replace(" stops", "")] : [];
   }
 
-  /** Text that is legible on any colour, squeezed into a width. @param {string} text @param {number} left @param {number} top @param {number} width */
+  /** Text legible on any colour, squeezed into a width. @param {string} text @param {number} left @param {number} top @param {number} width */
   outlined(text, left, top, width) {
     this.context.strokeStyle = OVERLAY.label;
     this.context.strokeText(text, left, top, width);

@@ -1,8 +1,8 @@
-// Which effect dominates where: a letter a pixel, at the size that effects were priced in.
+// The dominating effect of each pixel: one letter per pixel, at the size of the study.
 
 /** @typedef {{width: number, height: number, names: string[], colours: string[], map: string}} Effects */
 
-/** Letters of pixels that have no number: none dominates, and not counted. */
+/** Letters of pixels without an effect: none dominates, and not counted. */
 const NO_EFFECT = ".", NOT_COUNTED = "-";
 
 /** The letter at a place of the image, from 0 to 1. @param {Effects | null} effects @param {number} x @param {number} y */
@@ -13,9 +13,9 @@ function letterAt(effects, x, y) {
   return effects.map[row * effects.width + column];
 }
 
-/** What a letter says in words; empty where nothing is known. @param {Effects | null} effects @param {string} letter */
+/** The name of a letter's effect; empty if unknown. @param {Effects | null} effects @param {string} letter */
 function effectName(effects, letter) {
-  if (letter === NO_EFFECT) return "none to be seen";
+  if (letter === NO_EFFECT) return "none visible";
   return effects?.names[Number(letter)] ?? "";
 }
 
@@ -32,7 +32,7 @@ function listEffects(legend, effects, page) {
   const keys = effects.names.map((name, place) => [name, effects.colours[place]]);
   const line = /** @type {HTMLElement} */ (legend.querySelector(".keys"));
   line.replaceChildren(
-    ...[...keys, ["none to be seen", page.noEffect]].map(([name, colour]) => {
+    ...[...keys, ["none visible", page.noEffect]].map(([name, colour]) => {
       const key = Object.assign(document.createElement("span"), { className: "key" });
       const swatch = document.createElement("i");
       swatch.style.background = colour;

@@ -1,4 +1,4 @@
-// What is seen, as the fragment of the address: it can be sent to somebody else.
+// The view as the fragment of the address, which can be sent to somebody else.
 
 /**
  * @typedef {object} View
@@ -6,15 +6,15 @@
  * @property {string} mode        split, flicker, side or error
  * @property {string} map         a map's name
  * @property {string} tone        a tone map's name
- * @property {number} ev          exposure in stops, beyond that of the comparison
- * @property {number | null} zoom screen pixels for each of the image; null to fit
- * @property {number | null} x    the view's centre in pixels of the image, where it is zoomed
+ * @property {number} ev          exposure in stops, relative to the comparison's
+ * @property {number | null} zoom screen pixels per image pixel; null to fit
+ * @property {number | null} x    the centre of a zoomed view, in pixels of the image
  * @property {number | null} y
  * @property {number} split       place of the divide, 0 to 1
  * @property {number[] | null} pixel the marked pixel
  * @property {boolean} boxes      whether regions are boxed
- * @property {number | null} top  where the map's colours end; null for the automatic range
- * @property {boolean} best       whether the textbook is seen at its best exposure
+ * @property {number | null} top  end of the map's colours; null for the automatic range
+ * @property {boolean} best       whether the textbook has its best exposure
  * @property {number[] | null} box  the selected rectangle: left, top, width and height in pixels of the image
  * @property {number[] | null} band the values that are lit up: from, and up to
  * @property {string} sort        the overview's order
@@ -29,7 +29,7 @@ const DEFAULT_VIEW = Object.freeze({
   pixel: null, boxes: true, top: null, best: false, box: null, band: null, sort: "run", only: "", q: "", list: "cards",
 });
 
-/** The values that a property with few of them may have. @type {Record<string, string[]>} */
+/** The allowed values of properties that have few. @type {Record<string, string[]>} */
 const ALLOWED = {
   mode: ["split", "flicker", "side", "error"],
   tone: ["clip", "reinhard", "filmic", "false"],
@@ -37,7 +37,7 @@ const ALLOWED = {
   list: ["cards", "table"],
 };
 
-/** How each property is read; null where the text makes no sense. @type {Record<string, (text: string) => any>} */
+/** Functions that read properties; null if the text makes no sense. @type {Record<string, (text: string) => any>} */
 const READERS = {
   ev: numberIn(-16, 16), zoom: numberIn(1e-3, 1e3), x: numberIn(0, 1e6), y: numberIn(0, 1e6), split: numberIn(0, 1),
   boxes: (text) => text !== "0", best: (text) => text === "1", top: numberIn(1e-6, 1e6),
@@ -54,13 +54,13 @@ function numberIn(low, high) {
   };
 }
 
-/** Two values in order, of which either may be infinite. @param {string} text */
+/** Two values in order; either may be infinite. @param {string} text */
 function bandIn(text) {
   const ends = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
   return ends.length === 2 && ends[0] < ends[1] ? ends : null;
 }
 
-/** The view that a fragment stands for; what it does not say, or says wrongly, is as usual. @param {string} text @returns {View} */
+/** The view of a fragment; missing or wrong properties have their defaults. @param {string} text @returns {View} */
 function parseFragment(text) {
   /** @type {any} */
   const view = { ...DEFAULT_VIEW };
@@ -72,7 +72,7 @@ function parseFragment(text) {
   return view;
 }
 
-/** The fragment of a view, with what is not as usual. @param {View} view */
+/** The fragment of a view, without defaults. @param {View} view */
 function fragmentOf(view) {
   const parts = new URLSearchParams();
   for (const [key, value] of Object.entries(view)) {

@@ -1,11 +1,11 @@
-// The pixel inspector: what the images hold at one pixel, with as many digits as they are kept to.
+// The pixel inspector: the images' values at one pixel, with all digits stored.
 
 /**
- * Lines of text for a pixel, by the name of their place in the page.
+ * Texts for a pixel, by the names of their places in the page.
  * @param {Painter} painter
  * @param {any} scene
  * @param {number[]} pixel in pixels of the image
- * @param {View} view through whose exposure and tone map the pixel is seen
+ * @param {View} view gives the exposure and the tone map
  */
 function inspect(painter, scene, [x, y], view) {
   const { images } = painter;
@@ -24,7 +24,7 @@ function inspect(painter, scene, [x, y], view) {
   };
 }
 
-/** A half's colour in each space, by the half's name and the space's. @param {Painter} painter @param {any} scene @param {number} place @param {View} view @param {string} half */
+/** A half's colour in each space, by the names of the half and the space. @param {Painter} painter @param {any} scene @param {number} place @param {View} view @param {string} half */
 function coloursOf(painter, scene, place, view, half) {
   const rgb = painter.channels(half).map((codes) => VALUES[codes[place]]);
   const gain = half === "heuristic" ? gainOf(scene, view) : 1;
@@ -36,7 +36,7 @@ function coloursOf(painter, scene, place, view, half) {
   };
 }
 
-/** Whether a pixel is shown to differ. @param {number} flags */
+/** Whether a pixel is shown to differ, in words. @param {number} flags */
 function markText(flags) {
   if (!(flags & COUNTED)) return "not counted";
   if (flags & SIGNIFICANT) return "yes";
@@ -49,7 +49,7 @@ function valueText(images, name, place) {
   return significant(decimal(images.codes[name][place], plane.digits), plane.digits);
 }
 
-/** The effect that dominates at a pixel, or else in its region, where that is known. @param {any} scene @param {number} x @param {number} y */
+/** The effect that dominates at a pixel, or else in its region; empty if unknown. @param {any} scene @param {number} x @param {number} y */
 function effectAt(scene, x, y) {
   if (scene.effects) {
     return effectName(scene.effects, letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height));
@@ -61,7 +61,7 @@ function effectAt(scene, x, y) {
   return inside?.effect ?? "";
 }
 
-/** Writes a pixel's lines into the page. @param {HTMLElement} panel @param {ReturnType<typeof inspect> | null} lines */
+/** Write a pixel's texts into the page. @param {HTMLElement} panel @param {ReturnType<typeof inspect> | null} lines */
 function showInspection(panel, lines) {
   for (const cell of panel.querySelectorAll("[data-value]")) {
     const [name, index] = /** @type {HTMLElement} */ (cell).dataset.value?.split(".") ?? [];

@@ -1,4 +1,4 @@
-// Keys; the table in help.html.j2 says the same to people.
+// Keys; help.html.j2 explains them to people.
 
 /** @param {Viewer} viewer @param {(step: number) => void} turn to another scene @param {() => void} leave to the overview */
 function listenToKeys(viewer, turn, leave) {
@@ -48,7 +48,7 @@ function listenToKeys(viewer, turn, leave) {
     o: leave,
     Escape: back,
   };
-  /** On the canvas alone: elsewhere these scroll the page. @type {Record<string, number[]>} */
+  /** Only on the canvas: elsewhere these scroll the page. @type {Record<string, number[]>} */
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
   document.addEventListener("keydown", (event) => {

@@ -1,14 +1,14 @@
-// Scenes wait as text, in <noscript>, until they are opened: a page of many scenes is soon there, and
+// Scenes wait as text, in <noscript>, until they are opened: a page of many scenes loads fast, and
 // a browser without scripts shows them all.
 
-/** The section of a scene, made when it is first asked for; null if there is none. @param {string} id */
+/** The section of a scene, made when first requested; null if there is none. @param {string} id */
 function sectionOf(id) {
   const waiting = document.querySelector(`noscript[data-scene="${CSS.escape(id)}"]`);
   if (waiting) waiting.outerHTML = waiting.textContent ?? "";
   return document.getElementById(`scene=${id}`);
 }
 
-/** On paper a scene has its pictures, each drawn from the numbers in the page. @param {Viewer} viewer */
+/** Draw a scene's pictures for printing, from the numbers in the page. @param {Viewer} viewer */
 function listenToPrinting(viewer) {
   const draw = () => drawPictures(viewer);
   window.addEventListener("beforeprint", draw);

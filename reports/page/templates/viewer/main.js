@@ -1,4 +1,4 @@
-// The page: which scene is seen, and how, is what the address's fragment says.
+// The page: the address's fragment says which scene is seen, and how.
 
 const address = makeAddress();
 const overview = makeOverview(byId("overview-section"), page.scenes, change);
@@ -9,14 +9,14 @@ const terms = new TermsPanel(byId("terms"), page);
 /** @type {View} */
 let view = DEFAULT_VIEW;
 
-/** See something else, and say so in the address unless it is passing: browsers bear few changes a second. @param {Partial<View>} changes */
+/** Change the view, and the address unless the change is passing: browsers allow few changes per second. @param {Partial<View>} changes */
 function change(changes, passing = false) {
   view = { ...view, ...changes };
   if (!passing) address.replace(fragmentOf(view));
   show();
 }
 
-/** See what the address says. */
+/** Show the address's view. */
 function follow() {
   const before = view.scene;
   view = parseFragment(address.read());
@@ -25,7 +25,7 @@ function follow() {
   if (view.scene !== before) arrive(view.scene || before);
 }
 
-/** A page of one scene begins with it. */
+/** Show the address's view, or the only scene. */
 function begin() {
   const [only, ...others] = page.scenes;
   if (!address.read() && only?.images && !others.length) address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
@@ -58,7 +58,7 @@ function byId(id) {
   return /** @type {HTMLElement} */ (document.getElementById(id));
 }
 
-/** A scene begins at its heading, the overview where one left it. @param {string} id */
+/** Scroll to a scene's heading, or to where the overview was left. @param {string} id */
 function arrive(id) {
   if (view.scene) {
     window.scrollTo(0, 0);

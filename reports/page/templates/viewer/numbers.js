@@ -4,7 +4,7 @@ const LOWEST_EXPONENT = -18;
 const NEGATIVE = 0x8000;
 
 /**
- * The value of a decimal code: 0 for 0, else ± m · 10^(e − digits + 1) with m of so many digits.
+ * The value of a decimal code: 0 for 0, else ± m · 10^(e − digits + 1) with m of `digits` digits.
  * @param {number} code
  * @param {number} digits
  */
@@ -18,11 +18,11 @@ function decimal(code, digits) {
   return Number(`${code & NEGATIVE ? "-" : ""}${mantissa}e${exponent}`);
 }
 
-/** The values of all codes of three digits: images are painted by looking codes up. */
+/** The values of all codes of three digits, looked up in painting images. */
 const VALUES = Float64Array.from({ length: 65536 }, (_, code) => decimal(code, 3));
 
 /**
- * A value with so many significant digits, as a person writes it.
+ * A value with `digits` significant digits, in human form.
  * @param {number} value
  * @param {number} digits
  */
@@ -48,7 +48,7 @@ function percentText(part) {
   return value > 0 && value < 0.1 ? "< 0.1 %" : `${value >= 99.95 ? "100" : value.toPrecision(value < 1 ? 1 : value < 10 ? 2 : 3)} %`;
 }
 
-/** A value of a map: nobody sees a hundredth of a colour difference. @param {{kind: string, top: number}} map @param {number} value */
+/** A value of a map; a hundredth of a colour difference is invisible. @param {{kind: string, top: number}} map @param {number} value */
 function differenceText(map, value, digits = 3) {
   if (map.kind === "ratio") return `${significant(value, 2)} stops`;
   return value > 0 && value < 0.01 && map.top >= 1 ? "< 0.01" : significant(value, digits);

@@ -1,11 +1,11 @@
-// Shapes and materials: the pixels of one light up where its name is pointed at.
+// Shapes and materials: pointing at a name lights up its pixels.
 
 /** @typedef {{width: number, height: number, picture: string, maps: string}} Lit */
 
-/** How dark the others are. */
+/** Brightness of the other pixels. */
 const SHADE = 0.25;
 
-/** Make the table of a scene's shapes live, when the scene is first opened. @param {HTMLElement} section */
+/** Make the table of a scene's shapes live when the scene is first opened. @param {HTMLElement} section */
 async function makeObjects(section) {
   const element = /** @type {HTMLElement | null} */ (section.querySelector(".objects"));
   const canvas = element?.querySelector("canvas");
@@ -18,7 +18,7 @@ async function makeObjects(section) {
   const size = lit.width * lit.height;
   const planes = { objects: maps.subarray(0, size), materials: maps.subarray(size) };
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
-  /** The name that was clicked, whose pixels stay lit. @type {HTMLElement | null} */
+  /** The clicked name, whose pixels stay lit. @type {HTMLElement | null} */
   let kept = null;
 
   /** @param {HTMLElement | null} link */

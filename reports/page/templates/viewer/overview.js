@@ -1,4 +1,4 @@
-// The overview: one order and one filter for its cards and its table.
+// The overview: one order and one filter for cards and table.
 
 /** @param {HTMLElement} element @param {any[]} scenes @param {(changes: Partial<View>) => void} change */
 function makeOverview(element, scenes, change) {
@@ -46,7 +46,7 @@ function counted(scenes) {
 
 /**
  * Order by a key: names and the run's order from first to last, numbers from large to small; a minus
- * turns it round. What has no such number comes last.
+ * reverses it. Scenes without the number come last.
  * @param {string} sort
  */
 function byKey(sort) {

@@ -1,8 +1,8 @@
-// What the page says of itself: its scenes, and its maps in their order.
+// The page's data: its scenes, and its maps in order.
 
 const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
 
-/** The exposure of the textbook that lowers a map's mean most: its factor (1: as it is), and both means. @param {any} scene @param {string} map */
+/** The exposure of the textbook that lowers a map's mean most: its factor (1: unchanged), and both means. @param {any} scene @param {string} map */
 function bestOf(scene, map) {
   return scene.best[map] ?? scene.best[page.maps[0].name];
 }
@@ -12,7 +12,7 @@ function gainOf(scene, view) {
   return view.best ? bestOf(scene, view.map).factor : 1;
 }
 
-/** A map by its name; undefined where there is none. @param {any} page @param {string} name */
+/** The map with a name, or undefined. @param {any} page @param {string} name */
 function mapOf(page, name) {
   return page.maps.find((/** @type {any} */ map) => map.name === name);
 }

@@ -1,16 +1,16 @@
-// Pictures out of numbers: the two renderings and the maps, one canvas each, kept until they change.
+// Pictures from numbers: the two renderings and the maps, one canvas each, kept until they change.
 
 /** Significant, counted and undetermined, as in the plane "flags". */
 const SIGNIFICANT = 1, COUNTED = 2, UNDETERMINED = 4;
 
-/** An opaque pixel as the canvas keeps it, on machines of little-endian order (all that browsers run on). */
+/** An opaque pixel as stored in the canvas, on little-endian machines (all that browsers run on). */
 const rgba = (/** @type {number} */ r, /** @type {number} */ g, /** @type {number} */ b) =>
   (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
 
-/** What lies over pixels that are lit up, and over the others: colours with an opacity. */
+/** Overlays of pixels that are lit up, and of the others: colours with an opacity. */
 const LIT = ((0xa8 << 24) | (0xff << 16) | (0xf0 << 8) | 0x5e) >>> 0, DIMMED = (0x90 << 24) >>> 0;
 
-/** A table of 256 colours out of "rrggbb" after "rrggbb". @param {string} hexadecimal */
+/** A table of 256 colours from a sequence of "rrggbb". @param {string} hexadecimal */
 function colourTable(hexadecimal) {
   return Uint32Array.from({ length: 256 }, (_, place) => {
     const colour = parseInt(hexadecimal.slice(6 * place, 6 * place + 6), 16);
@@ -22,9 +22,9 @@ function colourTable(hexadecimal) {
 class Painter {
   /**
    * @param {Images} images
-   * @param {number} exposure the factor that the comparison was viewed at
-   * @param {any} page what the page says about its maps: colours, maps, luminance
-   * @param {Effects | null} effects what dominates where, if that is known
+   * @param {number} exposure the comparison's factor
+   * @param {any} page the page's data of maps: colours, maps, luminance
+   * @param {Effects | null} effects the dominating effects, if known
    */
   constructor(images, exposure, page, effects) {
     this.images = images;
@@ -50,7 +50,7 @@ class Painter {
     );
   }
 
-  /** Whether statistics are over a place. @param {number} place */
+  /** Whether statistics include a place. @param {number} place */
   counts(place) {
     return Boolean(this.images.codes.flags[place] & COUNTED);
   }
@@ -66,7 +66,7 @@ class Painter {
     return values;
   }
 
-  /** A map by its name, its colours ending at a value. @param {string} name @param {number} top */
+  /** The named map, its colours ending at a value. @param {string} name @param {number} top */
   map(name, top) {
     const { kind } = mapOf(this.page, name);
     return this.picture("map", `${name} ${top}`, (pixels) => {
@@ -78,7 +78,7 @@ class Painter {
   }
 
   /**
-   * The canvas in a slot, painted again where its key has changed.
+   * The canvas in a slot, repainted if its key has changed.
    * @param {string} slot
    * @param {string} key
    * @param {(pixels: Uint32Array) => void} paint
@@ -131,7 +131,7 @@ class Painter {
     }
   }
 
-  /** Lights up the counted pixels of a box whose values are in a band, and dims the others. @param {string} name @param {number[]} band @param {number[] | null} box */
+  /** Light up the counted pixels of a box whose values are in a band, and dim the others. @param {string} name @param {number[]} band @param {number[] | null} box */
   band(name, [low, high], box) {
     return this.picture("band", `${name} ${low} ${high} ${box}`, (pixels) => {
       const values = this.values(name);

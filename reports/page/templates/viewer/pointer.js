@@ -1,6 +1,6 @@
 // Mouse, pen and fingers on the canvas: the divide, selection, pan, wheel and pinch, hover and tap.
 
-/** A press that moves less than this is a tap; the divide is caught from this far (CSS pixels). */
+/** Most movement of a tap; distance within which a press grabs the divide (CSS pixels). */
 const TAP = 5, REACH = 14;
 
 /** @param {Viewer} viewer */
@@ -45,7 +45,7 @@ function listenToPointers(viewer) {
 
   canvas.addEventListener("pointerup", (event) => {
     if (moved <= TAP && down.size === 1) viewer.tap(place(event));
-    else viewer.change({}); // what passed by as it was dragged is now kept in the address
+    else viewer.change({}); // keep the view after a drag in the address
   });
   for (const end of ["pointerup", "pointercancel"]) {
     canvas.addEventListener(end, (event) => down.delete(/** @type {PointerEvent} */ (event).pointerId));
@@ -53,7 +53,7 @@ function listenToPointers(viewer) {
   canvas.addEventListener("pointerleave", () => viewer.hover(null));
 
   canvas.addEventListener("wheel", (event) => {
-    // The wheel scrolls the page, unless somebody has clicked into the picture.
+    // The wheel scrolls the page, unless the picture was clicked.
     if (!event.ctrlKey && !event.metaKey && document.activeElement !== canvas) return;
     event.preventDefault();
     viewer.change(viewer.viewport.zoomed(viewer.view, 2 ** (-event.deltaY / 240), place(event)));

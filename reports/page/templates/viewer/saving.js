@@ -1,4 +1,4 @@
-// The picture as it is seen, as a PNG file that says in its name what it shows.
+// The picture as shown, as a PNG file named after its content.
 
 /** @param {Viewer} viewer */
 function savePicture({ canvas, view, viewport, scene }) {
@@ -10,7 +10,7 @@ function savePicture({ canvas, view, viewport, scene }) {
   });
 }
 
-/** Scene, mode, map where one is seen, and region: the selection, else what is seen of a zoomed image. @param {View} view @param {Viewport} viewport @param {any} scene */
+/** Scene, mode, any map, and region: the selection, or else the visible part of a zoomed image. @param {View} view @param {Viewport} viewport @param {any} scene */
 function pictureName(view, viewport, scene) {
   const parts = [scene.id, view.mode];
   if (view.mode === "side" || view.mode === "error") parts.push(view.map);

@@ -1,6 +1,6 @@
-// What a metric is over a part of the image: the numbers behind brushing.
+// Statistics of a metric over a part of the image, for brushing.
 
-/** Ends of a map's colours, as parts of the metric's own; the automatic one holds this part of the pixels. */
+/** Ends of a map's colours relative to the metric's; the automatic one holds this part of the pixels. */
 const RANGES = [0.05, 0.1, 0.25, 0.5, 1, 2, 5], HELD = 0.95;
 
 /** Bars of the histogram, from one end of the colours to the other. */
@@ -8,7 +8,7 @@ const BARS = 40;
 
 /** @typedef {{count: number, size: number, mean: number, part: number, share: number, bars: number[]}} Summary */
 
-/** The ends of its colours that a map can have. @param {{top: number}} map */
+/** The possible ends of a map's colours. @param {{top: number}} map */
 function rangesOf(map) {
   return RANGES.map((factor) => Number((factor * map.top).toPrecision(3)));
 }
@@ -31,14 +31,14 @@ function endsOf(map, top) {
 }
 
 /**
- * A rectangle of the image, or all of it: counted pixels, their mean, their parts of the image's pixels
- * and of its departure (the sum of the metric's size), and the part of them in each bar; the outer bars
- * hold what is beyond.
+ * Statistics of a rectangle or the whole image: counted pixels, their mean, their parts of the image's
+ * pixels and of its departure (the sum of the metric's size), and the part of them in each bar; the
+ * outer bars include values beyond.
  * @param {Painter} painter
  * @param {any} map
  * @param {number} top
  * @param {number[] | null} box
- * @param {{count: number, size: number}} [all] the whole image's, where the rectangle is not that
+ * @param {{count: number, size: number}} [all] the whole image's, for a rectangle
  * @returns {Summary}
  */
 function summarise(painter, map, top, box, all) {
@@ -72,7 +72,7 @@ function eachPlace(painter, box, visit) {
   }
 }
 
-/** The rectangle that two of its corner pixels span. @param {number[]} from @param {number[]} to */
+/** The rectangle between two corner pixels. @param {number[]} from @param {number[]} to */
 function boxBetween(from, to) {
   const start = from.map((value, axis) => Math.min(value, to[axis]));
   return [...start, ...from.map((value, axis) => Math.abs(value - to[axis]) + 1)];
@@ -91,8 +91,8 @@ function withinBand(painter, map, box, [low, high]) {
 }
 
 /**
- * Effects in a rectangle: the part of its departure that lies where each of them dominates, largest first.
- * Where effects were not mapped, those of the regions that it overlaps, without parts.
+ * Effects in a rectangle: the part of its departure where each of them dominates, largest first.
+ * Without a map of effects, those of the regions that it overlaps, without parts.
  * @param {Painter} painter
  * @param {any} scene
  * @param {any} map

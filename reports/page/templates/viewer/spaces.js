@@ -1,4 +1,4 @@
-// Colours of a pixel in other spaces; definitions.py has the same formulas, by which ΔE2000 is made.
+// Colours of a pixel in other spaces, with the formulas of ΔE2000 in definitions.py.
 
 /** CIE XYZ (display white has Y = 1) of linear BT.709. @param {number[]} rgb @returns {number[]} */
 function xyzOf(rgb) {
@@ -13,7 +13,7 @@ function labOf(rgb, exposure) {
   return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
 }
 
-/** "#rrggbb" as the viewer shows it, after its exposure and its tone map. @param {number[]} rgb @param {string} tone @param {number} factor */
+/** "#rrggbb" as shown, with exposure and tone map. @param {number[]} rgb @param {string} tone @param {number} factor */
 function hexOf(rgb, tone, factor) {
   const curve = TONE_MAPS[tone] ?? TONE_MAPS.clip;
   const level = (/** @type {number} */ value) => Math.round(255 * srgb(curve(Math.max(value * factor, 0))));

@@ -5,7 +5,7 @@
  * @typedef {{sheet: string, width: number, height: number, columns: number, corners: Corner[]}} Board
  */
 
-/** Make the switchboard of a scene live, when the scene is first opened. @param {HTMLElement} section */
+/** Make the switchboard of a scene live when the scene is first opened. @param {HTMLElement} section */
 async function makeSwitchboard(section) {
   const element = /** @type {HTMLElement | null} */ (section.querySelector(".switchboard"));
   if (!element || element.dataset.ready) return;
@@ -23,7 +23,7 @@ async function makeSwitchboard(section) {
 
   /** @param {string} name @returns {HTMLElement} */
   const part = (name) => /** @type {HTMLElement} */ (element.querySelector(`[data-board=${name}]`));
-  /** Effects once one of them is switched. @param {number} effect */
+  /** The effects after switching one of them. @param {number} effect */
   const switched = (effect) => [...on].filter((one) => one !== effect).concat(on.has(effect) ? [] : [effect]).sort((a, b) => a - b);
   /** @param {number[]} effects */
   const inWords = (effects) => ["Textbook shading", ...effects.map((effect) => names[effect])].join(" + ");
@@ -52,7 +52,7 @@ async function makeSwitchboard(section) {
     gain.replaceChildren("ΔE2000 ", ...change(none.error, seen.error), ", ", ...change(none.time, seen.time));
   }
 
-  /** What was, and what is in its place. @param {string} before @param {string} after */
+  /** A value before and after. @param {string} before @param {string} after */
   function change(before, after) {
     const strong = Object.assign(document.createElement("strong"), { textContent: after });
     return on.size ? [`${before} → `, strong] : [strong];

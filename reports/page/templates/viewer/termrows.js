@@ -20,12 +20,12 @@ function rich(words) {
   });
 }
 
-/** A number of a term: below what the page keeps, "< 0.0001". @param {number} value */
+/** A number of a term; "< 0.0001" below the page's precision. @param {number} value */
 function amount(value) {
   return value > 0 && value < 1e-4 ? "< 0.0001" : significant(value, 3);
 }
 
-/** A factor of a term, without zeros at its end. @param {number} value */
+/** A factor of a term, without trailing zeros. @param {number} value */
 function factor(value, digits = 3) {
   const text = significant(value, digits);
   return /[×]/.test(text) ? text : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
@@ -63,7 +63,7 @@ function lightRows(light, material) {
   ];
 }
 
-/** The sum of the terms, and what the reference has there. @param {any} point @param {Images} images */
+/** The sum of the terms, and the reference. @param {any} point @param {Images} images */
 function sumRows(point, images) {
   const [x, y] = point.pixel;
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
@@ -85,13 +85,13 @@ function vectorsInWords(light, cosView) {
 function captionOf(light, point, top, cut) {
   const words = document.createElement("p");
   words.textContent = vectorsInWords(light, point.cosView);
-  if (light && point.lights.length > 1) words.textContent += ` Of ${point.lights.length} lights, ${light.name} gives most.`;
-  if (light) words.textContent += " Seen across the plane of N and L; V is projected onto it.";
+  if (light && point.lights.length > 1) words.textContent += ` Of ${point.lights.length} lights, ${light.name} contributes most.`;
+  if (light) words.textContent += " View of the plane of N and L, onto which V is projected.";
   if (!top) return [words];
   const keys = document.createElement("p");
   keys.append(key("textbook", "textbook lobe"), key("partner", "physical lobe"));
   const scale = document.createElement("p");
-  scale.textContent = "Lobes: the luminance that each direction sees in this plane, for a light of intensity 1, "
+  scale.textContent = "Lobes: the luminance in each direction of this plane, for a light of intensity 1, "
     + `both on one scale. The longest radius is ${significant(top, 3)}${cut ? ", where the longer lobe is cut off" : ""}.`;
   return [keys, words, scale];
 }

@@ -1,6 +1,6 @@
-// Equation 8.10 at the pixel that is picked, with its numbers, from the grid that the page holds.
+// Equation 8.10 at the picked pixel, with its numbers, from the page's grid.
 
-/** Codes of the grid are decoded as those of images; see reports/page/terms_view.py. */
+/** The largest code of the grid; see reports/page/terms_view.py. */
 const LARGEST_CODE = 65535;
 
 class TermsPanel {
@@ -16,7 +16,7 @@ class TermsPanel {
     });
   }
 
-  /** Move into a scene's section, and show its most telling point. @param {any} scene @param {HTMLElement} section */
+  /** Move into a scene's section, and show its first pixel. @param {any} scene @param {HTMLElement} section */
   async open(scene, section) {
     this.scene = scene;
     this.data = null;
@@ -26,7 +26,7 @@ class TermsPanel {
     if (!scene.terms) return;
     section.querySelector(".stage")?.after(this.panel);
     this.part("missing").hidden = !scene.terms.missing;
-    this.part("missing").textContent = `There are no terms to show. ${scene.terms.missing}`;
+    this.part("missing").textContent = `No terms. ${scene.terms.missing}`;
     this.part("whole").hidden = Boolean(scene.terms.missing);
     this.part("place").textContent = "";
     if (scene.terms.missing) return;
@@ -103,7 +103,7 @@ async function termsOf(scene) {
   };
 }
 
-/** The middle of the greatest region if a surface is there, or else of the picture. @param {any} scene @param {any} data */
+/** The middle of the largest region if it shows a surface, or else of the picture. @param {any} scene @param {any} data */
 function firstPixel(scene, data) {
   const [region] = scene.regions;
   const inside = region && [region.x + (region.width >> 1), region.y + (region.height >> 1)];
@@ -155,7 +155,7 @@ function product(a, b) {
   return a.map((value, channel) => value * b[channel]);
 }
 
-/** The light that gives most, or else faces the point most; null without lights. @param {any[]} lights @param {number[]} weights */
+/** The light that contributes most, or else faces the point most; null without lights. @param {any[]} lights @param {number[]} weights */
 function strongest(lights, weights) {
   const worth = (/** @type {any} */ light) =>
     luminanceOf(light.diffuse, weights) + luminanceOf(light.specular, weights) + 1e-9 * light.cosIncidence;

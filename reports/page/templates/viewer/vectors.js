@@ -1,9 +1,9 @@
-// The figure of a point: N, L, R and V in the plane of incidence, and both lobes about it.
+// The figure of a point: N, L, R and V in the plane of incidence, and both lobes.
 
 /** The point in the figure, the length of a vector and of the longest lobe. */
 const ORIGIN = [240, 226], VECTOR = 150, LOBE = 165;
 
-/** Lobes that differ by more than this factor are cut off, or the smaller would be a dot. */
+/** If lobes differ by more than this factor, the larger is cut off to keep the smaller visible. */
 const CUT = 3;
 
 /** Degrees between the directions of the textbook's lobe. */
@@ -21,7 +21,7 @@ function degreesOf(cosine) {
 }
 
 /**
- * What the textbook's material has from each direction in the plane of incidence.
+ * The textbook's lobe in the plane of incidence.
  * @param {any} material
  * @param {number} incidence degrees
  * @param {number[]} weights of red, green and blue in luminance
@@ -39,7 +39,7 @@ function textbookLobe(material, incidence, weights) {
 }
 
 /**
- * What the physical material has, between the incidences that are tabulated.
+ * The physical lobe, interpolated between the tabulated incidences.
  * @param {any} terms the scene's
  * @param {Float64Array} table incidences times views
  * @param {number} incidence degrees
@@ -103,9 +103,9 @@ function projectedView(light, cosView) {
 }
 
 /**
- * Draw the figure of a point, for the light that gives most there.
+ * Draw the figure of a point, for the light that contributes most.
  * @param {SVGElement} svg
- * @param {any} light with its cosines, or null where there is none
+ * @param {any} light with its cosines, or null
  * @param {number} cosView
  * @param {{textbook: number[][], physical: number[][]} | null} lobes
  * @returns {{top: number, cut: boolean}} the value of the longest radius, and whether a lobe is longer

@@ -1,4 +1,4 @@
-// The first screen: a tolerance, the scenes that pass, and what makes the others pass.
+// The first screen: a tolerance, the scenes that pass, and remedies for the others.
 
 /** @param {HTMLElement} element */
 function makeVerdict(element) {

@@ -1,4 +1,4 @@
-// The viewer of one scene: its state, its controls, and when it is drawn.
+// The viewer of one scene: its state, its actions, and when it is drawn.
 
 class Viewer {
   /**
@@ -6,7 +6,7 @@ class Viewer {
    * @param {HTMLElement} panel the pixel inspector
    * @param {HTMLElement} brushing the panel of the selection
    * @param {any} page
-   * @param {(changes: Partial<View>, passing?: boolean) => void} change tells the page what is to be seen
+   * @param {(changes: Partial<View>, passing?: boolean) => void} change requests a view of the page
    */
   constructor(element, panel, brushing, page, change) {
     this.element = element;
@@ -25,7 +25,7 @@ class Viewer {
     this.swapped = false;
     this.selecting = false;
     this.pending = false;
-    /** What was told last, by the event's name. @type {Map<string, string>} */
+    /** The last details, by the event's name. @type {Map<string, string>} */
     this.told = new Map();
     this.controls = new Controls(this);
     this.distribution = new Distribution(brushing, this);
@@ -53,7 +53,7 @@ class Viewer {
     this.redraw();
   }
 
-  /** The map of effects is there for scenes whose effects were priced. */
+  /** Offer the map of effects for scenes whose effects were priced. */
   offerEffects() {
     const option = /** @type {HTMLOptionElement} */ (this.element.querySelector("option[value=effects]"));
     option.hidden = option.disabled = !this.scene.effects;
@@ -70,13 +70,13 @@ class Viewer {
     this.redraw();
   }
 
-  /** The map that numbers are of: the one that is chosen, or the first if that has no values. */
+  /** The map of the numbers shown: the chosen one, or the first if that has no values. */
   measure() {
     const map = mapOf(this.page, this.view.map);
     return hasRange(map) ? map : this.page.maps[0];
   }
 
-  /** Where its colours end. */
+  /** The end of its colours. */
   top() {
     return this.view.top ?? this.automatic();
   }
@@ -86,14 +86,14 @@ class Viewer {
     return this.painter ? automaticRange(this.painter, map) : map.top;
   }
 
-  /** The selection, as far as it is in the image. @returns {number[] | null} */
+  /** The part of the selection in the image, or null. @returns {number[] | null} */
   box() {
     const [x, y, w, h] = this.view.box ?? [0, 0, 0, 0];
     const [width, height] = [Math.min(w, this.scene.width - x), Math.min(h, this.scene.height - y)];
     return width > 0 && height > 0 ? [x, y, width, height] : null;
   }
 
-  /** Draw once before the next frame, however often it is asked for. */
+  /** Draw once before the next frame, however often requested. */
   redraw() {
     if (this.pending || !this.painter) return;
     this.pending = true;
@@ -127,7 +127,7 @@ class Viewer {
     return `${this.scene.name}: ${modes[/** @type {keyof modes} */ (this.view.mode)]}. Press ? for the keys.`;
   }
 
-  /** Show the numbers of the pixel under the pointer, else of the marked one. */
+  /** Show the numbers of the pixel at the pointer, or else of the marked one. */
   inspectPixel() {
     const pixel = this.hovered ?? this.view.pixel;
     const known = this.painter && pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height ? pixel : null;
@@ -136,9 +136,9 @@ class Viewer {
   }
 
   /**
-   * Tell other parts of the page, once for each change, by a CustomEvent on the viewer's element:
-   * "pick" has `{scene, pixel, marked}` as its detail: the scene's id, `[x, y]` in pixels of the image
-   * or null, and whether the pixel is marked (by a click or the keys) or only under the pointer.
+   * Report each change to other parts of the page by a CustomEvent on the viewer's element. "pick" has
+   * the detail `{scene, pixel, marked}`: the scene's id, `[x, y]` in pixels of the image or null, and
+   * whether the pixel is marked (by a click or the keys) or only at the pointer.
    * @param {string} name
    * @param {object} detail
    */
@@ -161,14 +161,14 @@ class Viewer {
     this.change({ box: boxBetween(ends[0], ends[1]) }, true);
   }
 
-  /** Mark a pixel; swap the halves where they flicker. Where rectangles are selected, select none. @param {number[]} place */
+  /** Mark a pixel, and swap flickering halves; clear the selection when selecting. @param {number[]} place */
   tap(place) {
     if (this.selecting) return this.change({ box: null });
     if (this.view.mode === "flicker") this.swap();
     this.change({ pixel: this.viewport.pixelAt(this.view, place[0], place[1]) });
   }
 
-  /** Whether a drag, or the arrows, select a rectangle. @param {boolean} selecting */
+  /** Let drags and arrows select rectangles, or not. @param {boolean} selecting */
   selectBy(selecting) {
     this.selecting = selecting;
     this.element.classList.toggle("selecting", selecting);
@@ -181,7 +181,7 @@ class Viewer {
     this.redraw();
   }
 
-  /** Whether a press there takes the divide: near it, or anywhere while the whole image is seen. @param {number} left @param {number} reach */
+  /** Whether a press grabs the divide: near it, or anywhere if the whole image is visible. @param {number} left @param {number} reach */
   dividesAt(left, reach) {
     if (this.view.mode !== "split") return false;
     const pane = this.viewport.panes[0];
@@ -193,7 +193,7 @@ class Viewer {
     return clamp(left / this.viewport.panes[0].width, 0, 1);
   }
 
-  /** Zoom about the marked pixel where it is seen, else about the middle. @param {number} factor */
+  /** Zoom about the marked pixel if visible, or else about the middle. @param {number} factor */
   zoomBy(factor) {
     const pane = this.viewport.panes[0];
     const [x, y] = this.view.pixel ?? this.viewport.centre(this.view);
@@ -202,7 +202,7 @@ class Viewer {
     this.change(this.viewport.zoomed(this.view, factor, about));
   }
 
-  /** Move the marked pixel, and the view with it where it would leave. @param {number} right @param {number} down */
+  /** Move the marked pixel, and keep it in view. @param {number} right @param {number} down */
   step(right, down) {
     const { width, height } = this.viewport;
     const [cx, cy] = this.viewport.centre(this.view).map(Math.floor);
@@ -227,7 +227,7 @@ class Viewer {
     return this.viewport.sees(at) ? {} : { x: x + 0.5, y: y + 0.5 };
   }
 
-  /** What buttons and keys do. @param {string} action */
+  /** Do the action of a button or a key. @param {string} action */
   act(action) {
     /** @type {Record<string, () => void>} */
     const actions = {

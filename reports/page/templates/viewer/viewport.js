@@ -1,17 +1,17 @@
-// Where pixels of the image are on the canvas: zoom, pan, and the panes of side by side.
+// The places of the image's pixels on the canvas: zoom, pan, and the panes of side by side.
 
-/** Narrower canvases show side by side as one above the other (CSS pixels). */
+/** Narrower canvases stack the panes of side by side (CSS pixels). */
 const STACKED_BELOW = 620;
 
-/** Screen pixels for one of the image, at most. */
+/** Most screen pixels per image pixel. */
 const GREATEST_ZOOM = 64;
 
-/** The least height of a view, and the greatest as a part of the window's. */
+/** The least height of a view, and the greatest relative to the window's. */
 const LEAST_HEIGHT = 180, GREATEST_PART = 0.74;
 
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
-/** Geometry in CSS pixels; the image is `width` by `height` of its own. */
+/** Geometry in CSS pixels; `width` and `height` are the image's, in its pixels. */
 class Viewport {
   /** @param {number} width @param {number} height */
   constructor(width, height) {
@@ -24,7 +24,7 @@ class Viewport {
   }
 
   /**
-   * Lay out so many panes over a canvas of a width; returns the height that they take.
+   * Lay out panes over a canvas of a width, and return their height.
    * @param {number} count
    * @param {number} available
    */
@@ -68,7 +68,7 @@ class Viewport {
     return left >= 0 && top >= 0 && left <= pane.width && top <= pane.height;
   }
 
-  /** What panes show of the image: left, top, width and height in whole pixels. @param {View} view */
+  /** The visible part of the image: left, top, width and height in whole pixels. @param {View} view */
   seen(view) {
     const centre = this.centre(view);
     const zoom = this.zoom(view);
@@ -105,7 +105,7 @@ class Viewport {
   }
 
   /**
-   * Zoom by a factor, keeping the image's point under a place of the canvas where it is.
+   * Zoom by a factor, keeping the image's point under a place of the canvas in place.
    * @param {View} view
    * @param {number} factor
    * @param {number[]} place
@@ -120,14 +120,14 @@ class Viewport {
     return { zoom, ...this.within(x + (cx - x) * kept, y + (cy - y) * kept) };
   }
 
-  /** Move by so many pixels of the screen. @param {View} view @param {number} right @param {number} down */
+  /** Move by screen pixels. @param {View} view @param {number} right @param {number} down */
   panned(view, right, down) {
     const [cx, cy] = this.centre(view);
     const zoom = this.zoom(view);
     return view.zoom === null ? {} : this.within(cx - right / zoom, cy - down / zoom);
   }
 
-  /** A centre that is in the image. @param {number} x @param {number} y */
+  /** The nearest centre in the image. @param {number} x @param {number} y */
   within(x, y) {
     return { x: clamp(x, 0, this.width), y: clamp(y, 0, this.height) };
   }
