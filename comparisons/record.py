@@ -28,7 +28,7 @@ from comparisons.comparison import (
     Unrepresentable,
 )
 from comparisons.processes.pool import cores
-from comparisons.records import Record
+from comparisons.records import Machine, Record
 from comparisons.terms.term_grid import TermGrid
 from heuristic import __version__
 from heuristic.heuristics import named
@@ -88,13 +88,10 @@ def versions() -> dict[str, str]:
     return found
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Machine:
     """Return what times depend on."""
-    return {
-        "processor": _processor(),
-        "cores": cores(),
-        "system": f"{platform.system()} {platform.machine()}",
-    }
+    system = f"{platform.system()} {platform.machine()}"
+    return Machine(processor=_processor(), cores=cores(), system=system)
 
 
 def _processor() -> str:
@@ -209,9 +206,9 @@ def guard_record(guard: Guard) -> GuardRecord:
     )
 
 
-def guard_warnings(guard: Guard) -> Iterator[str]:
+def guard_warnings(guard: Guard | None) -> Iterator[str]:
     """Yield a warning if the probe disagreed with the plan."""
-    if guard.state is Verdict.DISAGREED:
+    if guard and guard.state is Verdict.DISAGREED:
         yield (
             f"The plan changes the light: {guard.words}. So everything was simulated. A rule of"
             " pruning is wrong for this scene: please report it."

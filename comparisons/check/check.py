@@ -59,7 +59,7 @@ class Check:
         """Return the change of a half's blocks, (rows, columns, 3) linear RGB."""
         return self.after.colours[half].blocks - self.before.colours[half].blocks
 
-    def objects(self, half: str, before: Array | None = None) -> dict[str, float]:
+    def objects(self, half: str, before: NDArray[np.floating] | None = None) -> dict[str, float]:
         """Return each object's share of a half's change, the largest first.
 
         ``before`` is the half's picture when the baseline was made. If it is omitted, or of another

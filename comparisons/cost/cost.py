@@ -31,8 +31,9 @@ from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
 from comparisons.effects.split import split
 from comparisons.options import Options
-from comparisons.records import Machine, Pixels
+from comparisons.records import Pixels
 from reference.rendering.gbuffer import image_size
+from reference.rendering.guard import Guard, Verdict
 from reference.rendering.passes import Progress
 from reference.scene.source import Source
 
@@ -151,10 +152,10 @@ def cost(
         split=Split(tuple(part for part, _ in parts), whole),
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=width * height),
-        machine=Machine(**record.machine()),
+        machine=record.machine(),
         versions=record.versions(),
         command=command,
-        guard=record.guard_record(ready.guard),
+        guard=record.guard_record(ready.guard or Guard(Verdict.NOT_NEEDED)),
         prediction=prediction,
         left_out=tuple(LeftOut(*pair) for pair in methods.left_out.items()),
         pictures=_limits([image for _, image in parts], priced.maps.values()),

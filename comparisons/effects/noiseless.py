@@ -8,6 +8,7 @@ is near the size of the noise, up to two fifths of the noise's part can remain.
 """
 
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from comparisons.cost.judging import Judge
 from comparisons.departure.blocks import ratio
 from comparisons.departure.debiasing import contrasts, signed_root
+from comparisons.departure.metric import Pixelwise
 from reference.rendering.moments import block_numbers
 
 
@@ -41,10 +43,11 @@ class Noiseless:
         First for the mean of all replicates (R, H, W, 3), then leaving out each in turn.
         """
         images = np.asarray(images)[:, self.judge.counted].astype(float)
+        metric = cast(Pixelwise, self.judge.metric)  # the leading one is
         found = []
         for chosen, references in self._references:
             plain, *noisy = (
-                self.judge.metric.difference(reference, shown)
+                metric.difference(reference, shown)
                 for reference, shown in zip(references, self._noisier(images[chosen]), strict=True)
             )
             found.append(self._without_noise(plain, np.mean(noisy, axis=0)))

@@ -213,7 +213,7 @@ def _changed_versions(baseline: Baseline) -> dict[str, VersionChange]:
 def _explained(found: Check, before: Pictures | None) -> dict[str, Any]:
     """Return causes and objects of a failure; ``before`` are the baseline's pictures, if any."""
     halves = (half for half in HALVES if any(move.half == half for move in found.moved))
-    objects = {half: found.objects(half, before and before[half]) for half in halves}
+    objects = {half: found.objects(half, before[half] if before else None) for half in halves}
     return {"causes": tuple(suspects.causes(found)), "objects": objects}
 
 
