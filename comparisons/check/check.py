@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.case import Case
 from comparisons.check.carried import carried
