@@ -128,7 +128,7 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
         said = [
             f"Textbook shading looks right in {only.scene}."
             if right
-            else f"Textbook shading is visibly wrong in {share:.0%} of {only.scene}."
+            else f"Textbook shading is visibly wrong in {100 * share:.0f} % of {only.scene}."
         ]
     else:
         said = [f"Textbook shading looks right in {right} of {len(findings)} scenes."]
@@ -145,7 +145,7 @@ def about(found: Finding, tolerance: float = USUAL) -> str:
     if found.is_exact:
         return "Textbook shading is exact here, as far as can be seen."
     share = found.beyond[tolerance]
-    wrong = f"is visibly wrong in {share:.0%} of the pixels"
+    wrong = f"is visibly wrong in {100 * share:.0f} % of the pixels"
     said = [
         "Textbook shading " + ("looks right here." if found.is_right(tolerance) else f"{wrong}.")
     ]

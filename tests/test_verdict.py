@@ -69,7 +69,7 @@ def test_the_sentences_count_scenes_and_name_what_those_that_fail_lack():
 def test_a_scene_is_told_in_a_few_sentences():
     remedy = dict.fromkeys(verdict.TOLERANCES, verdict.Remedy("path 3", 0.041))
     told = verdict.about(found("a", parts=[("occlusion", 4.0)], remedies=remedy))
-    assert told.startswith("Textbook shading is visibly wrong in 50% of the pixels.")
+    assert told.startswith("Textbook shading is visibly wrong in 50 % of the pixels.")
     assert "mostly occlusion" in told
     assert "path 3, 41.0 ms" in told
     right = verdict.about(found("a", beyond=0.0, remedies=remedy))

@@ -180,8 +180,14 @@ class Visitor:
         )
         self.settle()
 
+    def unfold(self):
+        """Open the appendix of each scene that is there."""
+        for summary in self.page.locator(".scene:visible .folded:not([open]) > summary").all():
+            summary.click()
+
     def see_charts(self):
         """Scroll to the charts of the open scene, and wait until Vega has drawn one."""
+        self.unfold()
         self.page.locator(".scene.open .charts").last.scroll_into_view_if_needed()
         self.page.wait_for_function("() => document.querySelector('.scene.open .vega-embed svg')")
 

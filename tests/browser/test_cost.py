@@ -17,6 +17,7 @@ CHARTS = len(drawn()) + 2
 
 def enlivened(visitor):
     page = visitor.open(SCENE)
+    visitor.unfold()
     for charts in page.locator(".scene.open .charts").all():
         charts.scroll_into_view_if_needed()
     page.wait_for_function(

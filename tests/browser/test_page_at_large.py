@@ -97,6 +97,7 @@ def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visit
     assert page.locator(".scene:visible").count() == 2
     assert page.locator(".card img:visible").count() == 6
     assert page.locator("canvas:visible").count() == 0
+    visitor.unfold()
     assert page.locator(".scene .chart svg:visible").count() == 2 + 2 * len(drawn())
     assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0

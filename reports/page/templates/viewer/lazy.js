@@ -10,7 +10,10 @@ function sectionOf(id) {
 
 /** Draw a scene's pictures for printing, from the numbers in the page. @param {Viewer} viewer */
 function listenToPrinting(viewer) {
-  const draw = () => drawPictures(viewer);
+  const draw = () => {
+    drawPictures(viewer);
+    for (const part of document.querySelectorAll(".scene.open details")) part.setAttribute("open", "");
+  };
   window.addEventListener("beforeprint", draw);
   matchMedia("print").addEventListener("change", draw);
 }
