@@ -264,15 +264,15 @@ def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "--heuristic or --bsdf"),
-        (("--heuristic", "phong", "--bsdf", "diffuse"), "one of them"),
+        ((), "one of --heuristic and --bsdf"),
+        (("--heuristic", "phong", "--bsdf", "diffuse"), "one of --heuristic and --bsdf"),
         (("--heuristic", "phong", "-p", "gloss=1"), "gloss"),
         (("--heuristic", "phnog"), "phnog"),
         (("--bsdf", "plastic"), "mirror"),
         (("--bsdf", "roughplastic", "-p", "alpha=0.01"), "too narrow"),
         (("--bsdf", "phong", "-p", "n=1000"), "too narrow"),
         (("--bsdf", "roughplastic", "-p", "alhpa=1"), "alhpa"),
-        (("--bsdf", "diffuse", "-p", "reflectance"), "no parameter"),
+        (("--bsdf", "diffuse", "-p", "reflectance"), "is not a parameter"),
     ],
 )
 def test_mistakes_are_told(run, tmp_path, words, told):

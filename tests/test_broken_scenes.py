@@ -319,7 +319,7 @@ def test_includes_that_fan_out_end(rgb, tmp_path):
         inner = f'<include filename="{depth + 1}.xml"/>' * 6
         (tmp_path / f"{depth}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
     (tmp_path / "10.xml").write_text('<scene version="3.0.0"/>')
-    with pytest.raises(InputError, match=f"more than {reading.MOST_INCLUDES} files"):
+    with pytest.raises(InputError, match=f"more than {reading.MOST_INCLUDES} times"):
         compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
 
 

@@ -268,5 +268,5 @@ def test_a_plan_picks_of_thousands_and_says_so(rgb, few_asked):
     assert ready.plan.integrator == "direct_all"
     assert not ready.plan.exact
     assert "20 lights: 16 per sample are picked, in proportion to their light" in evidence
-    assert any(line.startswith("integrator") and "16 lights a sample" in line for line in said)
+    assert any(line.startswith("integrator") and "16 lights per sample" in line for line in said)
     assert ready.reference.integrator.light_samples == light_choice.PICKS

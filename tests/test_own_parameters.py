@@ -164,9 +164,7 @@ def test_a_study_refuses_parameters_that_are_not_declared(rgb, written, text, me
 
 
 def test_a_study_without_an_image_is_of_phong_alone():
-    with pytest.raises(
-        InputError, match=r"lobe is evaluated without an image.*mine.py on sphere or"
-    ):
+    with pytest.raises(InputError, match=r"the scene lobe is not rendered.*mine.py on sphere or"):
         design.parse(
             "[[part]]\nscene = 'lobe'\nheuristic = 'mine.py'\n[part.parameters]\nalpha = 0.2"
         )

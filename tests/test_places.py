@@ -249,5 +249,5 @@ def test_a_scene_whose_name_is_not_in_utf8_is_one_message(run, tmp_path):
     for command in ("compare", "cost", "fit"):
         code, printed, messages = run(command, scene, "-o", tmp_path / "out")
         assert (code, printed) == (2, "")
-        assert r"caf\udce9.xml': this name is not in UTF-8" in messages
+        assert r"caf\udce9.xml': Mitsuba cannot open this name, which is not in UTF-8" in messages
         assert messages.count("\n") == 1

@@ -171,5 +171,7 @@ def test_the_lock_has_a_hash_and_no_address():
 
 
 def test_another_kind_is_refused():
-    with pytest.raises(InputError, match=r"of three\.js there are three:phong, three:lambert"):
+    with pytest.raises(
+        InputError, match=r"'three:toon' is not declared: choose one of three:phong, three:lambert"
+    ):
         named("three:toon")

@@ -182,7 +182,8 @@ class Visitor:
 
     def unfold(self):
         """Open the appendix of each scene that is there."""
-        for summary in self.page.locator(".scene:visible .folded:not([open]) > summary").all():
+        closed = self.page.locator(".scene:visible .folded:not([open]) > summary")
+        for summary in reversed(closed.all()):
             summary.click()
 
     def see_charts(self):
