@@ -61,7 +61,7 @@ def test_the_sentences_count_scenes_and_name_what_those_that_fail_lack():
         "What it lacks most is interreflection, then occlusion and spectral.",
     ]
     assert verdict.sentences([found("a", beyond=0.42)]) == [
-        "Textbook shading is visibly wrong in 42% of a."
+        "Textbook shading is visibly wrong in 42 % of a."
     ]
     assert verdict.sentences([found("a", beyond=0.0)]) == ["Textbook shading looks right in a."]
 
