@@ -101,7 +101,7 @@ class Worker:
         except Exception as error:  # unpickling can raise anything
             self.lose(f"its answer cannot be read: {type(error).__name__}: {error}")
             return
-        if number != self.number:  # an answer to no task of ours
+        if number != self.number:  # an answer to another task
             return
         self.deadline = monotonic() + limit_s
         if kind == "progress":

@@ -26,8 +26,7 @@ def document(results: Sequence[Result]) -> bytes:
         "errors": str(statuses.count("error")),
         "time": f"{sum(result.seconds for result in results):.3f}",
     }
-    root = Element("testsuites", totals)
-    suite = SubElement(root, "testsuite", totals, skipped="0")
+    root, suite = _roots(totals, skipped=0)
     for result in results:
         names = {"name": clean(result.name), "file": clean(result.path.as_posix())}
         time = f"{result.seconds:.3f}"
@@ -38,8 +37,7 @@ def document(results: Sequence[Result]) -> bytes:
         elif result.status == "error":
             error = SubElement(case, "error", message=headline(result), type="error")
             error.text = headline(result)
-    indent(root)
-    return tostring(root, encoding="utf-8", xml_declaration=True)
+    return _written(root)
 
 
 def of_gates(outcomes: Sequence[Outcome]) -> bytes:
@@ -51,14 +49,23 @@ def of_gates(outcomes: Sequence[Outcome]) -> bytes:
         "failures": str(states.count("failed")),
         "errors": "0",
     }
-    root = Element("testsuites", totals)
-    suite = SubElement(root, "testsuite", totals, skipped=str(states.count("undetermined")))
+    root, suite = _roots(totals, skipped=states.count("undetermined"))
     for outcome in outcomes:
         name = clean(f"{outcome.scene}, {outcome.gate}")
         case = SubElement(suite, "testcase", name=name, classname="fotismos.compare")
         kind = {"failed": "failure", "undetermined": "skipped"}.get(outcome.state)
         if kind:
             SubElement(case, kind, message=clean(str(outcome)))
+    return _written(root)
+
+
+def _roots(totals: dict[str, str], skipped: int) -> tuple[Element, Element]:
+    """Return the root of a document, and its one suite."""
+    root = Element("testsuites", totals)
+    return root, SubElement(root, "testsuite", totals, skipped=str(skipped))
+
+
+def _written(root: Element) -> bytes:
     indent(root)
     return tostring(root, encoding="utf-8", xml_declaration=True)
 

@@ -14,7 +14,7 @@ from PIL import Image
 from comparisons.record import Images
 from comparisons.records import Record, plain
 from reports.files.images import THUMBNAIL, tonemap
-from reports.page.switchboard import webp
+from reports.page.switchboard import webp, webp_uri
 
 #: The place of pixels without a shape.
 NOTHING = 255
@@ -37,8 +37,7 @@ class Lit(Record):
 
     def data(self) -> dict[str, Any]:
         """Return the data of the page's script."""
-        picture = "data:image/webp;base64," + base64.b64encode(self.picture).decode("ascii")
-        return plain(structs.replace(self, picture=b"")) | {"picture": picture}
+        return plain(structs.replace(self, picture=b"")) | {"picture": webp_uri(self.picture)}
 
 
 def lit(shown: Images, exposure: float = 1.0) -> Lit:

@@ -51,11 +51,16 @@ def webp(picture: Image.Image) -> bytes:
     return buffer.getvalue()
 
 
+def webp_uri(file: bytes) -> str:
+    """Return a WebP file as an address that holds it."""
+    return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+
+
 def data(record: Cost, shown: Sheet) -> dict[str, Any]:
     """Return the data of the page's script: the sheet, and the meaning of its pictures."""
     effects = [price.effect for price in record.prices.effects]
     return {
-        "sheet": "data:image/webp;base64," + base64.b64encode(shown.webp).decode("ascii"),
+        "sheet": webp_uri(shown.webp),
         "width": shown.width,
         "height": shown.height,
         "columns": COLUMNS,
