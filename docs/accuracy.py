@@ -1,6 +1,6 @@
 """The content of docs/accuracy.md: studies of cost over many scenes, and their common findings.
 
-``./run docs --accuracy`` measures for half an hour on an idle machine, and writes the page.
+``./run docs --accuracy`` measures for twenty minutes on an idle machine, and writes the page.
 """
 
 from collections import Counter
@@ -19,6 +19,7 @@ from comparisons.cost.rungs import FULL_PLAN, STAND_INS
 from comparisons.gallery.builtin import SCENES
 from reports.terminal.printing import number, parameter, seconds
 from reports.terminal.tables import markdown
+from tests.benchmarks import prediction
 
 LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
 WIDTH = 256
@@ -47,6 +48,16 @@ def setting(records: Sequence[Cost]) -> Iterator[str]:
         f"{len(records)} scenes at {width} by {height} pixels, {first.rounds} rounds, on"
         f" {first.machine.cores} cores of {first.machine.processor}."
     )
+
+
+def predictions() -> Iterator[str]:
+    """Yield how predictions compare with later measurements, scene by scene."""
+    found = prediction.run(rounds=7)
+    width, height = prediction.TARGET
+    yield f"At {width} by {height} pixels, 6 and 32 samples per pixel, none of them fitted."
+    yield " ".join(prediction.summary(found))
+    yield ""
+    yield from markdown([prediction.HEAD, *prediction.rows(found)], right=1)
 
 
 def pictures(records: Sequence[Cost]) -> Iterator[str]:

@@ -16,7 +16,7 @@ from comparisons.case import Request, open_case  # isort: skip  it finds LLVM fi
 from comparisons.compare import guarded
 from comparisons.cost.effort import Effort
 from comparisons.cost.methods import Methods
-from comparisons.cost.prediction.error_law import LEVEL
+from comparisons.cost.prediction.error_law import LEVEL, UNSEEN
 from comparisons.cost.prediction.forecasting import predict
 from comparisons.cost.prediction.target import sizes
 
@@ -34,41 +34,42 @@ SCENES = (
 )
 TARGET = 512, 384
 BOUND = 0.2
-UNSEEN = 0.02
-"""ΔE2000: errors that differ by less count as equal."""
+INSIDE = "time_inside", "error_inside"
+
+
+HEAD = "scene", "time: worst", "median", "error: worst", "time inside", "error inside"
 
 
 def run(rounds):
     """Print a row per scene, and return the deviations."""
-    table = Table("scene", "time: worst", "median", "error: worst", "time inside", "error inside")
-    found = {}
-    for name in SCENES:
-        found[name] = rows = _deviations(name, min(rounds, 7))
-        time, error = ([abs(row[key]) for row in rows] for key in ("time", "error"))
-        inside = [f"{_share(rows, key):.0%}" for key in ("time_inside", "error_inside")]
-        table.add_row(
-            name,
-            f"{max(time):.0%}",
-            f"{median(time):.0%}",
-            f"{max(error):.0%}",
-            *inside,
-        )
-    Console().print(table, *_summary(found.values()), sep="\n", highlight=False)
+    found = {name: _deviations(name, min(rounds, 7)) for name in SCENES}
+    table = Table(*HEAD)
+    for row in rows(found):
+        table.add_row(*row)
+    Console().print(table, *summary(found), sep="\n", highlight=False)
     return found
 
 
-def _summary(scenes):
-    """Yield how many scenes are within the bound, and how much the intervals hold."""
-    scenes, rows = list(scenes), [row for scene in scenes for row in scene]
-    time = sum(median(abs(row["time"]) for row in scene) <= BOUND for scene in scenes)
-    error = sum(all(abs(row["error"]) <= BOUND for row in scene) for scene in scenes)
+def rows(found):
+    """Yield the cells of each scene."""
+    for name, own in found.items():
+        time, error = ([abs(row[key]) for row in own] for key in ("time", "error"))
+        shares = max(time), median(time), max(error), *(_share(own, key) for key in INSIDE)
+        yield name, *(f"{share:.0%}" for share in shares)
+
+
+def summary(found):
+    """Yield how many scenes are within the bound, and how often the intervals hold."""
+    scenes, everything = found.values(), [row for own in found.values() for row in own]
+    time = sum(median(abs(row["time"]) for row in own) <= BOUND for own in scenes)
+    error = sum(all(abs(row["error"]) <= BOUND for row in own) for own in scenes)
     yield f"Within {BOUND:.0%}: time {time}, error {error} of {len(scenes)} scenes."
-    for key in ("time_inside", "error_inside"):
-        yield f"{key.replace('_', ' ')} its {LEVEL:.0%} interval: {_share(rows, key):.0%}."
+    time, error = (_share(everything, key) for key in INSIDE)
+    yield f"{LEVEL:.0%} intervals hold {time:.0%} of the times and {error:.0%} of the errors."
 
 
-def _share(rows, key):
-    return sum(row[key] for row in rows) / len(rows)
+def _share(own, key):
+    return sum(row[key] for row in own) / len(own)
 
 
 def _deviations(name, rounds):
@@ -76,12 +77,12 @@ def _deviations(name, rounds):
     case = open_case(name, Request(resolution=shape))
     methods = Methods(case.source, case.options, guarded(case.source, case.options))
     made = predict(methods, TARGET, Effort(rounds=rounds), seed=1, is_measured=True)
-    rows = []
+    found = []
     for forecast in made.forecasts:
         if forecast.measured is None:
             continue
         seconds, error = forecast.measured.seconds.median, forecast.measured.error
-        rows.append(
+        found.append(
             {
                 "method": forecast.method,
                 "spp": forecast.spp,
@@ -92,7 +93,7 @@ def _deviations(name, rounds):
                 "error_inside": forecast.error.low <= error <= forecast.error.high,
             }
         )
-    return rows
+    return found
 
 
 def _deviation(predicted, error):

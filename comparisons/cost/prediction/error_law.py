@@ -7,7 +7,9 @@ is. Between counts, it follows a method's
 Cross-validation shows how far off that is: the largest size is predicted from the others, and the
 middle counts of a curve from its other counts. The line's misfit grows as the root of the error,
 since edges meet the pixels by chance; the curve's misfit grows as the noise. Both are estimated
-over all methods of the scene, with more weight on a method's own cases.
+over all methods of the scene, with more weight on a method's own cases. Below :data:`UNSEEN` and
+:data:`UNRESOLVED`, three small sizes show nothing: all methods share the reference's chance of rare
+bright pixels, and edges that one size resolves and another does not. No interval is narrower.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,6 +31,12 @@ SHARED = 4
 
 OWN_CHANCE = 1 / 3
 """Share of the line's misfit at the largest size that edges add by chance at the requested size."""
+
+UNSEEN = 0.02
+"""Half an interval, at least: errors in ΔE that differ by less count as equal."""
+
+UNRESOLVED = 0.015
+"""Half an interval, at least, as a share of the error."""
 
 Point = tuple[int, int]
 """A width and a count."""
@@ -133,6 +141,7 @@ def intervals(laws: Sequence[ErrorLaw], width: float) -> Callable[[ErrorLaw, flo
 
     def interval(law: ErrorLaw, spp: float) -> NDArray:
         value, spread = law.at(width, spp), law.spread(width, spp, by_size, by_count)
-        return np.clip([value, value - reach * spread, value + reach * spread], 0.0, None)
+        half = hypot(reach * spread, UNSEEN, UNRESOLVED * value)
+        return np.clip([value, value - half, value + half], 0.0, None)
 
     return interval
