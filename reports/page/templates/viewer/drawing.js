@@ -11,8 +11,10 @@ const PRINTED_FROM = 40;
 
 /**
  * Besides the view: `map` with its `end` and the `measure` of bands, `gain` on the textbook's image.
- * @typedef {{swapped: boolean, regions: any[], box: number[] | null, map: any, gain: number}} Extra
+ * @typedef {{swapped: boolean, regions: Region[], box: number[] | null, map: Legend & {end: number, measure: string}, gain: number}} Extra
  */
+
+/** @typedef {{picture: string, title: string}} Content of a pane */
 
 /** Draws a view of a scene, without handling events. */
 class Drawing {
@@ -77,7 +79,7 @@ class Drawing {
     this.context.restore();
   }
 
-  /** @param {Box} pane @param {any[]} content */
+  /** @param {Box} pane @param {Content[]} content */
   pane(pane, content) {
     this.clipped(pane, () => this.picture(pane, content.length === 1 ? content[0].picture : "reference"));
     if (content.length === 1) return;
@@ -150,7 +152,7 @@ class Drawing {
     if (this.view.pixel) this.mark(pane, this.view.pixel);
   }
 
-  /** @param {Box} pane @param {any} region @param {number} number */
+  /** @param {Box} pane @param {Region} region @param {number} number */
   region(pane, region, number) {
     const frame = this.frame(pane, [region.x, region.y, region.width, region.height]);
     this.outline(...frame, OVERLAY.box);
@@ -198,7 +200,7 @@ class Drawing {
     context.stroke();
   }
 
-  /** @param {Box} pane @param {any[]} content */
+  /** @param {Box} pane @param {Content[]} content */
   titles(pane, content) {
     const bottom = pane.top + pane.height - 23;
     this.label(content[0].title, pane.left + 6, bottom);
