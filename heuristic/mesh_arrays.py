@@ -144,11 +144,7 @@ def tried() -> str:
         raise InstallationError(f"{type(error).__name__}: {error}") from error
     if wrong:
         raise InstallationError(f"{', '.join(wrong)} of a mesh are read differently than written")
-    return (
-        "flat arrays"
-        if is_flat(mesh)
-        else "arrays of rows, which no release had when this was written"
-    )
+    return "flat arrays" if is_flat(mesh) else "tensors, unlike those of any tested version"
 
 
 def _array(values, name):

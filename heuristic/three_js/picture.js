@@ -1,7 +1,30 @@
 // Draws the scene in #scene with three.js into floats, and leaves them in the page as base64.
 import * as THREE from "three";
 
-/** @param {string} text @param {Function} type of array */
+/**
+ * What three_scene.py writes; arrays are base64.
+ * @typedef {object} Surface
+ * @property {"MeshPhongMaterial" | "MeshLambertMaterial"} type
+ * @property {boolean} flat
+ * @property {number[]} color
+ * @property {number[]} emissive
+ * @property {number[]} [specular]
+ * @property {number} [shininess]
+ *
+ * @typedef {object} Lamp
+ * @property {"DirectionalLight" | "PointLight" | "SpotLight"} type
+ * @property {number[]} color
+ * @property {number} intensity
+ * @property {number[]} position
+ * @property {number[]} [target]
+ * @property {number} [decay]
+ * @property {number} [angle]
+ *
+ * @typedef {{positions: string, normals: string | null, faces: string, material: Surface}} Shape
+ * @typedef {{width: number, height: number, view: number[][], projection: number[][], meshes: Shape[], lights: Lamp[]}} Given
+ */
+
+/** @param {string} text @param {Float32ArrayConstructor | Uint32ArrayConstructor} type */
 const decoded = (text, type) =>
   new type(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
 
@@ -15,8 +38,10 @@ function encoded(floats) {
   return btoa(text);
 }
 
+/** @param {number[]} channels */
 const colour = ([red, green, blue]) => new THREE.Color(red, green, blue);
 
+/** @param {Surface} given */
 function material(given) {
   const own = new THREE[given.type]({ side: THREE.DoubleSide, flatShading: given.flat });
   own.color = colour(given.color);
@@ -28,9 +53,10 @@ function material(given) {
   return own;
 }
 
+/** @param {Shape} given */
 function mesh(given) {
   const geometry = new THREE.BufferGeometry();
-  const add = (name, text) =>
+  const add = (/** @type {string} */ name, /** @type {string} */ text) =>
     geometry.setAttribute(name, new THREE.BufferAttribute(decoded(text, Float32Array), 3));
   add("position", given.positions);
   if (given.normals) add("normal", given.normals);
@@ -40,6 +66,7 @@ function mesh(given) {
   return made;
 }
 
+/** @param {Lamp} given @param {THREE.Scene} scene */
 function light(given, scene) {
   const made = new THREE[given.type](colour(given.color), given.intensity);
   if (given.decay !== undefined) made.decay = given.decay;
@@ -55,6 +82,7 @@ function light(given, scene) {
   scene.add(made);
 }
 
+/** @param {Given} given */
 function draw(given) {
   THREE.ColorManagement.enabled = false;
   const { width, height } = given;
@@ -84,7 +112,7 @@ function draw(given) {
 const told = document.createElement("pre");
 try {
   told.id = "picture";
-  told.textContent = draw(JSON.parse(document.getElementById("scene").textContent));
+  told.textContent = draw(JSON.parse(document.getElementById("scene")?.textContent ?? ""));
 } catch (error) {
   told.id = "error";
   told.textContent = String(error);

@@ -31,7 +31,7 @@ def written(report):
 
 
 def checked(written, folder):
-    """Return what the compiler says of the scripts, with data assigned to variables of its types."""
+    """Return what the compiler says of the scripts and of data, assigned to its types."""
     lines = [
         f"/** @type {{{kind}}} */ const own{kind} = {json.dumps(written[kind])};"
         for kind in written
