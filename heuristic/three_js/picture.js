@@ -3,25 +3,26 @@ import * as THREE from "three";
 
 /**
  * What three_scene.py writes; arrays are base64.
+ * @typedef {[number, number, number]} Triple
+ * @typedef {{positions: string, normals: string | null, faces: string, material: Surface}} Shape
+ * @typedef {{width: number, height: number, view: number[][], projection: number[][], meshes: Shape[], lights: Lamp[]}} Given
+ *
  * @typedef {object} Surface
  * @property {"MeshPhongMaterial" | "MeshLambertMaterial"} type
  * @property {boolean} flat
- * @property {number[]} color
- * @property {number[]} emissive
- * @property {number[]} [specular]
+ * @property {Triple} color
+ * @property {Triple} emissive
+ * @property {Triple} [specular]
  * @property {number} [shininess]
  *
  * @typedef {object} Lamp
  * @property {"DirectionalLight" | "PointLight" | "SpotLight"} type
- * @property {number[]} color
+ * @property {Triple} color
  * @property {number} intensity
- * @property {number[]} position
- * @property {number[]} [target]
+ * @property {Triple} position
+ * @property {Triple} [target]
  * @property {number} [decay]
  * @property {number} [angle]
- *
- * @typedef {{positions: string, normals: string | null, faces: string, material: Surface}} Shape
- * @typedef {{width: number, height: number, view: number[][], projection: number[][], meshes: Shape[], lights: Lamp[]}} Given
  */
 
 /** @param {string} text @param {Float32ArrayConstructor | Uint32ArrayConstructor} type */
@@ -38,17 +39,17 @@ function encoded(floats) {
   return btoa(text);
 }
 
-/** @param {number[]} channels */
-const colour = ([red, green, blue]) => new THREE.Color(red, green, blue);
+/** @param {Triple} channels */
+const colour = (channels) => new THREE.Color(...channels);
 
 /** @param {Surface} given */
 function material(given) {
   const own = new THREE[given.type]({ side: THREE.DoubleSide, flatShading: given.flat });
   own.color = colour(given.color);
   own.emissive = colour(given.emissive);
-  if (given.specular) {
+  if ("specular" in own && given.specular) {
     own.specular = colour(given.specular);
-    own.shininess = given.shininess;
+    own.shininess = given.shininess ?? own.shininess;
   }
   return own;
 }
@@ -69,13 +70,13 @@ function mesh(given) {
 /** @param {Lamp} given @param {THREE.Scene} scene */
 function light(given, scene) {
   const made = new THREE[given.type](colour(given.color), given.intensity);
-  if (given.decay !== undefined) made.decay = given.decay;
-  if (given.angle !== undefined) {
+  if ("decay" in made && given.decay !== undefined) made.decay = given.decay;
+  if ("angle" in made && given.angle !== undefined) {
     made.angle = given.angle;
     made.penumbra = 0;
   }
   made.position.set(...given.position);
-  if (made.target) {
+  if ("target" in made && given.target) {
     made.target.position.set(...given.target);
     scene.add(made.target);
   }
@@ -95,11 +96,11 @@ function draw(given) {
   given.lights.forEach((each) => light(each, scene));
   const camera = new THREE.Camera();
   camera.matrixAutoUpdate = false;
-  camera.matrixWorld.set(...given.view.flat()).invert();
+  camera.matrixWorld.fromArray(given.view.flat()).transpose().invert(); // given row by row
   camera.matrix.copy(camera.matrixWorld);
   camera.matrixWorldAutoUpdate = false;
   camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
-  camera.projectionMatrix.set(...given.projection.flat());
+  camera.projectionMatrix.fromArray(given.projection.flat()).transpose();
   camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
   renderer.setRenderTarget(target);
   renderer.clear();

@@ -84,8 +84,7 @@ def test_npm_packages_have_one_version_and_a_hash_and_no_address(folder):
     wanted = json.loads((ROOT / folder / "package.json").read_text("utf-8"))["dependencies"]
     text = (ROOT / folder / "package-lock.json").read_text("utf-8")
     packages = {name: each for name, each in json.loads(text)["packages"].items() if name}
-    assert packages.keys() == {f"node_modules/{name}" for name in wanted}
     for name, version in wanted.items():
         assert packages[f"node_modules/{name}"]["version"] == version
-        assert packages[f"node_modules/{name}"]["integrity"].startswith("sha512-")
+    assert all(each["integrity"].startswith("sha512-") for each in packages.values())
     assert "://" not in text

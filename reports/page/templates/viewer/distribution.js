@@ -7,6 +7,8 @@ class Distribution {
     this.panel = panel;
     this.viewer = viewer;
     this.shown = "";
+    /** @type {{painter: Painter | null, name: string, top: number, all: Summary} | undefined} */
+    this.kept = undefined;
     this.chart = /** @type {SVGElement} */ (panel.querySelector("svg"));
     this.listenToDrags();
     for (const field of this.fields()) field.addEventListener("change", () => this.lightTyped());

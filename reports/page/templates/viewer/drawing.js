@@ -22,6 +22,15 @@ class Drawing {
   constructor(canvas) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    // What `draw` was given last:
+    /** @type {View} */
+    this.view;
+    /** @type {Viewport} */
+    this.viewport;
+    /** @type {Painter} */
+    this.painter;
+    /** @type {Extra} */
+    this.extra;
   }
 
   /**
@@ -146,7 +155,7 @@ class Drawing {
 
   /** Regions, the selection and the marked pixel. @param {Box} pane */
   overlay(pane) {
-    const { regions, box } = /** @type {Extra} */ (this.extra);
+    const { regions, box } = this.extra;
     if (this.view.boxes) regions.forEach((region, place) => this.region(pane, region, place + 1));
     if (box) this.outline(...this.frame(pane, box), OVERLAY.selection);
     if (this.view.pixel) this.mark(pane, this.view.pixel);

@@ -12,7 +12,7 @@ function inspect(painter, scene, [x, y], view) {
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
   const flags = images.codes.flags[place];
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
-  const mapText = (map) => (hasRange(map) ? differenceText(map, painter.values(map.name)[place]) : "");
+  const mapText = (/** @type {Legend} */ map) => (hasRange(map) ? differenceText(map, painter.values(map.name)[place]) : "");
   return {
     position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
     ...coloursOf(painter, scene, place, view, "heuristic"),

@@ -62,7 +62,7 @@ function byId(id) {
 function arrive(id) {
   if (view.scene) {
     window.scrollTo(0, 0);
-    document.querySelector(".scene.open h2")?.focus({ preventScroll: true });
+    /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2"))?.focus({ preventScroll: true });
   } else {
     document.querySelector(`.card[data-scene="${CSS.escape(id)}"]`)?.scrollIntoView({ block: "center" });
   }

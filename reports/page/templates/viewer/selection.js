@@ -101,8 +101,8 @@ function withinBand(painter, map, box, [low, high]) {
  */
 function causesIn(painter, scene, map, box) {
   if (!scene.effects) {
-    const names = scene.regions.filter((region) => overlap(region, box)).map((region) => region.effect);
-    return [...new Set(names.filter(Boolean))].map((name) => ({ name, part: null }));
+    const names = scene.regions.filter((region) => overlap(region, box)).flatMap((region) => region.effect ?? []);
+    return [...new Set(names)].map((name) => ({ name, part: null }));
   }
   const { width, height } = painter.images;
   const values = painter.values(map.name);

@@ -138,8 +138,7 @@ function termsAt(scene, data, [x, y]) {
   const number = data.material[place] - 1;
   const at = (/** @type {string} */ name) => data.planes[name][place];
   const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
-  /** @type {Material | null} */
-  const material = terms.materials[number] ?? null;
+  const material = /** @type {Material | null} */ (terms.materials[number] ?? null);
   if (!material) return { pixel, material, number, cosView: 0, lights: [], total: [0, 0, 0] };
   const lights = terms.lights.map((light, index) =>
     lightTerms(light, material, at("cos_view"), (name) => at(`${index}.${name}`)));
@@ -169,7 +168,7 @@ function product(a, b) {
 
 /** The light that contributes most, or else faces the point most; null without lights. @param {LightTerms[]} lights @param {number[]} weights */
 function strongest(lights, weights) {
-  const worth = (light) =>
+  const worth = (/** @type {LightTerms} */ light) =>
     luminanceOf(light.diffuse, weights) + luminanceOf(light.specular, weights) + 1e-9 * light.cosIncidence;
   return lights.reduce((/** @type {LightTerms | null} */ best, light) => (best && worth(best) >= worth(light) ? best : light), null);
 }

@@ -95,7 +95,7 @@ function drawnVector(letter, x, y) {
   ];
 }
 
-/** Where V is in the plane of incidence: along the surface towards R, and along N. @param {LightTerms} light @param {number} cosView */
+/** Where V is in the plane of incidence: along the surface towards R, and along N. @param {LightTerms} light @param {number} cosView @returns {[number, number]} */
 function projectedView(light, cosView) {
   const sine = Math.sqrt(Math.max(0, 1 - light.cosIncidence ** 2));
   const along = (light.cosIncidence * cosView - light.cosView) / sine;
