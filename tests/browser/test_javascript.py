@@ -60,23 +60,15 @@ def test_the_types_of_data_are_those_of_what_python_writes(written, tmp_path):
 
 
 @compiler
-@pytest.mark.parametrize(
-    ("kind", "change", "complaint"),
-    [
-        (
-            "Page",
-            lambda data: data.update(epsilon="1"),
-            "'string' is not assignable to type 'number'",
-        ),
-        ("Page", lambda data: data.pop("xyz"), "'xyz' is missing"),
-        ("Page", lambda data: data["scenes"][0].update(unknown=1), "'unknown' does not exist"),
-        ("Board", lambda data: data["corners"][0].pop("time"), "'time' is missing"),
-    ],
-)
-def test_data_of_another_type_is_found(written, tmp_path, kind, change, complaint):
+def test_data_of_other_types_are_found(written, tmp_path):
     other = json.loads(json.dumps(written))
-    change(other[kind])
-    assert complaint in checked(other, tmp_path)
+    other["Page"]["epsilon"] = "1"
+    other["Lit"]["unknown"] = 1
+    del other["Board"]["corners"][0]["time"]
+    said = checked(other, tmp_path)
+    assert "Type 'string' is not assignable to type 'number'" in said
+    assert "does not exist in type 'Lit'" in said
+    assert "Property 'time' is missing" in said
 
 
 @pytest.mark.parametrize("folder", LOCKS)
