@@ -70,7 +70,7 @@ def rows(mesh: Mesh, part: Part) -> np.ndarray:
         return np.array(vectors(mesh, part)).T
     # Without Dr.Jit, which takes milliseconds: plans read thousands of meshes.
     flat = np.array(getattr(mesh, f"{part.flat}_buffer")())
-    return flat.reshape(-1, dr.size_v(getattr(mi, part.kind)))
+    return flat.reshape(-1, 2 if part is TEXCOORDS else 3)
 
 
 def made(

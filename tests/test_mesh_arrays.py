@@ -190,17 +190,17 @@ def test_the_doctor_tries_meshes(interface):
     assert doctor.meshed(mi.variant()).startswith("are made and read, as ")
 
 
-@pytest.mark.parametrize("fault", [ValueError("no such keyword"), None])
+@pytest.mark.parametrize("fault", ["no such keyword", ""])
 def test_the_doctor_says_what_breaks_if_meshes_differ(rgb, monkeypatch, fault):
     def changed(mesh, part):
         if fault:
-            raise fault
+            raise ValueError(fault)
         return np.zeros((3, 3))
 
     monkeypatch.setattr(mesh_arrays, "rows", changed)
     said = doctor.meshed(mi.variant())
     assert "scenes with meshes cannot be compared" in said
-    assert ("no such keyword" if fault else "positions, faces, normals, texcoords") in said
+    assert (fault or "positions, faces, normals, texcoords") in said
     with pytest.raises(InstallationError):
         mesh_arrays.tried()
 
