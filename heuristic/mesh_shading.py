@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import meshes
+from heuristic import mesh_arrays, meshes
 from heuristic.arrays import Colour, Interaction, Mask, Mesh, Number, Position, Scene
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation, barycentric_coordinates
@@ -245,17 +245,13 @@ def _store(mesh, interpolation, colour, back, count):
     values = [mi.Float(component) for component in colour] if is_colour else [mi.Float(colour)] * 3
     components = len(values)
     values += [mi.Float(0)] * (-components % BLOCK)
-    names = [_name(interpolation, back, block) for block in range(len(values) // BLOCK)]
-    for name in names:
-        if not mesh.has_attribute(name):
-            # Zeros, because this copies one by one; all, because Mitsuba does not check the length.
-            mesh.add_attribute(name, BLOCK, [0.0] * (BLOCK * count))
-    parameters = mi.traverse(mesh)
-    for block, name in enumerate(names):
-        # Terms that do not depend on the position are a single number until spread out.
-        triple = mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)]) + dr.zeros(mi.Float, count)
-        parameters[name] = dr.ravel(triple)
-    parameters.update()
+    # Terms that do not depend on the position are a single number until spread out.
+    triples = {
+        _name(interpolation, back, block): mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)])
+        + dr.zeros(mi.Float, count)
+        for block in range(len(values) // BLOCK)
+    }
+    mesh_arrays.store(mesh, triples)
     return components
 
 

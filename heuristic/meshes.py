@@ -8,6 +8,7 @@ the vertices. Call it after ``mitsuba.set_variant``.
 import drjit as dr
 import mitsuba as mi
 
+from heuristic import mesh_arrays
 from heuristic.arrays import Array, Direction, Mesh, Position, Shape
 from heuristic.errors import InputError
 from heuristic.interpolation import FINEST
@@ -86,20 +87,19 @@ def split_faces(mesh: Mesh) -> Mesh:
 
 def positions(mesh: Mesh) -> Position:
     """Return the positions of a mesh's vertices, as vectors."""
-    return dr.unravel(mi.Vector3f, mesh.vertex_positions_buffer())
+    return mesh_arrays.vectors(mesh, mesh_arrays.POSITIONS)
 
 
 def faces(mesh: Mesh) -> Array:
     """Return the vertex numbers of a mesh's faces, anticlockwise as seen from the outside."""
-    corners = dr.unravel(mi.Vector3u, mesh.faces_buffer())
+    corners = mesh_arrays.vectors(mesh, mesh_arrays.FACES)
     return corners.xzy if mesh.has_flipped_normals() else corners
 
 
 def texture_coordinates(mesh: Mesh) -> Array | None:
     """Return a mesh's texture coordinates, None if it has none."""
-    if not mesh.has_vertex_texcoords():
-        return None
-    return dr.unravel(mi.Point2f, mesh.vertex_texcoords_buffer())
+    part = mesh_arrays.TEXCOORDS
+    return mesh_arrays.vectors(mesh, part) if mesh_arrays.has(mesh, part) else None
 
 
 def face_normals(mesh: Mesh) -> Direction:
@@ -115,9 +115,9 @@ def normals(mesh: Mesh) -> Direction:
     InputError
         If it has none, and the faces at a vertex oppose each other.
     """
-    if not mesh.has_vertex_normals():
+    if not mesh_arrays.has(mesh, mesh_arrays.NORMALS):
         return _checked_normals(mesh, Weighting.ANGLE)
-    own = dr.unravel(mi.Vector3f, mesh.vertex_normals_buffer())
+    own = mesh_arrays.vectors(mesh, mesh_arrays.NORMALS)
     return -own if mesh.has_flipped_normals() else own
 
 
@@ -218,20 +218,7 @@ def _closed(kind, uv):
 
 def _build(original, points, vertex_normals, uv, corners):
     """Make a mesh from its arrays."""
-    mesh = mi.Mesh(
-        original.id(),
-        dr.width(points),
-        dr.width(corners),
-        has_vertex_normals=True,
-        has_vertex_texcoords=uv is not None,
-    )
+    mesh = mesh_arrays.made(original.id(), points, corners, vertex_normals, uv)
     mesh.set_id(original.id())
     mesh.set_bsdf(original.bsdf())
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = dr.ravel(points)
-    parameters["vertex_normals"] = dr.ravel(vertex_normals)
-    parameters["faces"] = dr.ravel(corners)
-    if uv is not None:
-        parameters["vertex_texcoords"] = dr.ravel(uv)
-    parameters.update()
     return mesh

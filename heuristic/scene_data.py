@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
+from heuristic import mesh_arrays, meshes
 from heuristic.errors import InputError
 from heuristic.light import PLUGINS
 from heuristic.materials import COEFFICIENTS, PHYSICAL
@@ -79,18 +79,16 @@ def camera(scene: mi.Scene) -> dict:
 def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Triangles:
     """Return a shape as the triangles of :func:`heuristic.meshes.to_mesh`."""
     mesh = meshes.to_mesh(shape, tessellation or meshes.RESOLUTION)
-    values = mi.traverse(mesh)
-    normals = not mesh.has_face_normals() and mesh.has_vertex_normals()
 
-    def rows(name: str, width: int) -> np.ndarray:
-        return np.array(values[name]).reshape(-1, width)
+    def own(part: mesh_arrays.Part) -> np.ndarray | None:
+        return mesh_arrays.rows(mesh, part) if mesh_arrays.has(mesh, part) else None
 
     return Triangles(
         shape.id(),
-        rows("vertex_positions", 3),
-        rows("vertex_normals", 3) if normals else None,
-        rows("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None,
-        rows("faces", 3),
+        mesh_arrays.rows(mesh, mesh_arrays.POSITIONS),
+        None if mesh.has_face_normals() else own(mesh_arrays.NORMALS),
+        own(mesh_arrays.TEXCOORDS),
+        mesh_arrays.rows(mesh, mesh_arrays.FACES),
         material,
     )
 

@@ -16,6 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from heuristic import mesh_arrays
 from heuristic.lights import DirectionalLight
 from heuristic.plugins.emitters import FAR
 
@@ -112,7 +113,7 @@ def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
     corners = [np.zeros((0, 3))]
     for shape in scene.shapes():
         if shape.is_mesh():
-            corners.append(np.array(shape.vertex_positions_buffer(), float).reshape(-1, 3))
+            corners.append(mesh_arrays.rows(shape, mesh_arrays.POSITIONS).astype(float))
         else:
             ends = shape.bbox().min, shape.bbox().max
             corners.append(np.array([np.ravel(end) for end in ends], float))

@@ -1,7 +1,31 @@
 // Draws the scene in #scene with three.js into floats, and leaves them in the page as base64.
 import * as THREE from "three";
 
-/** @param {string} text @param {Function} type of array */
+/**
+ * What three_scene.py writes; arrays are base64.
+ * @typedef {[number, number, number]} Triple
+ * @typedef {{positions: string, normals: string | null, faces: string, material: Surface}} Shape
+ * @typedef {{width: number, height: number, view: number[][], projection: number[][], meshes: Shape[], lights: Lamp[]}} Given
+ *
+ * @typedef {object} Surface
+ * @property {"MeshPhongMaterial" | "MeshLambertMaterial"} type
+ * @property {boolean} flat
+ * @property {Triple} color
+ * @property {Triple} emissive
+ * @property {Triple} [specular]
+ * @property {number} [shininess]
+ *
+ * @typedef {object} Lamp
+ * @property {"DirectionalLight" | "PointLight" | "SpotLight"} type
+ * @property {Triple} color
+ * @property {number} intensity
+ * @property {Triple} position
+ * @property {Triple} [target]
+ * @property {number} [decay]
+ * @property {number} [angle]
+ */
+
+/** @param {string} text @param {Float32ArrayConstructor | Uint32ArrayConstructor} type */
 const decoded = (text, type) =>
   new type(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
 
@@ -15,22 +39,25 @@ function encoded(floats) {
   return btoa(text);
 }
 
-const colour = ([red, green, blue]) => new THREE.Color(red, green, blue);
+/** @param {Triple} channels */
+const colour = (channels) => new THREE.Color(...channels);
 
+/** @param {Surface} given */
 function material(given) {
   const own = new THREE[given.type]({ side: THREE.DoubleSide, flatShading: given.flat });
   own.color = colour(given.color);
   own.emissive = colour(given.emissive);
-  if (given.specular) {
+  if ("specular" in own && given.specular) {
     own.specular = colour(given.specular);
-    own.shininess = given.shininess;
+    own.shininess = given.shininess ?? own.shininess;
   }
   return own;
 }
 
+/** @param {Shape} given */
 function mesh(given) {
   const geometry = new THREE.BufferGeometry();
-  const add = (name, text) =>
+  const add = (/** @type {string} */ name, /** @type {string} */ text) =>
     geometry.setAttribute(name, new THREE.BufferAttribute(decoded(text, Float32Array), 3));
   add("position", given.positions);
   if (given.normals) add("normal", given.normals);
@@ -40,21 +67,23 @@ function mesh(given) {
   return made;
 }
 
+/** @param {Lamp} given @param {THREE.Scene} scene */
 function light(given, scene) {
   const made = new THREE[given.type](colour(given.color), given.intensity);
-  if (given.decay !== undefined) made.decay = given.decay;
-  if (given.angle !== undefined) {
+  if ("decay" in made && given.decay !== undefined) made.decay = given.decay;
+  if ("angle" in made && given.angle !== undefined) {
     made.angle = given.angle;
     made.penumbra = 0;
   }
   made.position.set(...given.position);
-  if (made.target) {
+  if ("target" in made && given.target) {
     made.target.position.set(...given.target);
     scene.add(made.target);
   }
   scene.add(made);
 }
 
+/** @param {Given} given */
 function draw(given) {
   THREE.ColorManagement.enabled = false;
   const { width, height } = given;
@@ -67,11 +96,11 @@ function draw(given) {
   given.lights.forEach((each) => light(each, scene));
   const camera = new THREE.Camera();
   camera.matrixAutoUpdate = false;
-  camera.matrixWorld.set(...given.view.flat()).invert();
+  camera.matrixWorld.fromArray(given.view.flat()).transpose().invert(); // given row by row
   camera.matrix.copy(camera.matrixWorld);
   camera.matrixWorldAutoUpdate = false;
   camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
-  camera.projectionMatrix.set(...given.projection.flat());
+  camera.projectionMatrix.fromArray(given.projection.flat()).transpose();
   camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
   renderer.setRenderTarget(target);
   renderer.clear();
@@ -84,7 +113,7 @@ function draw(given) {
 const told = document.createElement("pre");
 try {
   told.id = "picture";
-  told.textContent = draw(JSON.parse(document.getElementById("scene").textContent));
+  told.textContent = draw(JSON.parse(document.getElementById("scene")?.textContent ?? ""));
 } catch (error) {
   told.id = "error";
   told.textContent = String(error);

@@ -7,7 +7,7 @@ from tempfile import mkdtemp
 
 import mitsuba as mi
 
-from heuristic import meshes
+from heuristic import mesh_arrays, meshes
 from heuristic.arrays import Scene
 from heuristic.errors import InputError, OutputError
 from heuristic.interpolation import Interpolation
@@ -58,7 +58,7 @@ def replace_shapes(
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:
                 mesh = meshes.split_faces(mesh)
-        elif not mesh.has_vertex_normals():
+        elif not mesh_arrays.has(mesh, mesh_arrays.NORMALS):
             mesh = meshes.with_vertex_normals(mesh)
         path = folder.path / f"{index}.ply"
         try:

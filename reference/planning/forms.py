@@ -4,13 +4,14 @@ Everything is computed in NumPy from a shape's data, since asking Mitsuba for su
 milliseconds per shape. The tests compare the normals with those found by Mitsuba's rays.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
+
+from heuristic import mesh_arrays
 
 ROUNDING = 1e-6
 """Share of a shape's size: dents below the resolution of single precision do not count."""
@@ -63,7 +64,7 @@ def geometries(shapes: Sequence[mi.Shape]) -> list[Geometry]:
             found[number] = _disk(shape)
         elif shape.is_mesh():
             size = shape.vertex_count(), shape.face_count()
-            smooth = shape.has_vertex_normals()
+            smooth = mesh_arrays.has(shape, mesh_arrays.NORMALS)
             if 0 < size[0] * size[1] <= LARGEST_MESH:
                 flat = kind == +mi.ShapeType.Rectangle
                 meshes.setdefault((*size, smooth, flat), []).append(number)
@@ -113,20 +114,18 @@ class Meshes:
     @classmethod
     def of(cls, meshes: Sequence[mi.Mesh], smooth: bool) -> "Meshes":
         """Return meshes of one size; if ``smooth``, they are shaded by normals at vertices."""
-        count = len(meshes)
 
-        def read(buffers: Iterable[Any], kind: type) -> np.ndarray:
-            return np.array([np.array(buffer) for buffer in buffers], kind).reshape(count, -1, 3)
+        def read(part: mesh_arrays.Part, kind: type) -> np.ndarray:
+            return np.array([mesh_arrays.rows(mesh, part) for mesh in meshes], kind)
 
-        points = read((mesh.vertex_positions_buffer() for mesh in meshes), float)
-        faces = read((mesh.faces_buffer() for mesh in meshes), int)
+        points, faces = read(mesh_arrays.POSITIONS, float), read(mesh_arrays.FACES, int)
         corners = [_taken(points, faces[..., i]) for i in range(3)]
         across = _cross(corners[1] - corners[0], corners[2] - corners[0])
         length = np.linalg.norm(across, axis=-1, keepdims=True)
         known = np.all(length > 0, axis=(1, 2))
         normals = across / np.where(length > 0, length, 1)
         if smooth:
-            own = read((mesh.vertex_normals_buffer() for mesh in meshes), float)
+            own = read(mesh_arrays.NORMALS, float)
             for i in range(3):
                 known &= np.all(_are_alike(_taken(own, faces[..., i]), normals), axis=1)
         # The flip turns normals of faces and of vertices alike.

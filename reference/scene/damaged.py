@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 import mitsuba as mi
 import numpy as np
 
+from heuristic import mesh_arrays
 from heuristic.errors import InputError
 from reference.scene.graph import Graph
 
@@ -74,10 +75,10 @@ def _fault_of_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
         mesh = mi.load_dict(description)
     except Exception:  # making the scene raises it again
         return ""
-    faces, count = np.array(mesh.faces_buffer()), mesh.vertex_count()
+    faces, count = mesh_arrays.rows(mesh, mesh_arrays.FACES), mesh.vertex_count()
     if len(faces) and faces.max() >= count:
         return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
-    lost = ~np.isfinite(np.array(mesh.vertex_positions_buffer()).reshape(-1, 3)).all(axis=1)
+    lost = ~np.isfinite(mesh_arrays.rows(mesh, mesh_arrays.POSITIONS)).all(axis=1)
     if lost.any():
         return (
             f"the position of vertex {lost.argmax()} is not finite, and that of"

@@ -2,7 +2,6 @@
 
 import platform
 from collections.abc import Iterable, Iterator
-from importlib import metadata
 
 import click
 
@@ -11,8 +10,7 @@ from heuristic import backend
 from heuristic.errors import InstallationError
 from heuristic.version import __version__
 from reports import jobs
-
-LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "flip-evaluator", "OpenEXR")
+from reports.terminal.version_lines import version_lines
 
 TIMEOUT_S = 300
 """Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
@@ -31,7 +29,7 @@ def doctor() -> None:
 
 
 def examine(variants: Iterable[str]) -> Iterator[str]:
-    """Yield lines on versions, LLVM, a test rendering for each variant, OpenGL and metrics.
+    """Yield lines on versions, LLVM, a test rendering for each variant, meshes, OpenGL and metrics.
 
     Raises
     ------
@@ -42,8 +40,7 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     """
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
-    for library in LIBRARIES:
-        yield f"{library:<15} {metadata.version(library)}"
+    yield from version_lines()
     info = backend.check()
     version = ".".join(map(str, info.version or ()))
     yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
@@ -52,6 +49,7 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
+        yield f"meshes          {pool.do(Task('meshes', meshed, (backend.VARIANTS[0],)))}"
         yield f"GLSL            {pool.do(Task('GLSL', shaded, ()))}"
         yield f"three.js        {pool.do(Task('three.js', drawn, ()))}"
         apart = pool.do(Task("colour differences", compared, ()))
@@ -68,6 +66,22 @@ def rendered(variant: str) -> str:
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
+
+
+def meshed(variant: str) -> str:
+    """Make and read a mesh, and return through which interface, or what breaks."""
+    from reference.scene.graph import set_variant
+
+    set_variant(variant)
+    from heuristic import mesh_arrays
+
+    try:
+        return f"are made and read, as {mesh_arrays.tried()}"
+    except InstallationError as error:
+        return (
+            f"cannot be made or read ({error}), so scenes with meshes cannot be compared. Install"
+            " the pinned version of Mitsuba: `./run` does."
+        )
 
 
 def shaded() -> str:

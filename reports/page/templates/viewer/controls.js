@@ -98,19 +98,19 @@ class Controls {
   }
 }
 
-/** The changes that a control makes; another map has other units. @param {HTMLInputElement} control @returns {Partial<View>} */
+/** The changes that a control makes; another map has other units. @param {{value: string, dataset: DOMStringMap}} control @returns {Partial<View>} */
 function changeOf({ value, dataset }) {
   if (dataset.control === "map") return { map: value, top: null, band: null };
   if (dataset.control === "top") return { top: value ? Number(value) : null, band: null };
   return { [dataset.control ?? ""]: dataset.control === "ev" ? Number(value) : value };
 }
 
-/** Whether a map's colours stand for values. @param {any} map */
+/** Whether a map's colours stand for values. @param {Legend} map */
 function hasRange(map) {
   return map.kind === "error" || map.kind === "ratio";
 }
 
-/** A map's labels, from its lower end to its upper one. @param {any} map @param {number} top */
+/** A map's labels, from its lower end to its upper one. @param {Legend} map @param {number} top */
 function labelsOf(map, top) {
   if (map.kind === "ratio") return [`≤ −${plainly(top)}`, "0", `≥ +${plainly(top)} stops`];
   return ["0", plainly(top / 2), `≥ ${plainly(top)}`];

@@ -2,7 +2,7 @@
 
 /**
  * @typedef {{name: string, digits: number, base: string | null}} Plane
- * @typedef {{width: number, height: number, block: number, planes: Plane[]}} Manifest
+ * @typedef {{width: number, height: number, block: number, planes: Plane[], data: string}} Manifest
  * @typedef {Manifest & {codes: Record<string, Uint16Array>}} Images
  */
 

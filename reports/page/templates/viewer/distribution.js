@@ -7,6 +7,8 @@ class Distribution {
     this.panel = panel;
     this.viewer = viewer;
     this.shown = "";
+    /** @type {{painter: Painter | null, name: string, top: number, all: Summary} | undefined} */
+    this.kept = undefined;
     this.chart = /** @type {SVGElement} */ (panel.querySelector("svg"));
     this.listenToDrags();
     for (const field of this.fields()) field.addEventListener("change", () => this.lightTyped());
@@ -45,7 +47,7 @@ class Distribution {
     this.part("actions").hidden = !box && !view.band;
   }
 
-  /** The whole image's numbers, kept until the map changes. @param {any} map @param {number} top @returns {Summary} */
+  /** The whole image's numbers, kept until the map changes. @param {Legend} map @param {number} top @returns {Summary} */
   whole(map, top) {
     const { painter } = this.viewer;
     if (this.kept?.painter !== painter || this.kept?.name !== map.name || this.kept?.top !== top) {
@@ -54,7 +56,7 @@ class Distribution {
     return this.kept.all;
   }
 
-  /** @param {any} map @param {number} top @param {Summary} all @param {Summary} some */
+  /** @param {Legend} map @param {number} top @param {Summary} all @param {Summary} some */
   showChart(map, top, all, some) {
     const tallest = Math.max(...all.bars, ...some.bars, 1e-9);
     this.part("all").setAttribute("d", outline(all.bars, tallest));
@@ -68,7 +70,7 @@ class Distribution {
     for (const bar of /** @type {NodeListOf<HTMLElement>} */ (this.panel.querySelectorAll("[data-bar]"))) bar.hidden = bar.dataset.bar !== map.kind;
   }
 
-  /** @param {any} map @param {number[] | null} box @param {number} whole the sum over the image */
+  /** @param {Legend} map @param {number[] | null} box @param {number} whole the sum over the image */
   showBand(map, box, whole) {
     const { band } = this.viewer.view;
     this.fields().forEach((field, place) => {
@@ -127,7 +129,7 @@ function outline(bars, tallest) {
   return `M0 100${bars.map((bar) => `V${height(bar)}h${step}`).join("")}V100Z`;
 }
 
-/** @param {any} map @param {Summary} found @returns {string[][]} */
+/** @param {Legend} map @param {Summary} found @returns {string[][]} */
 function linesOf(map, found) {
   return [
     ["Mean", differenceText(map, found.mean)],

@@ -11,8 +11,10 @@ const PRINTED_FROM = 40;
 
 /**
  * Besides the view: `map` with its `end` and the `measure` of bands, `gain` on the textbook's image.
- * @typedef {{swapped: boolean, regions: any[], box: number[] | null, map: any, gain: number}} Extra
+ * @typedef {{swapped: boolean, regions: Region[], box: number[] | null, map: Legend & {end: number, measure: string}, gain: number}} Extra
  */
+
+/** @typedef {{picture: string, title: string}} Content of a pane */
 
 /** Draws a view of a scene, without handling events. */
 class Drawing {
@@ -20,6 +22,15 @@ class Drawing {
   constructor(canvas) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    // What `draw` was given last:
+    /** @type {View} */
+    this.view;
+    /** @type {Viewport} */
+    this.viewport;
+    /** @type {Painter} */
+    this.painter;
+    /** @type {Extra} */
+    this.extra;
   }
 
   /**
@@ -77,7 +88,7 @@ class Drawing {
     this.context.restore();
   }
 
-  /** @param {Box} pane @param {any[]} content */
+  /** @param {Box} pane @param {Content[]} content */
   pane(pane, content) {
     this.clipped(pane, () => this.picture(pane, content.length === 1 ? content[0].picture : "reference"));
     if (content.length === 1) return;
@@ -144,13 +155,13 @@ class Drawing {
 
   /** Regions, the selection and the marked pixel. @param {Box} pane */
   overlay(pane) {
-    const { regions, box } = /** @type {Extra} */ (this.extra);
+    const { regions, box } = this.extra;
     if (this.view.boxes) regions.forEach((region, place) => this.region(pane, region, place + 1));
     if (box) this.outline(...this.frame(pane, box), OVERLAY.selection);
     if (this.view.pixel) this.mark(pane, this.view.pixel);
   }
 
-  /** @param {Box} pane @param {any} region @param {number} number */
+  /** @param {Box} pane @param {Region} region @param {number} number */
   region(pane, region, number) {
     const frame = this.frame(pane, [region.x, region.y, region.width, region.height]);
     this.outline(...frame, OVERLAY.box);
@@ -198,7 +209,7 @@ class Drawing {
     context.stroke();
   }
 
-  /** @param {Box} pane @param {any[]} content */
+  /** @param {Box} pane @param {Content[]} content */
   titles(pane, content) {
     const bottom = pane.top + pane.height - 23;
     this.label(content[0].title, pane.left + 6, bottom);

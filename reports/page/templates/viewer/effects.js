@@ -19,7 +19,7 @@ function effectName(effects, letter) {
   return effects?.names[Number(letter)] ?? "";
 }
 
-/** The canvas colour of each letter. @param {Effects | null} effects @param {any} page @returns {Record<string, number>} */
+/** The canvas colour of each letter. @param {Effects | null} effects @param {Page} page @returns {Record<string, number>} */
 function effectColours(effects, page) {
   const parts = (/** @type {string} */ css) => [1, 3, 5].map((place) => parseInt(css.slice(place, place + 2), 16));
   const pixel = (/** @type {number[]} */ [r, g, b]) => rgba(r, g, b);
@@ -27,7 +27,7 @@ function effectColours(effects, page) {
   return Object.fromEntries([...own, [NO_EFFECT, pixel(parts(page.noEffect))], [NOT_COUNTED, pixel(page.mask[2])]]);
 }
 
-/** Fills the legend with the effects of a scene. @param {HTMLElement} legend @param {Effects} effects @param {any} page */
+/** Fills the legend with the effects of a scene. @param {HTMLElement} legend @param {Effects} effects @param {Page} page */
 function listEffects(legend, effects, page) {
   const keys = effects.names.map((name, place) => [name, effects.colours[place]]);
   const line = /** @type {HTMLElement} */ (legend.querySelector(".keys"));

@@ -82,7 +82,7 @@ function fragmentOf(view) {
   return `#${String(parts).replaceAll("%2C", ",")}`;
 }
 
-/** @param {any} value */
+/** @param {unknown} value */
 function rounded(value) {
   return typeof value === "number" ? String(Number(value.toFixed(3))) : String(value);
 }

@@ -3,7 +3,7 @@
 /**
  * Texts for a pixel, by the names of their places in the page.
  * @param {Painter} painter
- * @param {any} scene
+ * @param {Scene} scene
  * @param {number[]} pixel in pixels of the image
  * @param {View} view gives the exposure and the tone map
  */
@@ -12,19 +12,19 @@ function inspect(painter, scene, [x, y], view) {
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
   const flags = images.codes.flags[place];
   const shown = (/** @type {string} */ name) => valueText(images, name, place);
-  const mapText = (/** @type {any} */ map) => (hasRange(map) ? differenceText(map, painter.values(map.name)[place]) : "");
+  const mapText = (/** @type {Legend} */ map) => (hasRange(map) ? differenceText(map, painter.values(map.name)[place]) : "");
   return {
     position: images.block > 1 ? `${x}, ${y}: mean of ${images.block} × ${images.block}` : `${x}, ${y}`,
     ...coloursOf(painter, scene, place, view, "heuristic"),
     ...coloursOf(painter, scene, place, view, "reference"),
-    ...Object.fromEntries(painter.page.maps.map((/** @type {any} */ map) => [map.name, mapText(map)])),
+    ...Object.fromEntries(painter.page.maps.map((map) => [map.name, mapText(map)])),
     standard_error: shown("standard_error"),
     significant: markText(flags),
     effect: effectAt(scene, x, y),
   };
 }
 
-/** A half's colour in each space, by the names of the half and the space. @param {Painter} painter @param {any} scene @param {number} place @param {View} view @param {string} half */
+/** A half's colour in each space, by the names of the half and the space. @param {Painter} painter @param {Scene} scene @param {number} place @param {View} view @param {string} half */
 function coloursOf(painter, scene, place, view, half) {
   const rgb = painter.channels(half).map((codes) => VALUES[codes[place]]);
   const gain = half === "heuristic" ? gainOf(scene, view) : 1;
@@ -49,13 +49,13 @@ function valueText(images, name, place) {
   return significant(decimal(images.codes[name][place], plane.digits), plane.digits);
 }
 
-/** The effect that dominates at a pixel, or else in its region; empty if unknown. @param {any} scene @param {number} x @param {number} y */
+/** The effect that dominates at a pixel, or else in its region; empty if unknown. @param {Scene} scene @param {number} x @param {number} y */
 function effectAt(scene, x, y) {
   if (scene.effects) {
     return effectName(scene.effects, letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height));
   }
   const inside = scene.regions.find(
-    (/** @type {any} */ region) =>
+    (region) =>
       x >= region.x && y >= region.y && x < region.x + region.width && y < region.y + region.height,
   );
   return inside?.effect ?? "";

@@ -7,7 +7,7 @@ function listenToKeys(viewer, turn, leave) {
     const options = [.../** @type {HTMLSelectElement} */ (viewer.element.querySelector(`[data-control=${control}]`)).options].filter((option) => !option.disabled);
     const place = options.findIndex((option) => option.value === String(viewer.view[control] ?? ""));
     const { value } = options[(place + 1) % options.length];
-    viewer.change(changeOf(/** @type {any} */ ({ value, dataset: { control } })));
+    viewer.change(changeOf({ value, dataset: { control } }));
   };
   const press = (/** @type {string} */ action) => viewer.controls.enabled(action) && viewer.act(action);
   const expose = (/** @type {number} */ stops) => viewer.controls.enabled("ev") && viewer.change({ ev: clamp(viewer.view.ev + stops, -8, 8) });

@@ -24,7 +24,7 @@ function drawPictures({ painter }) {
   for (const canvas of document.querySelectorAll(".scene.open canvas[data-picture]")) {
     const picture = /** @type {HTMLCanvasElement} */ (canvas);
     const name = picture.dataset.picture ?? "";
-    const map = painter.page.maps.find((/** @type {any} */ one) => one.name === name);
+    const map = painter.page.maps.find((one) => one.name === name);
     picture.getContext("2d")?.drawImage(map ? painter.map(name, map.top) : painter.rendering(name, "clip", 1), 0, 0);
   }
 }

@@ -20,7 +20,7 @@ function change(changes, passing = false) {
 function follow() {
   const before = view.scene;
   view = parseFragment(address.read());
-  if (!page.scenes.some((/** @type {any} */ scene) => scene.id === view.scene)) view.scene = "";
+  if (!page.scenes.some((scene) => scene.id === view.scene)) view.scene = "";
   show();
   if (view.scene !== before) arrive(view.scene || before);
 }
@@ -33,7 +33,7 @@ function begin() {
 }
 
 function show() {
-  const scene = page.scenes.find((/** @type {any} */ one) => one.id === view.scene);
+  const scene = page.scenes.find((one) => one.id === view.scene);
   document.documentElement.dataset.view = scene ? "scene" : "overview";
   const open = scene && sectionOf(scene.id);
   for (const section of document.querySelectorAll(".scene")) section.classList.toggle("open", section === open);
@@ -43,7 +43,7 @@ function show() {
   viewer.show(view);
 }
 
-/** @param {any} scene */
+/** @param {Scene} scene */
 function openScene(scene) {
   const section = byId(`scene=${scene.id}`);
   void terms.open(scene, section);
@@ -62,7 +62,7 @@ function byId(id) {
 function arrive(id) {
   if (view.scene) {
     window.scrollTo(0, 0);
-    document.querySelector(".scene.open h2")?.focus({ preventScroll: true });
+    /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2"))?.focus({ preventScroll: true });
   } else {
     document.querySelector(`.card[data-scene="${CSS.escape(id)}"]`)?.scrollIntoView({ block: "center" });
   }
@@ -70,8 +70,8 @@ function arrive(id) {
 
 /** @param {number} step */
 function turn(step) {
-  const seen = page.scenes.filter((/** @type {any} */ scene) => scene.images);
-  const place = seen.findIndex((/** @type {any} */ scene) => scene.id === view.scene);
+  const seen = page.scenes.filter((scene) => scene.images);
+  const place = seen.findIndex((scene) => scene.id === view.scene);
   const { mode, map, tone, top } = view;
   const next = seen[(place + step + seen.length) % seen.length];
   address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, top, scene: next.id }));

@@ -1,12 +1,14 @@
 // The overview: one order and one filter for cards and table.
 
-/** @param {HTMLElement} element @param {any[]} scenes @param {(changes: Partial<View>) => void} change */
+/** @typedef {Listed & {place: number, elements: HTMLElement[]}} Entry */
+
+/** @param {HTMLElement} element @param {Listed[]} scenes @param {(changes: Partial<View>) => void} change */
 function makeOverview(element, scenes, change) {
-  const entries = scenes.map((scene, place) => ({
-    ...scene,
-    place,
-    elements: [...element.querySelectorAll(`[data-scene="${CSS.escape(scene.id)}"]`)],
-  }));
+  const entries = scenes.map((scene, place) => {
+    /** @type {NodeListOf<HTMLElement>} */
+    const elements = element.querySelectorAll(`[data-scene="${CSS.escape(scene.id)}"]`);
+    return { ...scene, place, elements: [...elements] };
+  });
 
   /** @param {View} view */
   function show(view) {
@@ -15,7 +17,7 @@ function makeOverview(element, scenes, change) {
       const hidden = !isWanted(entry, view);
       for (const item of entry.elements) {
         item.hidden = hidden;
-        item.parentElement.append(item);
+        item.parentElement?.append(item);
       }
     }
     element.dataset.list = view.list;
@@ -52,7 +54,7 @@ function counted(scenes) {
 function byKey(sort) {
   const key = sort.replace(/^-/, "");
   const sign = sort.startsWith("-") ? -1 : 1;
-  return (/** @type {any} */ a, /** @type {any} */ b) => {
+  return (/** @type {Entry} */ a, /** @type {Entry} */ b) => {
     if (key === "name") return sign * a.name.localeCompare(b.name);
     const [first, second] = [a.keys?.[key], b.keys?.[key]];
     if (first === undefined || second === undefined) {
@@ -62,10 +64,10 @@ function byKey(sort) {
   };
 }
 
-/** @param {any} entry @param {View} view */
+/** @param {Entry} entry @param {View} view */
 function isWanted(entry, view) {
   const named = entry.name.toLowerCase().includes(view.q.trim().toLowerCase());
-  return named && (!view.only || Boolean(entry[view.only]));
+  return named && (!view.only || Boolean(entry[/** @type {"failed" | "significant"} */ (view.only)]));
 }
 
 /** @param {HTMLElement} element @param {View} view */

@@ -23,7 +23,7 @@ class Painter {
   /**
    * @param {Images} images
    * @param {number} exposure the comparison's factor
-   * @param {any} page the page's data of maps: colours, maps, luminance
+   * @param {Page} page the page's data of maps: colours, maps, luminance
    * @param {Effects | null} effects the dominating effects, if known
    */
   constructor(images, exposure, page, effects) {

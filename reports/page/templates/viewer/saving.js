@@ -10,7 +10,7 @@ function savePicture({ canvas, view, viewport, scene }) {
   });
 }
 
-/** Scene, mode, any map, and region: the selection, or else the visible part of a zoomed image. @param {View} view @param {Viewport} viewport @param {any} scene */
+/** Scene, mode, any map, and region: the selection, or else the visible part of a zoomed image. @param {View} view @param {Viewport} viewport @param {Scene} scene */
 function pictureName(view, viewport, scene) {
   const parts = [scene.id, view.mode];
   if (view.mode === "side" || view.mode === "error") parts.push(view.map);

@@ -13,7 +13,7 @@ function rangesOf(map) {
   return RANGES.map((factor) => Number((factor * map.top).toPrecision(3)));
 }
 
-/** The least range that holds 95 % of the counted pixels, found once for each map. @param {Painter} painter @param {any} map */
+/** The least range that holds 95 % of the counted pixels, found once for each map. @param {Painter} painter @param {Legend} map */
 function automaticRange(painter, map) {
   const known = painter.ranges.get(map.name);
   if (known) return known;
@@ -25,7 +25,7 @@ function automaticRange(painter, map) {
   return range;
 }
 
-/** The values at the ends of a map's colours. @param {any} map @param {number} top */
+/** The values at the ends of a map's colours. @param {Legend} map @param {number} top */
 function endsOf(map, top) {
   return [map.kind === "ratio" ? -top : 0, top];
 }
@@ -35,7 +35,7 @@ function endsOf(map, top) {
  * pixels and of its departure (the sum of the metric's size), and the part of them in each bar; the
  * outer bars include values beyond.
  * @param {Painter} painter
- * @param {any} map
+ * @param {Legend} map
  * @param {number} top
  * @param {number[] | null} box
  * @param {{count: number, size: number}} [all] the whole image's, for a rectangle
@@ -78,7 +78,7 @@ function boxBetween(from, to) {
   return [...start, ...from.map((value, axis) => Math.abs(value - to[axis]) + 1)];
 }
 
-/** Counted pixels of a rectangle within a band of values, and the sum of their sizes. @param {Painter} painter @param {any} map @param {number[] | null} box @param {number[]} band */
+/** Counted pixels of a rectangle within a band of values, and the sum of their sizes. @param {Painter} painter @param {Legend} map @param {number[] | null} box @param {number[]} band */
 function withinBand(painter, map, box, [low, high]) {
   const values = painter.values(map.name);
   let count = 0, size = 0;
@@ -94,15 +94,15 @@ function withinBand(painter, map, box, [low, high]) {
  * Effects in a rectangle: the part of its departure where each of them dominates, largest first.
  * Without a map of effects, those of the regions that it overlaps, without parts.
  * @param {Painter} painter
- * @param {any} scene
- * @param {any} map
+ * @param {Scene} scene
+ * @param {Legend} map
  * @param {number[]} box
  * @returns {{name: string, part: number | null}[]}
  */
 function causesIn(painter, scene, map, box) {
   if (!scene.effects) {
-    const names = scene.regions.filter((/** @type {any} */ region) => overlap(region, box)).map((/** @type {any} */ region) => region.effect);
-    return [...new Set(names.filter(Boolean))].map((name) => ({ name, part: null }));
+    const names = scene.regions.filter((region) => overlap(region, box)).flatMap((region) => region.effect ?? []);
+    return [...new Set(names)].map((name) => ({ name, part: null }));
   }
   const { width, height } = painter.images;
   const values = painter.values(map.name);
@@ -120,7 +120,7 @@ function causesIn(painter, scene, map, box) {
     .sort((a, b) => b.part - a.part);
 }
 
-/** @param {any} region @param {number[]} box */
+/** @param {Region} region @param {number[]} box */
 function overlap(region, [x, y, w, h]) {
   return region.x < x + w && x < region.x + region.width && region.y < y + h && y < region.y + region.height;
 }

@@ -2,7 +2,7 @@
 
 /** CIE XYZ (display white has Y = 1) of linear BT.709. @param {number[]} rgb @returns {number[]} */
 function xyzOf(rgb) {
-  return page.xyz.map((/** @type {number[]} */ row) => row.reduce((sum, weight, channel) => sum + weight * rgb[channel], 0));
+  return page.xyz.map((row) => row.reduce((sum, weight, channel) => sum + weight * rgb[channel], 0));
 }
 
 /** CIE L*a*b* (D65) of linear RGB as a display shows it: exposed, then clipped. @param {number[]} rgb @param {number} exposure */

@@ -37,7 +37,7 @@ function colourText(colour) {
   return texts.every((text) => text === texts[0]) ? texts[0] : `(${texts.join(", ")})`;
 }
 
-/** @param {any} point */
+/** @param {TermsPoint} point */
 function termRows(point) {
   const { material } = point;
   const rows = [];
@@ -48,7 +48,7 @@ function termRows(point) {
   return rows;
 }
 
-/** @param {any} light @param {any} material */
+/** @param {LightTerms} light @param {Material} material */
 function lightRows(light, material) {
   const arriving = `${colourText(light.intensity)} × ${factor(light.attenuation)}`;
   const isLit = light.cosIncidence > 0;
@@ -63,7 +63,7 @@ function lightRows(light, material) {
   ];
 }
 
-/** The sum of the terms, and the reference. @param {any} point @param {Images} images */
+/** The sum of the terms, and the reference. @param {AnyPoint} point @param {Images} images */
 function sumRows(point, images) {
   const [x, y] = point.pixel;
   const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
@@ -73,7 +73,7 @@ function sumRows(point, images) {
   return rows;
 }
 
-/** @param {any} light @param {number} cosView */
+/** @param {LightTerms | null} light @param {number} cosView */
 function vectorsInWords(light, cosView) {
   const angle = (/** @type {number} */ cosine) => `${degreesOf(cosine).toFixed(0)}°`;
   if (!light) return `The viewer is ${angle(cosView)} from the normal; there is no light.`;
@@ -81,7 +81,7 @@ function vectorsInWords(light, cosView) {
   return `L is ${angle(light.cosIncidence)} from N, V ${angle(cosView)}${between}.`;
 }
 
-/** @param {any} light @param {any} point @param {number} top of the lobes, 0 without them @param {boolean} cut */
+/** @param {LightTerms | null} light @param {TermsPoint} point @param {number} top of the lobes, 0 without them @param {boolean} cut */
 function captionOf(light, point, top, cut) {
   const words = document.createElement("p");
   words.textContent = vectorsInWords(light, point.cosView);

@@ -3,34 +3,44 @@
 /** The largest code of the grid; see reports/page/terms_view.py. */
 const LARGEST_CODE = 65535;
 
+/**
+ * @typedef {Awaited<ReturnType<typeof termsOf>>} TermsData
+ * @typedef {ReturnType<typeof lightTerms>} LightTerms
+ * @typedef {ReturnType<typeof termsAt>} AnyPoint of a surface or the background
+ * @typedef {Extract<AnyPoint, {material: Material}>} TermsPoint
+ */
+
 class TermsPanel {
-  /** @param {HTMLElement} panel @param {any} page */
+  /** @param {HTMLElement} panel @param {Page} page */
   constructor(panel, page) {
     this.panel = panel;
     this.weights = page.xyz[1];
-    /** @type {any} */
+    /** @type {Scene | null} */
     this.scene = null;
+    /** @type {TermsData | null} */
+    this.data = null;
+    /** @type {number[] | null} */
+    this.asked = null;
     document.addEventListener("pick", (event) => {
       const { scene, pixel } = /** @type {CustomEvent} */ (event).detail;
       if (pixel && scene === this.scene?.id) this.show(pixel);
     });
   }
 
-  /** Move into a scene's section, and show its first pixel. @param {any} scene @param {HTMLElement} section */
+  /** Move into a scene's section, and show its first pixel. @param {Scene} scene @param {HTMLElement} section */
   async open(scene, section) {
+    const { terms } = scene;
     this.scene = scene;
-    this.data = null;
-    /** @type {number[] | null} */
-    this.asked = null;
-    this.panel.hidden = !scene.terms;
-    if (!scene.terms) return;
+    this.data = this.asked = null;
+    this.panel.hidden = !terms;
+    if (!terms) return;
     section.querySelector(".stage")?.after(this.panel);
-    this.part("missing").hidden = !scene.terms.missing;
-    this.part("missing").textContent = `No terms. ${scene.terms.missing}`;
-    this.part("whole").hidden = Boolean(scene.terms.missing);
+    this.part("missing").hidden = !terms.missing;
+    this.part("missing").textContent = `No terms. ${terms.missing}`;
+    this.part("whole").hidden = !terms.grid;
     this.part("place").textContent = "";
-    if (scene.terms.missing) return;
-    const data = await termsOf(scene);
+    if (!terms.grid) return;
+    const data = await termsOf(scene, terms, terms.grid);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.data = data;
     this.show(this.asked ?? firstPixel(scene, data));
@@ -39,16 +49,16 @@ class TermsPanel {
   /** @param {number[]} pixel */
   show(pixel) {
     this.asked = pixel;
-    if (!this.data) return;
+    if (!this.scene || !this.data) return;
     const point = termsAt(this.scene, this.data, pixel);
     const [x, y] = point.pixel;
     this.part("place").textContent = `at ${x}, ${y}${point.material ? `: ${point.material.name}` : ""}`;
-    this.drawFigure(point);
-    this.listTerms(point);
+    this.drawFigure(point, this.data);
+    this.listTerms(point, this.scene);
   }
 
-  /** @param {any} point */
-  drawFigure(point) {
+  /** @param {AnyPoint} point @param {TermsData} data */
+  drawFigure(point, data) {
     const svg = /** @type {SVGElement} */ (this.panel.querySelector("svg"));
     const caption = /** @type {HTMLElement} */ (this.panel.querySelector("figcaption"));
     if (!point.material) {
@@ -59,20 +69,19 @@ class TermsPanel {
     const light = strongest(point.lights, this.weights);
     const isLit = light && light.cosIncidence > 0;
     const incidence = light ? degreesOf(light.cosIncidence) : 0;
-    const table = this.data?.lobes[point.number];
+    const table = data.lobes[point.number];
     const lobes = isLit && table && {
       textbook: textbookLobe(point.material, incidence, this.weights),
-      physical: physicalLobe(this.scene.terms, table, incidence),
+      physical: physicalLobe(data.terms, table, incidence),
     };
     const { top, cut } = drawVectors(svg, light, point.cosView, lobes || null);
     svg.setAttribute("aria-label", vectorsInWords(light, point.cosView));
     caption.replaceChildren(...captionOf(light, point, lobes ? top : 0, cut));
   }
 
-  /** @param {any} point */
-  listTerms(point) {
+  /** @param {AnyPoint} point @param {Scene} scene */
+  listTerms(point, scene) {
     const [list, sums] = this.panel.querySelectorAll("tbody");
-    const { scene } = this;
     list.replaceChildren(...(point.material ? termRows(point) : []));
     void imagesOf(scene.id, scene.images).then((images) => {
       if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
@@ -85,9 +94,9 @@ class TermsPanel {
   }
 }
 
-/** Planes of a scene's grid as numbers, and the lobes of its materials. @param {any} scene */
-async function termsOf(scene) {
-  const { grid, lobes, tops } = scene.terms;
+/** Planes of a scene's grid as numbers, and the lobes of its materials. @param {Scene} scene @param {Terms} terms @param {Manifest} grid */
+async function termsOf(scene, terms, grid) {
+  const { lobes, tops } = terms;
   const { codes } = await imagesOf(`terms-${scene.id}`, grid);
   const table = lobes ? (await decode(lobes, lobes.data)).codes : {};
   const values = (/** @type {string} */ name, /** @type {Uint16Array} */ plane) =>
@@ -96,14 +105,16 @@ async function termsOf(scene) {
   /** @type {Record<string, Float64Array>} */
   const planes = Object.fromEntries(Object.entries(codes).map(([name, plane]) => [name, values(name, plane)]));
   return {
+    terms,
+    grid,
     material: codes.material,
     planes,
-    lobes: scene.terms.materials.map((/** @type {any} */ _, /** @type {number} */ number) =>
+    lobes: terms.materials.map((_, number) =>
       values(`physical.${number}`, table[`physical.${number}`] ?? new Uint16Array())),
   };
 }
 
-/** The middle of the largest region if it shows a surface, or else of the picture. @param {any} scene @param {any} data */
+/** The middle of the largest region if it shows a surface, or else of the picture. @param {Scene} scene @param {TermsData} data */
 function firstPixel(scene, data) {
   const [region] = scene.regions;
   const inside = region && [region.x + (region.width >> 1), region.y + (region.height >> 1)];
@@ -113,13 +124,13 @@ function firstPixel(scene, data) {
 
 /**
  * The terms at the point of the grid nearest to a pixel; `material` is null on the background.
- * @param {any} scene
- * @param {any} data
+ * @param {Scene} scene
+ * @param {TermsData} data
  * @param {number[]} pixel
  */
 function termsAt(scene, data, [x, y]) {
-  const { terms } = scene;
-  const { width, height } = terms.grid;
+  const { terms } = data;
+  const { width, height } = data.grid;
   const column = Math.floor((x * width) / scene.width), row = Math.floor((y * height) / scene.height);
   const middle = (/** @type {number} */ cell, /** @type {number} */ count, /** @type {number} */ side) =>
     Math.floor(((2 * cell + 1) * side) / (2 * count));
@@ -127,21 +138,21 @@ function termsAt(scene, data, [x, y]) {
   const number = data.material[place] - 1;
   const at = (/** @type {string} */ name) => data.planes[name][place];
   const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
-  const material = terms.materials[number] ?? null;
+  const material = /** @type {Material | null} */ (terms.materials[number] ?? null);
   if (!material) return { pixel, material, number, cosView: 0, lights: [], total: [0, 0, 0] };
-  const lights = terms.lights.map((/** @type {any} */ light, /** @type {number} */ index) =>
+  const lights = terms.lights.map((light, index) =>
     lightTerms(light, material, at("cos_view"), (name) => at(`${index}.${name}`)));
   const ambient = product(material.ambient, material.k_a);
   const others = "others.R" in data.planes ? ["R", "G", "B"].map((colour) => at(`others.${colour}`)) : null;
-  const parts = [material.k_i, ambient, ...(others ? [others] : []), ...lights.flatMap((/** @type {any} */ light) => [light.diffuse, light.specular])];
+  const parts = [material.k_i, ambient, ...(others ? [others] : []), ...lights.flatMap((light) => [light.diffuse, light.specular])];
   const total = parts.reduce((sum, part) => sum.map((/** @type {number} */ value, /** @type {number} */ channel) => value + part[channel]));
   return { pixel, material, number, cosView: at("cos_view"), ambient, lights, others, total };
 }
 
-/** @param {any} light @param {any} material @param {number} normalView @param {(name: string) => number} at */
+/** @param {Lamp} light @param {Material} material @param {number} normalView @param {(name: string) => number} at */
 function lightTerms(light, material, normalView, at) {
   const [attenuation, cosIncidence, cosView, lobe] = ["attenuation", "cos_incidence", "cos_view", "lobe"].map(at);
-  const arriving = light.intensity.map((/** @type {number} */ value) => value * attenuation);
+  const arriving = light.intensity.map((value) => value * attenuation);
   return {
     ...light, attenuation, cosIncidence, cosView, lobe,
     cosReflection: 2 * cosIncidence * normalView - cosView,
@@ -155,9 +166,9 @@ function product(a, b) {
   return a.map((value, channel) => value * b[channel]);
 }
 
-/** The light that contributes most, or else faces the point most; null without lights. @param {any[]} lights @param {number[]} weights */
+/** The light that contributes most, or else faces the point most; null without lights. @param {LightTerms[]} lights @param {number[]} weights */
 function strongest(lights, weights) {
-  const worth = (/** @type {any} */ light) =>
+  const worth = (/** @type {LightTerms} */ light) =>
     luminanceOf(light.diffuse, weights) + luminanceOf(light.specular, weights) + 1e-9 * light.cosIncidence;
-  return lights.reduce((best, light) => (best && worth(best) >= worth(light) ? best : light), null);
+  return lights.reduce((/** @type {LightTerms | null} */ best, light) => (best && worth(best) >= worth(light) ? best : light), null);
 }

@@ -22,7 +22,7 @@ function degreesOf(cosine) {
 
 /**
  * The textbook's lobe in the plane of incidence.
- * @param {any} material
+ * @param {Material} material
  * @param {number} incidence degrees
  * @param {number[]} weights of red, green and blue in luminance
  * @returns {number[][]} pairs of degrees and a value
@@ -40,7 +40,7 @@ function textbookLobe(material, incidence, weights) {
 
 /**
  * The physical lobe, interpolated between the tabulated incidences.
- * @param {any} terms the scene's
+ * @param {Terms} terms the scene's
  * @param {Float64Array} table incidences times views
  * @param {number} incidence degrees
  * @returns {number[][]}
@@ -67,7 +67,7 @@ function highest(lobe) {
   return Math.max(0, ...lobe.map(([, value]) => value));
 }
 
-/** @param {string} name @param {Record<string, any>} attributes @param {string} text */
+/** @param {string} name @param {Record<string, string | number>} attributes @param {string} text */
 function drawn(name, attributes, text = "") {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
@@ -95,7 +95,7 @@ function drawnVector(letter, x, y) {
   ];
 }
 
-/** Where V is in the plane of incidence: along the surface towards R, and along N. @param {any} light @param {number} cosView */
+/** Where V is in the plane of incidence: along the surface towards R, and along N. @param {LightTerms} light @param {number} cosView @returns {[number, number]} */
 function projectedView(light, cosView) {
   const sine = Math.sqrt(Math.max(0, 1 - light.cosIncidence ** 2));
   const along = (light.cosIncidence * cosView - light.cosView) / sine;
@@ -105,7 +105,7 @@ function projectedView(light, cosView) {
 /**
  * Draw the figure of a point, for the light that contributes most.
  * @param {SVGElement} svg
- * @param {any} light with its cosines, or null
+ * @param {LightTerms | null} light with its cosines, or null
  * @param {number} cosView
  * @param {{textbook: number[][], physical: number[][]} | null} lobes
  * @returns {{top: number, cut: boolean}} the value of the longest radius, and whether a lobe is longer

@@ -5,7 +5,7 @@ class Viewer {
    * @param {HTMLElement} element the canvas and its controls
    * @param {HTMLElement} panel the pixel inspector
    * @param {HTMLElement} brushing the panel of the selection
-   * @param {any} page
+   * @param {Page} page
    * @param {(changes: Partial<View>, passing?: boolean) => void} change requests a view of the page
    */
   constructor(element, panel, brushing, page, change) {
@@ -16,6 +16,8 @@ class Viewer {
     this.canvas = /** @type {HTMLCanvasElement} */ (element.querySelector("canvas"));
     this.drawing = new Drawing(this.canvas);
     this.viewport = new Viewport(1, 1);
+    /** The open one. @type {Scene} */
+    this.scene;
     /** @type {View} */
     this.view = DEFAULT_VIEW;
     /** @type {Painter | null} */
@@ -33,7 +35,7 @@ class Viewer {
     new ResizeObserver(() => this.redraw()).observe(element);
   }
 
-  /** Open a scene in its section of the page. @param {any} scene @param {HTMLElement} section */
+  /** Open a scene in its section of the page. @param {Scene} scene @param {HTMLElement} section */
   async open(scene, section) {
     this.scene = scene;
     this.painter = null;
@@ -63,7 +65,7 @@ class Viewer {
 
   /** @param {View} view */
   show(view) {
-    const known = mapOf(this.page, view.map) && (view.map !== "effects" || this.scene.effects);
+    const known = this.page.maps.some((map) => map.name === view.map) && (view.map !== "effects" || this.scene.effects);
     this.view = known ? view : { ...view, map: DEFAULT_VIEW.map };
     this.element.dataset.mode = view.mode;
     this.controls.show();

@@ -1,0 +1,82 @@
+"""The scripts' JSDoc types: of the data that the page holds, and the compiler that checks them."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from urllib.request import url2pathname
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+COMPILER = ROOT / "tests/javascript/node_modules/.bin/tsc"
+SCRIPTS = ROOT / "reports/page/templates/viewer"
+LOCKS = ["heuristic/three_js", "tests/javascript"]
+
+compiler = pytest.mark.skipif(not COMPILER.exists(), reason="npm ci --prefix tests/javascript")
+
+JSON = re.compile(r'<script type="application/json"[^>]*>(.*?)</script>', re.DOTALL)
+
+
+@pytest.fixture(scope="session")
+def written(report):
+    """The data of the page's scripts, by the name of its type."""
+    html = Path(url2pathname(report.url.removeprefix("file://"))).read_text(encoding="utf-8")
+    named = {"scenes": "Page", "corners": "Board", "picture": "Lit"}
+    found = {}
+    for data in map(json.loads, JSON.findall(html)):
+        found |= {kind: data for key, kind in named.items() if key in data}
+    assert {*found} == {*named.values()}
+    return found
+
+
+def checked(written, folder):
+    """Return what the compiler says of the scripts and of data, assigned to its types."""
+    lines = [
+        f"/** @type {{{kind}}} */ const own{kind} = {json.dumps(written[kind])};"
+        for kind in written
+    ]
+    (folder / "written.js").write_text("\n".join(lines), encoding="utf-8")
+    project = {
+        "extends": str(ROOT / "tests/javascript/tsconfig.json"),
+        "include": [str(SCRIPTS / "*.js"), "written.js"],
+    }
+    (folder / "tsconfig.json").write_text(json.dumps(project), encoding="utf-8")
+    words = [str(COMPILER), "--project", str(folder)]
+    return subprocess.run(words, capture_output=True, text=True, timeout=120).stdout
+
+
+@compiler
+def test_the_types_of_data_are_those_of_what_python_writes(written, tmp_path):
+    scenes = written["Page"]["scenes"]
+    assert {bool(scene.get("terms") and scene["terms"]["grid"]) for scene in scenes} == {
+        True,
+        False,
+    }
+    assert any(scene.get("effects") for scene in scenes)
+    assert any(scene.get("regions") for scene in scenes)
+    assert any(scene.get("failed") for scene in scenes)
+    assert checked(written, tmp_path) == ""
+
+
+@compiler
+def test_data_of_other_types_are_found(written, tmp_path):
+    other = json.loads(json.dumps(written))
+    other["Page"]["epsilon"] = "1"
+    other["Lit"]["unknown"] = 1
+    del other["Board"]["corners"][0]["time"]
+    said = checked(other, tmp_path)
+    assert "Type 'string' is not assignable to type 'number'" in said
+    assert "does not exist in type 'Lit'" in said
+    assert "Property 'time' is missing" in said
+
+
+@pytest.mark.parametrize("folder", LOCKS)
+def test_npm_packages_have_one_version_and_a_hash_and_no_address(folder):
+    wanted = json.loads((ROOT / folder / "package.json").read_text("utf-8"))["dependencies"]
+    text = (ROOT / folder / "package-lock.json").read_text("utf-8")
+    packages = {name: each for name, each in json.loads(text)["packages"].items() if name}
+    for name, version in wanted.items():
+        assert packages[f"node_modules/{name}"]["version"] == version
+    assert all(each["integrity"].startswith("sha512-") for each in packages.values())
+    assert "://" not in text
