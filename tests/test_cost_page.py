@@ -7,7 +7,8 @@ import jsonschema
 import pytest
 from msgspec import structs
 
-from reports.page import cost_overview, page
+from reports.page import page
+from reports.page.costs import cost_overview
 from reports.page.scene_view import SceneView
 from reports.run import cost_files, output
 from reports.run.stages import Run

@@ -1,6 +1,6 @@
 """Study what accuracy costs on one scene."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from comparisons.cost.judging import judged
 from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
 from comparisons.cost.prediction.target import Size, require
+from comparisons.cost.timing import Key
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -46,8 +47,8 @@ class Study:
     ----------
     record
         The contents of files, tables and charts.
-    rungs
-        ``{rung name: (H, W, 3)}``, with the most samples.
+    points
+        ``{(rung name, samples per pixel): (H, W, 3)}``: one rendering of each measured point.
     parts
         ``{part: (H, W, 3)}``, signed and linear.
     difference
@@ -67,7 +68,7 @@ class Study:
     """
 
     record: Cost
-    rungs: dict[str, np.ndarray]
+    points: Mapping[Key, np.ndarray]
     parts: dict[str, np.ndarray]
     difference: np.ndarray
     effects: dict[str, np.ndarray]
@@ -76,6 +77,11 @@ class Study:
     reference: np.ndarray
     counted: np.ndarray
     previews: dict
+
+    @property
+    def rungs(self) -> dict[str, np.ndarray]:
+        """``{rung name: (H, W, 3)}``, with the most samples."""
+        return {name: image for (name, _), image in self.points.items()}
 
 
 def cost(
@@ -162,7 +168,7 @@ def cost(
     )
     return Study(
         record=made,
-        rungs={name: image for (name, _), image in found.images.items()},
+        points=found.images,
         parts={part.name: image for part, image in parts},
         difference=difference,
         effects=priced.maps,

@@ -12,6 +12,7 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page import switchboard
+from reports.page.costs import point_pictures
 from reports.page.embedding import Embedded
 from reports.page.lit import Lit
 from reports.page.switchboard import Sheet
@@ -29,13 +30,18 @@ class EffectMap(Record):
 
 
 class CostView(Record):
-    """A page's data of a study; ``images`` are PNG files by name without suffix."""
+    """A page's data of a study.
+
+    ``images`` are PNG files by name without suffix; ``sheet`` has the corners of the lattice,
+    ``points`` the measured points and then the reference.
+    """
 
     record: Cost
     images: dict[str, bytes]
     noise: str
     effects: EffectMap
     sheet: Sheet | None = None
+    points: Sheet | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""
@@ -45,6 +51,11 @@ class CostView(Record):
     def switchboard(self) -> dict[str, Any]:
         """The data of the switchboard's script; empty without a sheet."""
         return switchboard.data(self.record, self.sheet) if self.sheet else {}
+
+    @property
+    def measured(self) -> dict[str, Any]:
+        """The data of the script that shows the points' pictures; empty without them."""
+        return point_pictures.data(self.record, self.points) if self.points else {}
 
 
 class SceneView(Record):

@@ -11,7 +11,9 @@ from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.page import switchboard
+from reports.page.costs import point_pictures
 from reports.page.scene_view import CostView, EffectMap, picture_name
+from reports.run.places import PAGE
 from reports.terminal.cost_tables import closure, noise
 
 if TYPE_CHECKING:
@@ -54,12 +56,16 @@ def documents(study: Study) -> dict[str, bytes]:
 
 
 def write(place: Path, study: Study) -> None:
-    """Write the files of a study to a folder, each atomically; other files stay.
+    """Write the files and the page of a study to a folder, each atomically; other files stay.
 
     The record comes last, so its pictures are never those of another study.
     """
+    from reports.page.costs import cost_page
+
     ownership.folder(place)
-    for name, content in documents(study).items():
+    made = documents(study)
+    page = cost_page.render(view(study, made), figures(study.record))
+    for name, content in {PAGE: page, **made}.items():
         ownership.write(place / name, content)
 
 
@@ -97,6 +103,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
                 for corner in study.record.prices.corners
             ]
         ),
+        points=point_pictures.sheet(study),
     )
 
 
