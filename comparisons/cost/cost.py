@@ -23,6 +23,7 @@ from comparisons.cost.cost_record import (
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.judging import judged
+from comparisons.cost.object_prices import object_prices
 from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
 from comparisons.cost.prediction.target import Size, require
@@ -163,6 +164,7 @@ def cost(
         command=command,
         guard=record.guard_record(ready.guard or Guard(Verdict.NOT_NEEDED)),
         prediction=prediction,
+        objects=object_prices(priced, counted, ready.surface.shape),
         left_out=tuple(LeftOut(*pair) for pair in methods.left_out.items()),
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
