@@ -18,6 +18,7 @@ from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, METRICS
 from comparisons.records import plain
+from reports import glossary
 from reports.charts import histograms, vega
 from reports.page import overview, templating, verdict_view, viewer_data
 from reports.page.legends import legends
@@ -36,11 +37,11 @@ TITLE = "Textbook shading against physically based rendering"
 
 #: The parts of the page's style and of its script, in order.
 STYLES = (
-    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "print",
+    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "help", "print",
 )  # fmt: skip
 SCRIPTS = (
-    "page", "numbers", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
-    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving", "pointer",
+    "page", "numbers", "help", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
+    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "caption", "saving", "pointer",
     "controls", "viewer", "keyboard", "overview", "points", "charts", "verdict", "vectors",
     "termrows", "terms", "switchboard", "objects", "lazy", "main",
 )  # fmt: skip
@@ -97,6 +98,7 @@ def render(
             leading=LEADING,
             columns=overview.columns(),
             legends=legends(),
+            glossary=glossary.GROUPS,
             equations=equations,
             ranking=rankings([scene.record for scene in scenes]),
             verifications=verifications,
@@ -137,6 +139,7 @@ def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[s
             *map(_scene_data, scenes),
             *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
         ],
+        "terms": glossary.meanings(),
         **viewer_data.drawing(),
     }
 

@@ -12,6 +12,12 @@ function gainOf(scene, view) {
   return view.best ? bestOf(scene, view.map).factor : 1;
 }
 
+/** A factor on the textbook's image, in words. @param {number} gain */
+function gainText(gain) {
+  const rounded = plainly(Number(gain.toPrecision(3)));
+  return rounded === "1" ? "at the same exposure" : `× ${rounded}`;
+}
+
 /** The map with a name, or undefined. @param {any} page @param {string} name */
 function mapOf(page, name) {
   return page.maps.find((/** @type {any} */ map) => map.name === name);
