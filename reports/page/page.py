@@ -37,13 +37,14 @@ TITLE = "Textbook shading against physically based rendering"
 
 #: The parts of the page's style and of its script, in order.
 STYLES = (
-    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "help", "print",
+    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "help",
+    "print",
 )  # fmt: skip
 SCRIPTS = (
     "page", "numbers", "help", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
-    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "caption", "saving", "pointer",
-    "controls", "viewer", "keyboard", "overview", "points", "charts", "verdict", "vectors",
-    "termrows", "terms", "switchboard", "objects", "lazy", "main",
+    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "caption", "saving",
+    "pointer", "controls", "viewer", "keyboard", "overview", "points", "charts", "verdict",
+    "vectors", "termrows", "terms", "switchboard", "objects", "lazy", "main",
 )  # fmt: skip
 
 

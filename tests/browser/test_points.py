@@ -1,0 +1,74 @@
+"""The pictures of the points of the cost chart: hover, focus, click, touch."""
+
+import pytest
+
+from tests.browser.conftest import NOISY_ID
+from tests.browser.test_page_at_large import PHONE
+
+SCENE = f"#scene={NOISY_ID}"
+LEVELS = {"Phong kernel": 124, "full plan, 4": 170, "full plan, 16": 203}
+"""sRGB of linear 0.2, 0.4 and 0.6, the made-up pictures of the points."""
+
+
+def opened(visitor):
+    page = visitor.open(SCENE)
+    page.locator(".points").scroll_into_view_if_needed()
+    page.wait_for_selector(".points[data-ready=yes]")
+    return page
+
+
+def marks(page):
+    return page.locator(".scene.open .mark-symbol path")
+
+
+def shown(page):
+    """The middle of the picture shown, and the words beside it."""
+    level = page.locator("[data-point=seen]").evaluate(
+        "canvas => canvas.getContext('2d').getImageData(6, 4, 1, 1).data[0]"
+    )
+    return level, page.locator(".points [role=status]").inner_text()
+
+
+def test_hover_shows_a_point_and_leaving_shows_the_kept_one(visitor):
+    page = opened(visitor)
+    assert shown(page)[0] == pytest.approx(LEVELS["Phong kernel"], abs=3)
+    marks(page).nth(2).hover()
+    level, words = shown(page)
+    assert level == pytest.approx(LEVELS["full plan, 16"], abs=3)
+    assert "full plan" in words
+    assert "16 samples per pixel: 56.7 ms, mean ΔE2000 1.23" in words
+    page.mouse.move(2, 2)
+    assert "Phong kernel" in shown(page)[1]
+
+
+def test_a_click_keeps_a_point(visitor):
+    page = opened(visitor)
+    marks(page).nth(1).click()
+    page.mouse.move(2, 2)
+    level, words = shown(page)
+    assert level == pytest.approx(LEVELS["full plan, 4"], abs=3)
+    assert "4 samples per pixel" in words
+    assert [mark.get_attribute("aria-pressed") for mark in marks(page).all()] == [
+        "false", "true", "false",
+    ]  # fmt: skip
+
+
+def test_arrows_move_between_points_and_enter_keeps_one(visitor):
+    page = opened(visitor)
+    marks(page).nth(0).focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert "16 samples per pixel" in shown(page)[1]
+    page.keyboard.press("Enter")
+    page.locator("h2:visible").first.focus()
+    assert "16 samples per pixel" in shown(page)[1]
+    assert page.locator(".mark-symbol path[tabindex='0']").count() == 1
+
+
+@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
+def test_a_finger_beside_a_point_reaches_it(visitor):
+    page = opened(visitor)
+    marks(page).nth(2).scroll_into_view_if_needed()
+    box = marks(page).nth(2).bounding_box()
+    page.touchscreen.tap(box["x"] + box["width"] / 2 + 12, box["y"] + box["height"] / 2 + 8)
+    assert "16 samples per pixel" in shown(page)[1]
