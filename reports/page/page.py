@@ -157,6 +157,7 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "best": viewer_data.best_exposures(record.metrics),
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(scene.cost.effects) if scene.cost else None,
+        "between": plain(scene.cost.between) if scene.cost else None,
         "terms": scene.terms.manifest() if scene.terms else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),

@@ -33,7 +33,8 @@ class CostView(Record):
     """A page's data of a study.
 
     ``images`` are PNG files by name without suffix; ``sheet`` has the corners of the lattice,
-    ``points`` the measured points and then the reference.
+    ``points`` the measured points and then the reference. ``between`` is the part of the
+    reference's light that comes from between surfaces, from 0 to 1.
     """
 
     record: Cost
@@ -42,6 +43,7 @@ class CostView(Record):
     effects: EffectMap
     sheet: Sheet | None = None
     points: Sheet | None = None
+    between: Embedded | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""

@@ -6,12 +6,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from comparisons import records
 from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.page import switchboard
 from reports.page.costs import point_pictures
+from reports.page.embedding import ERROR_DIGITS, embed_colours
 from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.run.places import PAGE
 from reports.terminal.cost_tables import closure, noise
@@ -104,7 +108,15 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             ]
         ),
         points=point_pictures.sheet(study),
+        between=embed_colours(_between_surfaces(study), ERROR_DIGITS),
     )
+
+
+def _between_surfaces(study: Study) -> NDArray[np.float64]:
+    """Return the part (H, W, 3) of the reference that all light adds to direct light."""
+    seen = study.reference > 0
+    shares = np.divide(study.parts["transport"], study.reference, where=seen, out=0.0 * seen)
+    return np.clip(shares, 0, 1)
 
 
 def _effect_map(study: Study) -> EffectMap:

@@ -20,6 +20,8 @@ class TermsPanel {
   async open(scene, section) {
     this.scene = scene;
     this.data = null;
+    /** @type {Images | null} */
+    this.between = null;
     /** @type {number[] | null} */
     this.asked = null;
     this.panel.hidden = !scene.terms;
@@ -30,9 +32,10 @@ class TermsPanel {
     this.part("whole").hidden = Boolean(scene.terms.missing);
     this.part("place").textContent = "";
     if (scene.terms.missing) return;
-    const data = await termsOf(scene);
+    const [data, between] = await Promise.all([termsOf(scene), scene.between && decode(scene.between, scene.between.data)]);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.data = data;
+    this.between = between;
     this.show(this.asked ?? firstPixel(scene, data));
   }
 
@@ -75,7 +78,7 @@ class TermsPanel {
     const { scene } = this;
     list.replaceChildren(...(point.material ? termRows(point) : []));
     void imagesOf(scene.id, scene.images).then((images) => {
-      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
+      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images), ...splitRows(point, images, scene, this.between));
     });
   }
 
