@@ -9,7 +9,7 @@ from tests.browser.test_page_at_large import PHONE, VIEWS
 SCENE = f"#scene={NOISY_ID}"
 
 PLAIN = {
-    "", "scene", "material", "materials", "mean", "max", "name", "r", "g", "b", "x", "y", "z",
+    "", "scene", "material", "materials", "mean", "max", "name", "r", "g", "b", "a", "x", "y", "z",
     "l", "pixel", "pixels", "metric", "shape", "of the pixels", "term", "in numbers", "cause",
     "together", "keys", "lights", "passes", "all passes", "first pass",
 }  # fmt: skip
@@ -39,7 +39,7 @@ def test_hover_and_focus_tell_what_a_term_means(visitor):
     page = visitor.open(SCENE)
     tip = page.locator("#tip")
     assert tip.is_hidden()
-    page.get_by_text("Standard error", exact=True).hover()
+    page.locator("#inspector").get_by_text("Standard error", exact=True).hover()
     assert tip.text_content() == glossary.meanings()["standard error"]
     page.mouse.move(1, 1)
     assert tip.is_hidden()
@@ -56,7 +56,8 @@ def test_no_term_is_without_help(visitor):
     for fragment in ("", "#list=table", SCENE):
         page = visitor.open(fragment)
         visitor.unfold()
-        assert set(page.evaluate(HEADINGS)) - PLAIN == set(), fragment
+        found = {name for name in page.evaluate(HEADINGS) if not name.isdigit()}
+        assert found - PLAIN == set(), fragment
 
 
 @pytest.mark.parametrize("visitor", [{}, PHONE], indirect=True)
@@ -69,10 +70,13 @@ def test_targets_are_large_enough_and_nothing_is_clipped(visitor):
 
 
 def test_the_first_tab_skips_to_the_results(visitor):
-    page = visitor.open(SCENE)
-    page.evaluate("document.activeElement.blur()")
+    page = visitor.open()
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.className") == "skip"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    visitor.open(SCENE)
+    page.locator(".skip").focus()
     page.keyboard.press("Enter")
     assert visitor.state()["scene"] == NOISY_ID
     assert page.evaluate("document.activeElement.matches('.scene.open h2')")

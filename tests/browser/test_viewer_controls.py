@@ -15,7 +15,7 @@ SMALL = {"viewport": {"width": 360, "height": 640}}
 def wheel(visitor, steps=3):
     for _ in range(steps):
         visitor.page.mouse.wheel(0, -120)
-    visitor.page.wait_for_timeout(150)
+    visitor.page.wait_for_timeout(400)  # the gesture's end
 
 
 @pytest.mark.parametrize("visitor", [{"viewport": {"width": 1200, "height": 500}}], indirect=True)
@@ -168,7 +168,12 @@ def test_the_picture_is_saved_as_it_is_seen(visitor, tmp_path):
     download.value.save_as(tmp_path / "saved.png")
     image = np.asarray(Image.open(tmp_path / "saved.png"))
     box = visitor.canvas().bounding_box()
-    assert image.shape[:2] == (round(box["height"]), round(box["width"]))
+    height, width = round(box["height"]), round(box["width"])
+    assert image.shape[0] > height + 40
+    assert image.shape[1] == width
+    bar, line = image[height + 8 : height + 18, 8:428, :3], image[-24:, :, :3]
+    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 100  # the legend's colours
+    assert (line.min(axis=(0, 2)) < 100).sum() > 100  # the letters of a line
     for (left, top), seen in zip(places, expected, strict=True):
         np.testing.assert_array_equal(image[int(top), int(left), :3], seen)
 
