@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -99,7 +100,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             for name, content in made.items()
             if name.endswith(".png")
         },
-        noise=" ".join(each(study.record) for each in (noise, closure) if study.effects),
+        noise=" ".join(_typeset(each(study.record)) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
         sheet=switchboard.sheet(
             [
@@ -110,6 +111,10 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
         points=point_pictures.sheet(study),
         between=embed_colours(_between_surfaces(study), ERROR_DIGITS),
     )
+
+
+def _typeset(text: str) -> str:
+    return re.sub(r"-(?=\d)", "−", text)
 
 
 def _between_surfaces(study: Study) -> NDArray[np.float64]:

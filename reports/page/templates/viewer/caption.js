@@ -37,7 +37,7 @@ function captioned(viewer) {
 function captionText(viewer) {
   const { scene, view, painter, page } = viewer;
   const map = mapOf(page, view.map);
-  const [low, , high] = labelsOf(map, viewer.top());
+  const [low, high] = labelsOf(map, viewer.top()).filter((_, place) => place !== 1).map((label) => label.replace(/[≤≥] /, ""));
   const isMapped = view.mode === "side" || view.mode === "error";
   const parts = [viewer.description().replace(/\. .*/, "")];
   if (isMapped && hasRange(map)) parts.push(`${map.title} from ${low} to ${high}`);

@@ -26,7 +26,7 @@ class TermsPanel {
     this.asked = null;
     this.panel.hidden = !scene.terms;
     if (!scene.terms) return;
-    section.querySelector(".stage")?.after(this.panel);
+    section.querySelector(".pictures")?.after(this.panel); // first on paper, hidden on screens
     this.part("missing").hidden = !scene.terms.missing;
     this.part("missing").textContent = `No terms. ${scene.terms.missing}`;
     this.part("whole").hidden = Boolean(scene.terms.missing);
