@@ -23,7 +23,7 @@ def opened(visitor):
 
 
 def marks(page):
-    return page.locator(".scene.open .mark-symbol path")
+    return page.locator(".scene.open .chart-figure:has(.points) .mark-symbol path")
 
 
 def shown(page):

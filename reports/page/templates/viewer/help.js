@@ -49,7 +49,13 @@ function listenForHelp(tip) {
     tip.textContent = meanings.get(term.dataset.term ?? "") ?? "";
     tip.hidden = false;
     term.setAttribute("aria-describedby", tip.id);
-    const { left, bottom, top } = term.getBoundingClientRect();
+    place();
+  }
+
+  /** Put the help below its term, or else above. */
+  function place() {
+    if (!shown) return;
+    const { left, bottom, top } = shown.getBoundingClientRect();
     const { width, height } = tip.getBoundingClientRect();
     const below = bottom + 6 + height < window.innerHeight;
     tip.style.left = `${clamp(left, 8, Math.max(8, document.documentElement.clientWidth - width - 8))}px`;
@@ -58,7 +64,7 @@ function listenForHelp(tip) {
 
   for (const name of ["pointerover", "focusin", "click"]) document.addEventListener(name, show);
   document.addEventListener("focusout", hide);
-  window.addEventListener("scroll", hide, { passive: true });
+  window.addEventListener("scroll", place, { passive: true });
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape" || tip.hidden) return;
     hide();

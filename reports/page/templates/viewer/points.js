@@ -96,5 +96,7 @@ function revealMarks(chart, mark) {
   const svg = /** @type {Element} */ (chart.querySelector("svg"));
   for (const one of svg.querySelectorAll("[aria-hidden]")) if (one.contains(mark)) one.removeAttribute("aria-hidden");
   svg.removeAttribute("aria-hidden");
+  mark.parentElement?.setAttribute("role", "group");
+  mark.parentElement?.removeAttribute("aria-roledescription");
   for (const one of svg.querySelectorAll("g[class*=mark-], g.role-axis, text")) if (!one.contains(mark)) one.setAttribute("aria-hidden", "true");
 }
