@@ -89,6 +89,9 @@ def test_shadows_are_worth_their_price_on_the_floor_alone(compared):
     assert abs(sphere.removes[0].value) < 0.05 * floor.removes[0].value
 
 
+@pytest.mark.guarantee(
+    "prices", "What an effect removes on each shape averages to what it removes in the image."
+)
 def test_prices_on_shapes_average_to_those_of_the_image(compared):
     study = compared.study
     record = study.record
