@@ -12,7 +12,6 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.page import switchboard
-from reports.page.costs import point_pictures
 from reports.page.embedding import Embedded
 from reports.page.lit import Lit
 from reports.page.switchboard import Sheet
@@ -57,6 +56,8 @@ class CostView(Record):
     @property
     def measured(self) -> dict[str, Any]:
         """The data of the script that shows the points' pictures; empty without them."""
+        from reports.page.costs import point_pictures
+
         return point_pictures.data(self.record, self.points) if self.points else {}
 
 
