@@ -2,9 +2,11 @@
 
 import pytest
 
+from reports import glossary
 from reports.files.images import tonemap
+from reports.run import cost_files
 from tests.browser.conftest import NOISY_ID
-from tests.browser.test_page_at_large import PHONE
+from tests.browser.test_page_at_large import PHONE, violations
 
 SCENE = f"#scene={NOISY_ID}"
 
@@ -81,3 +83,22 @@ def test_a_finger_beside_a_point_reaches_it(visitor):
     box = marks(page).nth(2).bounding_box()
     page.touchscreen.tap(box["x"] + box["width"] / 2 + 12, box["y"] + box["height"] / 2 + 8)
     assert "16 samples per pixel" in shown(page)[1]
+
+
+def test_the_page_of_cost_shows_points_and_explains_terms(chromium, report, tmp_path):
+    cost_files.write(tmp_path, report.study)
+    page = chromium.new_page()
+    complaints = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto((tmp_path / "index.html").as_uri())
+    page.wait_for_selector(".points[data-ready=yes]")
+    page.locator(".chart-figure:has(.points) .mark-symbol path").nth(2).hover()
+    found, words = shown(page)
+    assert found == level(report.study, 2)
+    assert "16 samples per pixel" in words
+    page.get_by_role("columnheader", name="first run").hover()
+    assert page.locator("#tip").inner_text() == glossary.meanings()["first run"]
+    assert not violations(page)
+    assert complaints == []
+    page.close()
