@@ -70,7 +70,8 @@ def write(place: Path, study: Study) -> None:
     ownership.folder(place)
     made = documents(study)
     page = cost_page.render(view(study, made), figures(study.record))
-    for name, content in {PAGE: page, **made}.items():
+    ownership.write(place / PAGE, page)
+    for name, content in made.items():
         ownership.write(place / name, content)
 
 
