@@ -39,7 +39,7 @@ function captionText(viewer) {
   const map = mapOf(page, view.map);
   const [low, high] = labelsOf(map, viewer.top()).filter((_, place) => place !== 1).map((label) => label.replace(/[≤≥] /, ""));
   const isMapped = view.mode === "side" || view.mode === "error";
-  const parts = [viewer.description().replace(/\. .*/, "")];
+  const parts = [viewer.description().replace(/\. Press.*/, "")];
   if (isMapped && hasRange(map)) parts.push(`${map.title} from ${low} to ${high}`);
   if (view.mode !== "error") {
     parts.push(`exposure × ${plainly((painter?.exposure ?? 1) * 2 ** view.ev)}`);

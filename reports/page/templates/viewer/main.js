@@ -83,6 +83,7 @@ explainTerms(document.body);
 listenForHelp(byId("tip"));
 document.querySelector(".skip")?.addEventListener("click", (event) => {
   event.preventDefault(); // the fragment is the view's
+  event.stopPropagation();
   /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2") ?? document.getElementById("main"))?.focus();
 });
 listenToKeys(viewer, turn, () => address.go("#"));
