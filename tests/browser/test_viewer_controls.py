@@ -12,6 +12,16 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touc
 SMALL = {"viewport": {"width": 360, "height": 640}}
 
 
+COUNTING = """() => {
+  const replace = history.replaceState.bind(history);
+  window.replaced = 0;
+  history.replaceState = (...given) => {
+    window.replaced += 1;
+    replace(...given);
+  };
+}"""
+
+
 def wheel(visitor, steps=3):
     for _ in range(steps):
         visitor.page.mouse.wheel(0, -120)
@@ -30,9 +40,11 @@ def test_the_wheel_scrolls_the_page_until_a_click_into_the_picture(visitor):
     assert "zoom" not in visitor.state()
     page.mouse.click(*place)
     before = page.evaluate("window.scrollY")
+    page.evaluate(COUNTING)
     wheel(visitor)
     assert page.evaluate("window.scrollY") == before
     assert "zoom" in visitor.state()
+    assert page.evaluate("window.replaced") == 1  # once for the whole gesture
 
 
 def test_what_does_nothing_in_a_mode_is_disabled(visitor):
