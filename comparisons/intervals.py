@@ -28,6 +28,15 @@ def student(value: float, error: float, count: int) -> Estimated:
     return Estimated(value, value - half, value + half)
 
 
+def jackknifed(values: ArrayLike) -> Estimated:
+    """Return the first of values (1 + n), with an interval from the others.
+
+    The first is of all repeats, each other one leaves out one of them.
+    """
+    value, *others = np.asarray(values, float)
+    return student(float(value), float(jackknife_error(others)), len(others))
+
+
 def of_mean(values: ArrayLike) -> Estimated:
     """Return the mean of independent values, with its interval."""
     values = np.asarray(values, float)

@@ -40,7 +40,10 @@ def study(scene="fig-8-9"):
     parts = {name: (place - 1.5) * 0.1 * image for place, name in enumerate(PARTS)}
     return Study(
         record=record(scene),
-        rungs={rung.name: image for rung in record(scene).rungs},
+        points={
+            (point.rung, point.spp): np.full_like(image, 0.2 * (place + 1))
+            for place, point in enumerate(record(scene).points)
+        },
         parts=parts,
         difference=sum(parts.values()),
         effects=effects,

@@ -7,11 +7,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.check.carried import carried
 from comparisons.check.check import Check
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences, moved
 from comparisons.check.suspects import causes
+from comparisons.departure.objects import shares
 from comparisons.departure.spaces import DEFAULT_VIEWING
 from reference.rendering.gbuffer import Owners, gbuffer, image_size
 from tests.small_baselines import change
@@ -70,7 +70,13 @@ def test_objects_are_told_by_pixels_or_else_by_blocks():
 
 
 def test_a_change_of_nothing_is_carried_by_nothing():
-    assert carried(np.zeros((2, 2)), Owners(np.zeros((2, 2), int), ("a",))) == {}
+    assert shares(np.zeros((2, 2)), Owners(np.zeros((2, 2), int), ("a",))) == {}
+
+
+def test_what_sees_no_shape_carries_nothing():
+    owners = Owners(np.array([[0, 1], [1, -1]]), ("wall", "lamp"))
+    change = np.array([[1.0, 2.0], [1.0, 9.0]])
+    assert shares(change, owners) == pytest.approx({"lamp": 0.75, "wall": 0.25})
 
 
 def test_each_pixel_knows_its_shape(rgb):

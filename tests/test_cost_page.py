@@ -7,7 +7,8 @@ import jsonschema
 import pytest
 from msgspec import structs
 
-from reports.page import cost_overview, page
+from reports.page import page
+from reports.page.costs import cost_overview
 from reports.page.scene_view import SceneView
 from reports.run import cost_files, output
 from reports.run.stages import Run
@@ -104,12 +105,12 @@ def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path
     comparison = noisy()
     output.write_scene(tmp_path, "scene", comparison, study)
     files = {path.name for path in (tmp_path / "scene").glob("cost*")}
-    assert {"cost.json", "cost.svg", "cost-part-transport.png"} <= files
+    assert {"cost.json", "cost.svg", "cost-part-visibility.png"} <= files
     other = replace(study, record=structs.replace(study.record, seed=8), parts=dict(study.parts))
-    del other.parts["transport"]
+    del other.parts["visibility"]
     output.write_scene(tmp_path, "scene", comparison, other)
     assert json.loads((tmp_path / "scene" / "cost.json").read_text("utf-8"))["seed"] == 8
-    assert not (tmp_path / "scene" / "cost-part-transport.png").exists()
+    assert not (tmp_path / "scene" / "cost-part-visibility.png").exists()
     output.write_scene(tmp_path, "scene", comparison)
     assert not list((tmp_path / "scene").glob("cost*"))
 

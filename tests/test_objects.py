@@ -1,11 +1,15 @@
 """Which shape and which material carries the departure, and by which effect."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from comparisons import intervals
 from comparisons.case import Request, open_case
 from comparisons.compare import compare
 from comparisons.cost.cost import quick
+from comparisons.cost.object_prices import object_prices
 from comparisons.departure import objects
 from comparisons.effects.naming import named
 from reference.rendering.gbuffer import Owners, gbuffer
@@ -48,7 +52,8 @@ def shadowed(size=24):
 def compared():
     case = open_case(shadowed(), Request.of({"resolution": (48, 48)}), "shadowed")
     found = compare(case.source, case.options)
-    return found, named(found, quick(case.source, case.options).effects)
+    study = quick(case.source, case.options)
+    return SimpleNamespace(found=found, study=study, record=named(found, study.effects))
 
 
 @pytest.mark.guarantee(
@@ -56,7 +61,7 @@ def compared():
     "Every shape and every region is listed with its share of the departure, and its cause.",
 )
 def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
-    _, record = compared
+    record = compared.record
     floor, sphere = record.objects
     assert (floor.name, sphere.name) == ("floor", "sphere")
     assert floor.share > 0.99
@@ -68,15 +73,61 @@ def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
 
 
 def test_materials_are_those_of_the_shapes(compared):
-    _, record = compared
+    record = compared.record
     assert [each.material for each in record.objects] == ["slate", "chalk"]
     assert [each.name for each in record.materials] == ["slate", "chalk"]
     assert record.materials[0].effect == "occlusion"
 
 
+def test_shadows_are_worth_their_price_on_the_floor_alone(compared):
+    record = compared.study.record
+    assert [price.effect for price in record.prices.effects] == ["occlusion"]
+    floor, sphere = record.objects
+    assert (floor.name, sphere.name) == ("floor", "sphere")
+    assert floor.share > 0.99
+    assert floor.removes[0].low > 0.98 * floor.departure
+    assert abs(sphere.removes[0].value) < 0.05 * floor.removes[0].value
+
+
+@pytest.mark.guarantee(
+    "prices", "What an effect removes on each shape averages to what it removes in the image."
+)
+def test_prices_on_shapes_average_to_those_of_the_image(compared):
+    study = compared.study
+    record = study.record
+    pixels = [row.pixels for row in record.objects]
+    assert sum(pixels) == record.pixels.counted
+    for place, price in enumerate(record.prices.effects):
+        removed = [row.removes[place].value for row in record.objects]
+        assert np.average(removed, weights=pixels) == pytest.approx(price.removes.value)
+    for row in record.objects:
+        total = sum(removes.value for removes in row.removes) + row.left
+        assert total == pytest.approx(row.departure)
+
+
+def test_intervals_on_shapes_tell_the_spread_of_replicates():
+    """Noise of known size in the replicates of one shape, none in those of another."""
+    rng = np.random.default_rng(5)
+    counted = np.array([[True, True, True], [True, True, False]])
+    owners = Owners(np.array([[0, 0, 1], [1, 1, 1]]), ("noisy", "still"))
+    spread = rng.normal(size=8)
+    left_out = [(spread.sum() - each) / 7 for each in spread]
+    means = np.array([spread.mean(), *left_out])
+    removed = np.stack([means, means, *[np.full(9, 2.0)] * 3], axis=1)
+    departure = np.where(counted, 3.0, 0)
+    priced = SimpleNamespace(removed={"shadow": removed}, departure=departure, left=departure)
+    found = {row.name: row for row in object_prices(priced, counted, owners)}
+    still, noisy = found["still"], found["noisy"]
+    assert (still.pixels, noisy.pixels) == (3, 2)
+    assert still.removes[0].low == still.removes[0].high == 2.0
+    expected = intervals.of_mean(spread)
+    assert noisy.removes[0].value == pytest.approx(expected.value)
+    assert noisy.removes[0].high == pytest.approx(expected.high)
+
+
 def test_pixels_belong_to_the_surface_that_their_ray_meets(compared):
     """The sphere's are at its radius from its centre."""
-    found, record = compared
+    found, record = compared.found, compared.record
     distance = np.linalg.norm(found.images.position - CENTRE, axis=-1)
     on_sphere = found.images.counted & (abs(distance - RADIUS) < 1e-3)
     np.testing.assert_array_equal(found.images.objects == 1, on_sphere)
@@ -88,7 +139,7 @@ def test_pixels_belong_to_the_surface_that_their_ray_meets(compared):
 
 
 def test_shares_and_pixels_add_up_to_the_whole(compared):
-    _, record = compared
+    record = compared.record
     for carriers in (record.objects, record.materials):
         assert sum(each.share for each in carriers) == pytest.approx(1)
         assert sum(each.pixels for each in carriers) == record.pixels.counted
@@ -163,7 +214,7 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
 
 
 def test_the_terminal_and_the_table_have_every_shape(compared, tmp_path):
-    _, record = compared
+    record = compared.record
     text = "\n".join(carrier_lines.lines(record))
     assert "floor" in text
     assert "occlusion" in text

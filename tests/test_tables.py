@@ -8,7 +8,7 @@ import pytest
 from markdown_it import MarkdownIt
 from msgspec import structs
 
-from comparisons.cost.cost_record import Price
+from comparisons.cost.cost_record import ObjectPrice, Price
 from comparisons.records import Estimated, plain
 from reports.terminal import tables
 from tests import cost_records, records
@@ -54,11 +54,13 @@ def test_a_study_of_cost_is_written_with_its_methods_and_prices(tmp_path):
         found.points[0], rung="direct", spp=4, seconds=seconds, error=12.75, error_stderr=0.03125
     )
     prices = structs.replace(found.prices, effects=(price,))
-    tables.write_cost(
-        tmp_path / "tables", "box", structs.replace(found, points=(point,), prices=prices)
-    )
+    wall = ObjectPrice("wall", 12, 0.75, 2.5, (amount,), 1.0)
+    shown = structs.replace(found, points=(point,), prices=prices, objects=(wall,))
+    tables.write_cost(tmp_path / "tables", "box", shown)
     read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
-    assert sorted(read) == ["box-cost.csv", "box-cost.md", "box-prices.csv", "box-prices.md"]
+    parts = ("cost", "prices", "shapes")
+    assert sorted(read) == [f"box-{part}.{kind}" for part in parts for kind in ("csv", "md")]
+    assert "\nwall,12,0.75,2.5,occlusion,1.5,1.25,1.75\n" in read["box-shapes.csv"]
     assert "\ndirect,4,0.25,0.125,0.5,12.75,0.03125,yes\n" in read["box-cost.csv"]
     assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-prices.csv"]
     assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 | 1.50 |" in read["box-prices.md"]

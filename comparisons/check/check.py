@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.case import Case
-from comparisons.check.carried import carried
 from comparisons.check.measurement import PASSES, Measurement, Pictures, block_edges, measure
 from comparisons.check.moved import LEVEL, Move, differences, moved
 from comparisons.compare import guarded
+from comparisons.departure.objects import shares
 from comparisons.departure.spaces import Array, luminance
 from comparisons.options import Options
 from heuristic.errors import InputError
@@ -75,7 +75,7 @@ class Check:
             spread = change.repeat(rows, axis=0).repeat(columns, axis=1)
         else:
             spread = luminance(np.abs(now - before))
-        return carried(spread, self.seen)
+        return shares(spread, self.seen)
 
     def p_values(self, half: str) -> Array:
         """Return the smallest corrected p-value of each block of a half."""

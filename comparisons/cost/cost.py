@@ -1,6 +1,6 @@
 """Study what accuracy costs on one scene."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,9 +23,11 @@ from comparisons.cost.cost_record import (
 from comparisons.cost.effort import QUICK, QUICK_WIDTH, Effort, reduced
 from comparisons.cost.front import equal_error, equal_time, pareto
 from comparisons.cost.judging import judged
+from comparisons.cost.object_prices import object_prices
 from comparisons.cost.prediction.asked_prices import at_size
 from comparisons.cost.prediction.forecasting import predict
 from comparisons.cost.prediction.target import Size, require
+from comparisons.cost.timing import Key
 from comparisons.effects.lattice import Lattice
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.prices import prices
@@ -46,8 +48,8 @@ class Study:
     ----------
     record
         The contents of files, tables and charts.
-    rungs
-        ``{rung name: (H, W, 3)}``, with the most samples.
+    points
+        ``{(rung name, samples per pixel): (H, W, 3)}``: one rendering of each measured point.
     parts
         ``{part: (H, W, 3)}``, signed and linear.
     difference
@@ -67,7 +69,7 @@ class Study:
     """
 
     record: Cost
-    rungs: dict[str, np.ndarray]
+    points: Mapping[Key, np.ndarray]
     parts: dict[str, np.ndarray]
     difference: np.ndarray
     effects: dict[str, np.ndarray]
@@ -76,6 +78,11 @@ class Study:
     reference: np.ndarray
     counted: np.ndarray
     previews: dict
+
+    @property
+    def rungs(self) -> dict[str, np.ndarray]:
+        """``{rung name: (H, W, 3)}``, with the most samples."""
+        return {name: image for (name, _), image in self.points.items()}
 
 
 def cost(
@@ -157,12 +164,13 @@ def cost(
         command=command,
         guard=record.guard_record(ready.guard or Guard(Verdict.NOT_NEEDED)),
         prediction=prediction,
+        objects=object_prices(priced, counted, ready.surface.shape),
         left_out=tuple(LeftOut(*pair) for pair in methods.left_out.items()),
         pictures=_limits([image for _, image in parts], priced.maps.values()),
     )
     return Study(
         record=made,
-        rungs={name: image for (name, _), image in found.images.items()},
+        points=found.images,
         parts={part.name: image for part, image in parts},
         difference=difference,
         effects=priced.maps,

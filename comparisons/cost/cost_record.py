@@ -160,6 +160,33 @@ class Price(Record):
     sampling_error: Amount
 
 
+class ObjectPrice(Record):
+    """What each effect removes from the departure on one shape.
+
+    Attributes
+    ----------
+    name
+        Id of the shape.
+    pixels
+        Number of counted pixels that see it.
+    share
+        Its part of the departure.
+    departure
+        Mean ΔE2000 of the heuristic half on it, without noise.
+    removes
+        Mean ΔE2000 that each effect removes there, in the order of :attr:`Prices.effects`.
+    left
+        Mean ΔE2000 that remains there when all effects are simulated.
+    """
+
+    name: str
+    pixels: Size
+    share: float
+    departure: float
+    removes: tuple[Estimated, ...]
+    left: float
+
+
 class Closure(Record):
     """Mean ΔE2000 that remains when all effects are simulated, without noise, and its interval.
 
@@ -345,6 +372,9 @@ class Cost(Record, kw_only=True):
     guard: GuardRecord | None = None
     prediction: Prediction | None = None
     left_out: tuple[LeftOut, ...] = ()
+    objects: Annotated[
+        tuple[ObjectPrice, ...], Meta(description="Prices of the effects on each shape.")
+    ] = ()
 
     def points_of(self, rung: str) -> tuple[Measured, ...]:
         """Return the points of a rung."""

@@ -61,6 +61,21 @@ def find(
     ), found
 
 
+def shares(change: NDArray, owners: Owners) -> dict[str, float]:
+    """Return the share of each shape in a change (H, W) ≥ 0 of those seen, the largest first.
+
+    Without change there are no shares.
+    """
+    found, _ = find(change, owners.places >= 0, owners)
+    return {each.name: each.share for each in found if each.share > 0}
+
+
+def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
+    """Return the means (..., count) of values (..., N) by carrier; ``rows`` (N,) names it."""
+    sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]
+    return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
+
+
 def _carrier(
     name: str, error: NDArray, mask: NDArray, total: float, materials: Owners | None
 ) -> Carrier:

@@ -7,6 +7,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.departure.objects import means
 from comparisons.effects.dominance import in_region, in_words
 from comparisons.record import Comparison
 
@@ -33,16 +34,12 @@ def named(comparison: Comparison, effects: dict[str, NDArray]) -> ComparisonReco
 def _carried(carriers, places, effects):
     """Name the effects of carriers, by the maps' cell in which each of their pixels lies."""
     seen = places >= 0
-    counts = np.bincount(places[seen], minlength=len(carriers))
-    sums = {
-        name: np.bincount(places[seen], _enlarged(values, places.shape)[seen], len(carriers))
+    found = {
+        name: means(_enlarged(values, places.shape)[seen], places[seen], len(carriers))
         for name, values in effects.items()
     }
     return tuple(
-        structs.replace(
-            carrier,
-            effect=in_words({name: each[row] / counts[row] for name, each in sums.items()}),
-        )
+        structs.replace(carrier, effect=in_words({name: each[row] for name, each in found.items()}))
         for row, carrier in enumerate(carriers)
     )
 

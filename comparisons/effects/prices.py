@@ -10,7 +10,6 @@ effects are simulated; only a fault can cause it.
 All errors are without noise (:mod:`comparisons.effects.noiseless`).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +21,6 @@ from comparisons.effects import shapley
 from comparisons.effects.corners import corners, labels
 from comparisons.effects.lattice import Lattice, Replicates
 from comparisons.effects.noiseless import Noiseless
-from comparisons.records import Estimated
 from reference.effects.effect import Effect
 
 Errors = dict[frozenset[Effect], NDArray]
@@ -46,6 +44,9 @@ class Priced:
         (H, W): the ΔE2000 that remains when all effects are simulated.
     previews
         ``{labels of the effects that are simulated: (f H, f W, 3)}``, linear.
+    removed
+        ``{effect: (R + 1, N)}``: the ΔE2000 that each removes from the counted pixels, by all
+        replicates, then leaving out each in turn.
     """
 
     prices: Prices
@@ -54,6 +55,7 @@ class Priced:
     departure: np.ndarray
     left: np.ndarray
     previews: dict[tuple[str, ...], NDArray]
+    removed: dict[str, NDArray]
 
 
 def prices(
@@ -100,15 +102,14 @@ def prices(
     nothing: frozenset[Effect] = frozenset()
     shares = shapley.shares(effects, error, seed, exact_effects, orders)
     times = shapley.shares(effects, time, seed, exact_effects, orders)
-    found, maps = [], {}
+    found, all_removed = [], {}
     for place, effect in enumerate(effects):
-        removed = -shares.values[place]
-        maps[effect.label] = _filled(removed[0], counted)
+        removed = all_removed[effect.label] = -shares.values[place]
         others = everything - {effect}
         found.append(
             Price(
                 effect=effect.label,
-                removes=_jackknife(removed.mean(axis=1)),
+                removes=intervals.jackknifed(removed.mean(axis=1)),
                 alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
                 last=float((error(others) - error(everything))[0].mean()),
                 adds_s=intervals.of_mean(times.values[place]),
@@ -130,15 +131,10 @@ def prices(
         orders=shares.orders,
         corners=reached,
     )
-    mean = _jackknife(error(everything).mean(axis=1))
+    mean = intervals.jackknifed(error(everything).mean(axis=1))
     closure = Closure(mean=mean.value, low=mean.low, high=mean.high)
-    return Priced(priced, closure, maps, departure, left, previews)
-
-
-def _jackknife(values: Sequence[float]) -> Estimated:
-    """Return the first value, with an interval from the others, each leaving out one replicate."""
-    value, *others = values
-    return intervals.student(float(value), float(intervals.jackknife_error(others)), len(others))
+    maps = {name: _filled(removed[0], counted) for name, removed in all_removed.items()}
+    return Priced(priced, closure, maps, departure, left, previews, all_removed)
 
 
 def _filled(values: NDArray, counted: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -43,9 +43,16 @@ def figures(record: ComparisonRecord) -> list[vega.Figure]:
     """The histograms of a record for the page."""
     counted, found = record.pixels.counted, record.histograms
     return [
-        vega.figure(METRICS[name].label, chart, note(found[name], counted))
+        vega.figure(
+            METRICS[name].label, chart, f"{_unit(name)} {note(found[name], counted)}".strip()
+        )
         for name, chart in specs(record).items()
     ]
+
+
+def _unit(name: str) -> str:
+    unit = METRICS[name].unit
+    return f"{unit[0].upper()}{unit[1:]}."
 
 
 def specs(record: ComparisonRecord) -> dict[str, Spec]:

@@ -41,7 +41,7 @@ def cost(
     """Measure what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
-    prices each effect in which textbook shading differs. Writes cost.json, cost.svg and
+    prices each effect in which textbook shading differs. Writes a page, cost.json, cost.svg and
     pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without --resolution the film is reduced
     to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
@@ -58,7 +58,7 @@ def cost(
         pool.start()
         from comparisons.records import to_json
         from reports.run.output import below, held, require_free_folders
-        from reports.run.places import FIGURES, TABLES, places
+        from reports.run.places import FIGURES, PAGE, TABLES, places
         from reports.terminal import cost_tables, progress, tables
 
         with held(output, jobs.command_line()) as held_folder:
@@ -75,4 +75,4 @@ def cost(
         click.echo(to_json(record), nl=False)
         return
     verbosity.tell(cost_tables.lines(record))
-    verbosity.tell_where(folder / place / "cost.svg")
+    verbosity.tell_where(folder / place / PAGE)

@@ -114,6 +114,14 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     return Embedded(width, height, block, tuple(planes), packed(planes, codes))
 
 
+def embed_colours(image: NDArray, digits: int) -> Embedded:
+    """Encode an image (H, W, 3) as planes R, G and B of some digits."""
+    planes = [Plane(colour, digits) for colour in "RGB"]
+    codes = {colour: encode(image[..., place], digits) for place, colour in enumerate("RGB")}
+    height, width, _ = image.shape
+    return Embedded(width, height, 1, tuple(planes), packed(planes, codes))
+
+
 def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
     """The named codes of planes as in `Embedded.data`."""
     raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base or "")) for plane in planes)

@@ -11,38 +11,20 @@ text.
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import math
 from collections.abc import Sequence
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, METRICS
 from comparisons.records import plain
-from reports.charts import histograms, theme, vega
-from reports.files import images
-from reports.page import overview, verdict_view, viewer_data
+from reports import glossary
+from reports.charts import histograms, vega
+from reports.page import overview, templating, verdict_view, viewer_data
 from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
 from reports.ranking import rankings
 from reports.run.stages import Failure, Run
-from reports.terminal.printing import (
-    NOTICEABLE,
-    about_noise,
-    code_spans,
-    difference,
-    may_be_none,
-    number,
-    parameter,
-    percent,
-    seconds,
-)
 
 if TYPE_CHECKING:  # few pages need these
     from comparisons.cost.cost_record import Cost
@@ -53,28 +35,17 @@ if TYPE_CHECKING:  # few pages need these
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
 
-#: Pictures narrower than this are enlarged without smoothing.
-PIXELATED_BELOW = 400
-
-#: How values are printed, by the names of forms.
-FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
-
-TEMPLATES = Path(__file__).parent / "templates"
-
 #: The parts of the page's style and of its script, in order.
-STYLES = ("base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "print")
-SCRIPTS = (
-    "page", "numbers", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
-    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving", "pointer",
-    "controls", "viewer", "keyboard", "overview", "charts", "verdict", "vectors", "termrows",
-    "terms", "switchboard", "objects", "lazy", "main",
+STYLES = (
+    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "help",
+    "print",
 )  # fmt: skip
-
-#: Runs before anything is drawn: content that needs scripts is shown only if they run.
-EARLY = 'document.documentElement.className = "js";'
-
-#: Tells the page that the module before it has run; inline modules have no such event.
-LOADED = '\nwindow.dispatchEvent(new Event("vega"));'
+SCRIPTS = (
+    "page", "numbers", "help", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
+    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "caption", "saving",
+    "pointer", "controls", "viewer", "keyboard", "overview", "points", "charts", "verdict",
+    "vectors", "termrows", "terms", "switchboard", "objects", "lazy", "main",
+)  # fmt: skip
 
 
 class Scene(SceneView, kw_only=True):
@@ -113,15 +84,13 @@ def render(
         for failure in failures
     ]
     charted = any(scene.histograms or scene.charts for scene in scenes)
-    code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
-    scripts = [EARLY, *([vega.bundle() + LOADED] if charted else []), '"use strict";\n' + code]
     return (
-        _environment()
+        templating.environment()
         .get_template("page.html.j2")
         .render(
             title=title,
-            style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
-            scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
+            style=templating.style(STYLES),
+            scripts=templating.scripts(SCRIPTS, charted),
             page_data=_page_data(scenes, failed),
             verdict=verdict_view.context(scenes) if scenes else None,
             scenes=scenes,
@@ -130,6 +99,7 @@ def render(
             leading=LEADING,
             columns=overview.columns(),
             legends=legends(),
+            glossary=glossary.GROUPS,
             equations=equations,
             ranking=rankings([scene.record for scene in scenes]),
             verifications=verifications,
@@ -144,7 +114,7 @@ def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[s
     """Content of few pages, made by modules that the others do not import."""
     shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases}
     if costs:
-        from reports.page import cost_overview
+        from reports.page.costs import cost_overview
 
         shown["cost_methods"] = cost_overview.methods(costs)
         shown["cost_rows"] = cost_overview.rows(costs)
@@ -170,6 +140,7 @@ def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[s
             *map(_scene_data, scenes),
             *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
         ],
+        "terms": glossary.meanings(),
         **viewer_data.drawing(),
     }
 
@@ -186,51 +157,8 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "best": viewer_data.best_exposures(record.metrics),
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(scene.cost.effects) if scene.cost else None,
+        "between": plain(scene.cost.between) if scene.cost else None,
         "terms": scene.terms.manifest() if scene.terms else None,
         "keys": overview.keys(record),
         "significant": overview.is_significant(record),
     }
-
-
-def _data_uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-
-
-def _hash(script: str) -> Markup:
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-    return Markup(f"'sha256-{digest}'")
-
-
-def _source(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
-
-
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    environment.filters.update(
-        FORMS,
-        code_spans=code_spans,
-        region_view=viewer_data.region_view,
-        plain=plain,
-        uri=_data_uri,
-    )
-    environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
-    environment.globals.update(
-        forms=FORMS,
-        marked=images.css_colour(images.MARKED),
-        unmarked=images.css_colour(images.UNMARKED),
-        uncounted=images.css_colour(images.UNCOUNTED),
-        undetermined=images.css_colour(images.UNDETERMINED),
-        effects_title=theme.EFFECTS_TITLE,
-        value_bar=images.colour_bar(images.VALUE_COLOURS),
-        pixelated_below=PIXELATED_BELOW,
-        noticeable=NOTICEABLE,
-    )
-    return environment

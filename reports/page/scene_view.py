@@ -29,13 +29,20 @@ class EffectMap(Record):
 
 
 class CostView(Record):
-    """A page's data of a study; ``images`` are PNG files by name without suffix."""
+    """A page's data of a study.
+
+    ``images`` are PNG files by name without suffix; ``sheet`` has the corners of the lattice,
+    ``points`` the measured points and then the reference. ``between`` is the part of the
+    reference's light that comes from between surfaces, from 0 to 1.
+    """
 
     record: Cost
     images: dict[str, bytes]
     noise: str
     effects: EffectMap
     sheet: Sheet | None = None
+    points: Sheet | None = None
+    between: Embedded | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a rung, a part or an effect."""
@@ -45,6 +52,13 @@ class CostView(Record):
     def switchboard(self) -> dict[str, Any]:
         """The data of the switchboard's script; empty without a sheet."""
         return switchboard.data(self.record, self.sheet) if self.sheet else {}
+
+    @property
+    def measured(self) -> dict[str, Any]:
+        """The data of the script that shows the points' pictures; empty without them."""
+        from reports.page.costs import point_pictures
+
+        return point_pictures.data(self.record, self.points) if self.points else {}
 
 
 class SceneView(Record):

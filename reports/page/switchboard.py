@@ -56,14 +56,20 @@ def webp_uri(file: bytes) -> str:
     return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
 
 
-def data(record: Cost, shown: Sheet) -> dict[str, Any]:
-    """Return the data of the page's script: the sheet, and the meaning of its pictures."""
-    effects = [price.effect for price in record.prices.effects]
+def placed(shown: Sheet) -> dict[str, Any]:
+    """Return the sheet, and where its pictures are, for the page's scripts."""
     return {
         "sheet": webp_uri(shown.webp),
         "width": shown.width,
         "height": shown.height,
         "columns": COLUMNS,
+    }
+
+
+def data(record: Cost, shown: Sheet) -> dict[str, Any]:
+    """Return the data of the switchboard's script: the sheet, and the meaning of its pictures."""
+    effects = [price.effect for price in record.prices.effects]
+    return placed(shown) | {
         "corners": [
             {
                 "on": [effects.index(effect) for effect in corner.effects],

@@ -7,12 +7,14 @@ images (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-from msgspec import field
+from msgspec import field, structs
 from numpy.typing import NDArray
 
+from comparisons.departure.regions import Region
 from comparisons.records import Record, plain
 from comparisons.terms import polar
 from comparisons.terms.term_grid import TermGrid
@@ -43,6 +45,17 @@ class LightView(Record):
     intensity: tuple[float, ...]
 
 
+class PickedTerms(Record):
+    """The terms at one pixel, for paper and browsers without scripts.
+
+    ``rows`` are names with linear RGB: the terms, their sum, and the reference.
+    """
+
+    pixel: tuple[int, int]
+    material: str
+    rows: tuple[tuple[str, tuple[float, ...]], ...]
+
+
 class TermsView(Record):
     """The page's data of the terms of a scene.
 
@@ -56,6 +69,8 @@ class TermsView(Record):
         Planes over incidences and directions of view, by the material's number.
     missing
         Why there are no terms.
+    picked
+        The terms where the departure is largest, or else in the middle.
     """
 
     grid: Embedded | None = None
@@ -64,10 +79,11 @@ class TermsView(Record):
     materials: tuple[MaterialView, ...] = ()
     lights: tuple[LightView, ...] = ()
     missing: str = ""
+    picked: PickedTerms | None = None
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        found = plain(self)
+        found = plain(structs.replace(self, picked=None))
         return found | {
             "grid": self.grid.manifest() if self.grid else None,
             "incidences": polar.INCIDENCES.tolist(),
@@ -76,7 +92,9 @@ class TermsView(Record):
         }
 
 
-def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
+def view(
+    grid: TermGrid | None, missing: str = "", picked: PickedTerms | None = None
+) -> TermsView | None:
     """Return the page's data of a grid of terms, or the reason why there is none."""
     if grid is None:
         return TermsView(missing=missing) if missing else None
@@ -107,7 +125,32 @@ def view(grid: TermGrid | None, missing: str = "") -> TermsView | None:
         tops=tops,
         materials=tuple(_of(MaterialView, material) for material in grid.materials),
         lights=tuple(_of(LightView, light) for light in grid.lights),
+        picked=picked,
     )
+
+
+def picked(
+    grid: TermGrid | None, regions: Sequence[Region], reference: NDArray
+) -> PickedTerms | None:
+    """Return the terms in the middle of the largest region, or else of the image (H, W, 3)."""
+    if grid is None:
+        return None
+    middles = [(each.x + each.width // 2, each.y + each.height // 2) for each in regions[:1]]
+    height, width, _ = reference.shape
+    found = [grid.at(*pixel) for pixel in (*middles, (width // 2, height // 2))]
+    terms = next(filter(None, found), None)
+    if terms is None:
+        return None
+    lit = (
+        (f"{light.name}, {name}", getattr(light, name))
+        for light in terms.lights
+        for name in ("diffuse", "specular")
+    )
+    column, row = terms.pixel
+    rows = [("emission", terms.emission), ("ambient", terms.ambient), *lit]
+    rows = [*((name, rgb) for name, rgb in (*rows, ("other lights", terms.others)) if any(rgb))]
+    rows += [("textbook", terms.total), ("physical", tuple(reference[row, column].tolist()))]
+    return PickedTerms(terms.pixel, terms.material.name, tuple(rows))
 
 
 def _of(kind: type[View], source: object) -> View:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from comparisons import records
 from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.page import switchboard
+from reports.page.costs import point_pictures
+from reports.page.embedding import ERROR_DIGITS, embed_colours
 from reports.page.scene_view import CostView, EffectMap, picture_name
+from reports.run.places import PAGE
 from reports.terminal.cost_tables import closure, noise
 
 if TYPE_CHECKING:
@@ -54,12 +61,17 @@ def documents(study: Study) -> dict[str, bytes]:
 
 
 def write(place: Path, study: Study) -> None:
-    """Write the files of a study to a folder, each atomically; other files stay.
+    """Write the files and the page of a study to a folder, each atomically; other files stay.
 
     The record comes last, so its pictures are never those of another study.
     """
+    from reports.page.costs import cost_page
+
     ownership.folder(place)
-    for name, content in documents(study).items():
+    made = documents(study)
+    page = cost_page.render(view(study, made), figures(study.record))
+    ownership.write(place / PAGE, page)
+    for name, content in made.items():
         ownership.write(place / name, content)
 
 
@@ -89,7 +101,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             for name, content in made.items()
             if name.endswith(".png")
         },
-        noise=" ".join(each(study.record) for each in (noise, closure) if study.effects),
+        noise=" ".join(_typeset(each(study.record)) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
         sheet=switchboard.sheet(
             [
@@ -97,7 +109,20 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
                 for corner in study.record.prices.corners
             ]
         ),
+        points=point_pictures.sheet(study),
+        between=embed_colours(_between_surfaces(study), ERROR_DIGITS),
     )
+
+
+def _typeset(text: str) -> str:
+    return re.sub(r"-(?=\d)", "−", text)
+
+
+def _between_surfaces(study: Study) -> NDArray[np.float64]:
+    """Return the part (H, W, 3) of the reference that all light adds to direct light."""
+    seen = study.reference > 0
+    shares = np.divide(study.parts["transport"], study.reference, where=seen, out=0.0 * seen)
+    return np.clip(shares, 0, 1)
 
 
 def _effect_map(study: Study) -> EffectMap:

@@ -134,7 +134,11 @@ def write_scene(
         files={file: f"{name}/{file}" for file in links},
         charts=tuple(cost_files.figures(study.record)) if study else (),
         cost=cost_files.view(study, priced) if study else None,
-        terms=terms_view.view(comparison.terms, comparison.no_terms),
+        terms=terms_view.view(
+            comparison.terms,
+            comparison.no_terms,
+            terms_view.picked(comparison.terms, record.regions, shown.reference),
+        ),
         lit=lit(shown, record.viewing.exposure),
     )
     with ownership.replacing_folder(folder / name) as place:

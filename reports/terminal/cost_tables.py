@@ -47,6 +47,8 @@ def lines(record: Cost) -> Iterator[str]:
         yield "alone, last: added first, added last"
         yield noise(record)
         yield closure(record)
+    if len(record.objects) > 1 and record.prices.effects:
+        yield from _section("Mean ΔE2000 removed on each shape", _objects(record))
     yield from _section("Parts of the departure, linear", _parts(record))
     if record.prediction:
         yield from predicted(record.prediction)
@@ -185,6 +187,14 @@ def _prices(record: Cost) -> Rows:
             f"{price.last:.3f}",
             *_timed(price.adds_s.value, price.adds_s),
         )
+
+
+def _objects(record: Cost) -> Rows:
+    effects = (price.effect for price in record.prices.effects)
+    yield "shape", "of the departure", "mean ΔE2000", *effects
+    for row in record.objects:
+        removes = (f"{each.value:.3f} ± {each.high - each.value:.3f}" for each in row.removes)
+        yield row.name, f"{row.share:.1%}", f"{row.departure:.3f}", *removes
 
 
 def _parts(record: Cost) -> Rows:

@@ -64,9 +64,10 @@ def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
 
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the methods and prices of a study of cost: ``name-cost`` and ``name-prices``."""
+    """Write the tables of a study of cost: ``name-cost``, ``name-prices`` and ``name-shapes``."""
     ownership.folder(folder)
-    for part, rows in {"cost": [*methods(record)], "prices": [*prices(record)]}.items():
+    made = {"cost": methods(record), "prices": prices(record), "shapes": shapes(record)}
+    for part, rows in ((part, [*found]) for part, found in made.items()):
         ownership.write(folder / f"{name}-{part}.csv", comma_separated(rows))
         shown = ([_shown(cell) for cell in row] for row in rows)
         ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
@@ -88,6 +89,15 @@ def prices(record: Cost) -> Iterator[Sequence[Any]]:
     for price in record.prices.effects:
         removes = price.removes.value, price.removes.low, price.removes.high
         yield price.effect, *removes, price.alone, price.last, price.adds_s.value
+
+
+def shapes(record: Cost) -> Iterator[Sequence[Any]]:
+    """Yield the rows of the shapes: the mean ΔE2000 that each effect removes there."""
+    yield "shape", "pixels", "share", "dE2000", "effect", "removes", "removes_low", "removes_high"
+    for row in record.objects:
+        for price, removes in zip(record.prices.effects, row.removes, strict=True):
+            found = removes.value, removes.low, removes.high
+            yield row.name, row.pixels, row.share, row.departure, price.effect, *found
 
 
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:

@@ -34,7 +34,7 @@ def bytes_of(css):
 def test_charts_come_alive(visitor):
     page = enlivened(visitor)
     assert page.locator(".scene.open .chart svg").count() == CHARTS
-    titles = page.locator(".scene.open .charts.wide figcaption").all_text_contents()
+    titles = page.locator(".scene.open .charts.wide .chart-figure > figcaption").all_text_contents()
     assert titles == ["Error against time", "Price of an effect"]
 
 

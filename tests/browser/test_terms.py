@@ -3,6 +3,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from tests import term_grids
@@ -166,3 +167,36 @@ def test_a_scene_that_is_opened_again_does_not_keep_the_pixel_of_before(visitor)
     visitor.open(SCENE)
     visitor.settle()
     assert title.text_content() == first
+
+
+def test_the_reference_is_split_by_the_light_between_surfaces(visitor, report):
+    page = visitor.open(SCENE)
+    pick(visitor, 30, 18, "click")
+    page.wait_for_selector("#terms tr.split")
+    parts = [
+        [float(cell.text_content().replace("< ", "")) for cell in row.locator("td").all()[1:]]
+        for row in page.locator("#terms tr.split").all()
+    ]
+    whole = values(shown_rows(page)["physical"])
+    study = report.study
+    share = np.clip(study.parts["transport"] / study.reference, 0, 1)
+    place = page.locator("#terms h3 span").text_content()
+    column, row = (int(text) for text in re.findall(r"\d+", place)[:2])
+    cell = row * study.reference.shape[0] // HEIGHT, column * study.reference.shape[1] // WIDTH
+    np.testing.assert_allclose(np.sum(parts, axis=0), whole, rtol=0.02, atol=1e-3)
+    np.testing.assert_allclose(parts[1], whole * share[cell], rtol=0.06, atol=1e-3)
+
+
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
+def test_without_scripts_the_terms_of_one_pixel_add_up(visitor):
+    visitor.page.goto(visitor.report.url)
+    (table,) = visitor.page.locator(".unscripted table:visible").all()
+    rows = {
+        row.locator("th").text_content(): [
+            float(cell.get_attribute("value")) for cell in row.locator("td data").all()
+        ]
+        for row in table.locator("tbody tr").all()
+    }
+    whole, _ = rows.pop("textbook"), rows.pop("physical")
+    assert len(rows) > 2
+    np.testing.assert_allclose(np.sum([*rows.values()], axis=0), whole, rtol=1e-6)

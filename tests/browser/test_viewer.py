@@ -196,7 +196,7 @@ def test_zooming_enlarges_pixels_to_squares(visitor, report):
     for _ in range(6):
         page.mouse.wheel(0, -120)
     page.keyboard.up("Control")
-    visitor.settle()
+    page.wait_for_timeout(400)  # the gesture's end
     state = visitor.state()
     zoom = float(state["zoom"])
     assert zoom > 3 * visitor.canvas().bounding_box()["width"] / WIDTH

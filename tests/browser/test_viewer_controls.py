@@ -12,10 +12,20 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touc
 SMALL = {"viewport": {"width": 360, "height": 640}}
 
 
+COUNTING = """() => {
+  const replace = history.replaceState.bind(history);
+  window.replaced = 0;
+  history.replaceState = (...given) => {
+    window.replaced += 1;
+    replace(...given);
+  };
+}"""
+
+
 def wheel(visitor, steps=3):
     for _ in range(steps):
         visitor.page.mouse.wheel(0, -120)
-    visitor.page.wait_for_timeout(150)
+    visitor.page.wait_for_timeout(400)  # the gesture's end
 
 
 @pytest.mark.parametrize("visitor", [{"viewport": {"width": 1200, "height": 500}}], indirect=True)
@@ -30,9 +40,11 @@ def test_the_wheel_scrolls_the_page_until_a_click_into_the_picture(visitor):
     assert "zoom" not in visitor.state()
     page.mouse.click(*place)
     before = page.evaluate("window.scrollY")
+    page.evaluate(COUNTING)
     wheel(visitor)
     assert page.evaluate("window.scrollY") == before
     assert "zoom" in visitor.state()
+    assert page.evaluate("window.replaced") == 1  # once for the whole gesture
 
 
 def test_what_does_nothing_in_a_mode_is_disabled(visitor):
@@ -168,7 +180,12 @@ def test_the_picture_is_saved_as_it_is_seen(visitor, tmp_path):
     download.value.save_as(tmp_path / "saved.png")
     image = np.asarray(Image.open(tmp_path / "saved.png"))
     box = visitor.canvas().bounding_box()
-    assert image.shape[:2] == (round(box["height"]), round(box["width"]))
+    height, width = round(box["height"]), round(box["width"])
+    assert image.shape[0] > height + 40
+    assert image.shape[1] == width
+    bar, line = image[height + 8 : height + 18, 8:428, :3], image[-24:, :, :3]
+    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 100  # the legend's colours
+    assert (line.min(axis=(0, 2)) < 100).sum() > 100  # the letters of a line
     for (left, top), seen in zip(places, expected, strict=True):
         np.testing.assert_array_equal(image[int(top), int(left), :3], seen)
 

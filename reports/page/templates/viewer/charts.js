@@ -34,4 +34,5 @@ async function enliven(chart) {
   // Expressions are interpreted, since the page's policy forbids code made from text.
   await embed(chart, spec, { ast: true, renderer: "svg", actions: false, mode: "vega-lite" });
   chart.querySelector("svg")?.setAttribute("aria-hidden", "true"); // the chart has a label
+  await makePoints(chart);
 }

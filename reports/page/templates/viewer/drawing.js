@@ -58,7 +58,7 @@ class Drawing {
   contents({ swapped, map, gain }) {
     const error = { picture: "map", title: gain === 1 ? map.title : `${map.title}, without that exposure` };
     const halves = ["heuristic", "reference"].map((half) => ({ picture: half, title: PANE_TITLES[half] }));
-    if (gain !== 1) halves[0].title += ` × ${plainly(Number(gain.toPrecision(3)))}`;
+    if (gain !== 1) halves[0].title += ` ${gainText(gain)}`;
     switch (this.view.mode) {
       case "side": return [...halves, error].map((one) => [one]);
       case "error": return [[error]];

@@ -51,6 +51,7 @@ function openScene(scene) {
   watchCharts(section);
   void makeSwitchboard(section);
   void makeObjects(section);
+  explainTerms(section);
 }
 
 /** @param {string} id @returns {HTMLElement} */
@@ -78,6 +79,13 @@ function turn(step) {
 }
 
 listenToPrinting(viewer);
+explainTerms(document.body);
+listenForHelp(byId("tip"));
+document.querySelector(".skip")?.addEventListener("click", (event) => {
+  event.preventDefault(); // the fragment is the view's
+  event.stopPropagation();
+  /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2") ?? document.getElementById("main"))?.focus();
+});
 listenToKeys(viewer, turn, () => address.go("#"));
 address.listen(follow);
 begin();

@@ -33,6 +33,7 @@
  * @property {Manifest} images
  * @property {Effects | null} effects
  * @property {Terms | null} terms
+ * @property {Manifest | null} between   the share of the reference's light from between surfaces
  * @property {Record<string, number>} keys   by column of the overview
  * @property {boolean} significant
  * @property {undefined} [failed]
@@ -52,6 +53,7 @@
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
  * @property {number[][]} mask   colours of pixels: marked, unmarked, not counted, undetermined
  * @property {number[][]} xyz
+ * @property {Record<string, string>} terms   meanings, from the glossary
  * @property {number} epsilon
  */
 
@@ -66,6 +68,12 @@ function bestOf(scene, map) {
 /** The factor on the textbook's image in a view. @param {Scene} scene @param {View} view */
 function gainOf(scene, view) {
   return view.best ? bestOf(scene, view.map).factor : 1;
+}
+
+/** A factor on the textbook's image, in words. @param {number} gain */
+function gainText(gain) {
+  const rounded = plainly(Number(gain.toPrecision(3)));
+  return rounded === "1" ? "at the same exposure" : `× ${rounded}`;
 }
 
 /** The map with a known name. @param {Page} page @param {string} name @returns {Legend} */

@@ -3,12 +3,17 @@
 /** Most movement of a tap; distance within which a press grabs the divide (CSS pixels). */
 const TAP = 5, REACH = 14;
 
+/** Milliseconds without the wheel that end its gesture. */
+const GESTURE = 200;
+
 /** @param {Viewer} viewer */
 function listenToPointers(viewer) {
   const { canvas } = viewer;
   /** Pointers that are down, by id. @type {Map<number, number[]>} */
   const down = new Map();
   let moved = 0;
+  /** Ends a gesture of the wheel. */
+  let rest = 0;
   let dividing = false;
   /** Where a selection begins. @type {number[] | null} */
   let corner = null;
@@ -56,7 +61,9 @@ function listenToPointers(viewer) {
     // The wheel scrolls the page, unless the picture was clicked.
     if (!event.ctrlKey && !event.metaKey && document.activeElement !== canvas) return;
     event.preventDefault();
-    viewer.change(viewer.viewport.zoomed(viewer.view, 2 ** (-event.deltaY / 240), place(event)));
+    viewer.change(viewer.viewport.zoomed(viewer.view, 2 ** (-event.deltaY / 240), place(event)), true);
+    clearTimeout(rest);
+    rest = setTimeout(() => viewer.change({}), GESTURE); // one address for the whole gesture
   }, { passive: false });
 }
 

@@ -73,6 +73,22 @@ function sumRows(point, images) {
   return rows;
 }
 
+/** The reference, in the light straight from lights and that from between surfaces, by the study's shares. @param {AnyPoint} point @param {Images} images @param {Scene} scene @param {Images | null} between */
+function splitRows(point, images, scene, between) {
+  if (!between || !point.material) return [];
+  const [x, y] = point.pixel;
+  const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
+  const cell = Math.floor((y * between.height) / scene.height) * between.width + Math.floor((x * between.width) / scene.width);
+  const colours = ["R", "G", "B"];
+  const whole = colours.map((colour) => VALUES[images.codes[`reference.${colour}`][place]]);
+  const shares = colours.map((colour) => decimal(between.codes[colour][cell], between.planes[0].digits));
+  const size = `${between.width} × ${between.height}`;
+  return [
+    termRow("from lights", "straight from lights or emitted: the rest", whole.map((value, channel) => amount(value * (1 - shares[channel]))), "split"),
+    termRow("between surfaces", `in the share that a study at ${size} pixels found`, whole.map((value, channel) => amount(value * shares[channel])), "split"),
+  ];
+}
+
 /** @param {LightTerms | null} light @param {number} cosView */
 function vectorsInWords(light, cosView) {
   const angle = (/** @type {number} */ cosine) => `${degreesOf(cosine).toFixed(0)}°`;

@@ -19,6 +19,8 @@ class TermsPanel {
     this.scene = null;
     /** @type {TermsData | null} */
     this.data = null;
+    /** @type {Images | null} */
+    this.between = null;
     /** @type {number[] | null} */
     this.asked = null;
     document.addEventListener("pick", (event) => {
@@ -31,18 +33,22 @@ class TermsPanel {
   async open(scene, section) {
     const { terms } = scene;
     this.scene = scene;
-    this.data = this.asked = null;
+    this.data = this.between = this.asked = null;
     this.panel.hidden = !terms;
     if (!terms) return;
-    section.querySelector(".stage")?.after(this.panel);
+    section.querySelector(".pictures")?.after(this.panel); // first on paper, hidden on screens
     this.part("missing").hidden = !terms.missing;
     this.part("missing").textContent = `No terms. ${terms.missing}`;
     this.part("whole").hidden = !terms.grid;
     this.part("place").textContent = "";
     if (!terms.grid) return;
-    const data = await termsOf(scene, terms, terms.grid);
+    const [data, between] = await Promise.all([
+      termsOf(scene, terms, terms.grid),
+      scene.between && decode(scene.between, scene.between.data),
+    ]);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.data = data;
+    this.between = between;
     this.show(this.asked ?? firstPixel(scene, data));
   }
 
@@ -84,7 +90,7 @@ class TermsPanel {
     const [list, sums] = this.panel.querySelectorAll("tbody");
     list.replaceChildren(...(point.material ? termRows(point) : []));
     void imagesOf(scene.id, scene.images).then((images) => {
-      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
+      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images), ...splitRows(point, images, scene, this.between));
     });
   }
 

@@ -1,0 +1,170 @@
+"""The technical terms of the page, each with one sentence: its help, and its list of terms."""
+
+from comparisons.departure.metrics import METRICS, RATIO
+
+Terms = dict[tuple[str, ...], str]
+"""A sentence by the names under which a term is shown."""
+
+RESULTS: Terms = {
+    ("shape", "mean shape", "ΔE2000, best exposure", "after the best exposure"): (
+        "The mean that remains after the one exposure of the textbook image that lowers it most:"
+        " no exposure would remove it."
+    ),
+    ("level", "level mean − shape"): (
+        "The part of the mean that the best exposure removes: a difference in brightness alone."
+    ),
+    ("best exposure", "factor"): (
+        "The one factor on the textbook image that makes the metric’s mean smallest."
+    ),
+    ("noise", "noise floor", "ΔE2000, noise floor"): (
+        "The mean that the reference’s own noise gives: its distance from itself with noise of"
+        " its standard error added."
+    ),
+    ("without noise", "without noise 95 %"): (
+        "The mean without the part that is due to noise, with a 95 % interval. If it contains 0,"
+        " there may be no departure."
+    ),
+    ("significant", "significant pixels", "shown to differ"): (
+        "Pixels whose linear difference is more than noise, however small. At most 5 % of these"
+        " marks are expected to be wrong; more samples show more of them."
+    ),
+    ("undetermined",): "Not shown to differ, but noise might hide a visible difference there.",
+    ("not counted",): "Pixels that see no surface are left out of all numbers.",
+    ("unchanged",): "Both images as rendered, with one exposure.",
+    ("median",): "Half of the values are below it.",
+    ("95 %",): "95 % of the pixels are below it.",
+    ("95 % interval", "interval"): (
+        "The range that holds the true value in 95 of 100 such measurements."
+    ),
+    ("standard error",): (
+        "How far the mean of the samples is likely to be from the true value, because of noise."
+    ),
+    ("RMS", "root mean square"): "The square root of the mean of the squares.",
+    ("of the departure",): "Its part of the sum of ΔE2000 over all pixels.",
+    ("mostly", "effect", "worth most", "cause", "causes"): (
+        "The difference between the two halves that adds most to the departure there."
+    ),
+    ("region", "regions"): "The rectangles of the image that hold most of the departure.",
+}
+
+VIEWS: Terms = {
+    ("textbook", "heuristic"): (
+        "The scene shaded by the textbook’s model: ambient, Lambert and Phong."
+    ),
+    ("physical", "physical reference", "reference"): (
+        "The same scene with Mitsuba’s physically based materials and light transport."
+    ),
+    ("textbook, as seen", "physical, as seen"): (
+        "The colour on the screen, after exposure and tone map, as hexadecimal sRGB."
+    ),
+    ("tone map",): (
+        "How linear light becomes a colour of the screen. Clipped: as a display shows it."
+    ),
+    ("exposure",): "A factor on both images, in stops: one stop doubles the light.",
+    ("range",): "The value at which the colours of the map end.",
+    ("map of the error",): "Which measure of the difference the map shows.",
+    ("flicker",): "Both pictures in turn in one place: differences jump out.",
+    ("split",): "The textbook’s picture to the left of a line, the physical one to its right.",
+    ("XYZ and L*a*b*",): (
+        "Coordinates of colour: XYZ is linear in light, L*a*b* is nearly even for the eye."
+    ),
+}
+
+COSTS: Terms = {
+    ("method",): "A way to render the scene, from flat shading to all light transport.",
+    ("samples",): "Samples per pixel: camera rays whose mean is the pixel’s colour.",
+    ("time for one image",): "Of a later image of the same size; the first one also compiles.",
+    ("first run",): "The first image, with tracing and compiling the program.",
+    ("error left",): "The method’s mean distance from the converged reference.",
+    ("reaches ΔE2000 of",): "The time after which the method’s mean error is this small.",
+    ("error against time",): (
+        "Each point is a method with a number of samples. Further left is faster, lower is better."
+    ),
+    ("price of an effect", "removes"): (
+        "The mean ΔE2000 that simulating the effect removes: a Shapley value, the mean over all"
+        " orders of adding the effects."
+    ),
+    ("adds",): "The time that simulating the effect adds to one image.",
+    ("first",): "ΔE2000 removed if the effect is added before all others.",
+    ("last",): "ΔE2000 removed if the effect is added after all others.",
+    ("left", "left with all"): (
+        "ΔE2000 that remains with all effects: 0 apart from noise, or some effect has no price."
+    ),
+    ("part",): "A step from the textbook image to the reference; the steps add up.",
+    ("per pass, median",): "A pass is one image with a part of the samples.",
+    ("compilation",): "Time to turn the rendering program into machine code.",
+}
+
+PLANS: Terms = {
+    ("called for",): "Whether the scene needs the effect, by a rule that is proved or measured.",
+    ("rule",): "Why the effect is simulated, or left out without any change of the image.",
+    ("guard",): "A few rays with everything simulated, which check that the plan left out nothing.",
+    ("pairing",): "How each textbook material and light gets its physical partner.",
+    ("misses",): "Quantities in which the physical partner cannot equal the textbook’s.",
+}
+
+EFFECTS: Terms = {
+    ("occlusion",): "Shadows: surfaces that hide a light. The textbook lights through them.",
+    ("interreflection",): (
+        "Light that reaches a surface from other surfaces. The textbook has ambient light instead."
+    ),
+    ("microfacets and Fresnel",): (
+        "Highlights of rough, transparent coats, stronger at grazing angles. Phong’s are not."
+    ),
+    ("extended lights",): "Lights with an area, and so soft shadows. The textbook’s are points.",
+    ("environment",): "Light from all around. The textbook has one ambient colour.",
+    ("spectral",): "Light by wavelength in place of three colours.",
+    ("polygon interpolation",): "Flat and Gouraud shading, which interpolate over polygons.",
+    ("transmission",): "Light that passes through surfaces, which the textbook’s cannot.",
+    ("distance attenuation",): "How light weakens with distance: physically by its square.",
+    ("spot cone",): "How a spot light weakens towards the edge of its cone.",
+}
+
+METHODS: Terms = {
+    ("flat kernel",): "The textbook’s model with one colour for each polygon.",
+    ("Gouraud kernel",): "The textbook’s model at the corners of polygons, interpolated between.",
+    ("Phong kernel",): "The textbook’s model at each point, with interpolated normals.",
+    ("kernel with shadows",): "The textbook’s model with a shadow ray to each light.",
+    ("shadow map", "filtered shadow map"): (
+        "Shadows from a depth image as each light sees it; filtered: with soft edges."
+    ),
+    ("constant ambient", "hemisphere ambient", "spherical harmonics"): (
+        "Ambient light that stands in for light between surfaces: one colour, two colours for up"
+        " and down, or nine terms over all directions."
+    ),
+    ("ambient occlusion", "ambient occlusion, depth image"): (
+        "Ambient light, darker where near surfaces hide the surroundings: by rays, or as far as a"
+        " depth image shows."
+    ),
+    ("phong BSDF, full transport",): "Textbook materials under all light transport.",
+    ("direct",): "Physical materials under the light that comes straight from lights.",
+    ("path 3", "path 4", "path 5"): (
+        "Path tracing that ends after as many steps; 2 is direct light alone."
+    ),
+    ("full plan",): "Everything that the scene calls for.",
+}
+
+GROUPS: dict[str, Terms] = {
+    "Results": RESULTS,
+    "Views": VIEWS,
+    "Costs": COSTS,
+    "Plans": PLANS,
+    "Effects": EFFECTS,
+    "Methods": METHODS,
+}
+
+
+def meanings() -> dict[str, str]:
+    """Return the sentence of each name of a term, metrics included."""
+    found = {
+        name: f"{metric.definition} {metric.caution}"
+        for metric in METRICS.values()
+        for name in (metric.label, metric.heading, f"mean {metric.label}")
+    }
+    found[RATIO.label] = f"Stops: {RATIO.definition}."
+    return found | {
+        name: meaning
+        for terms in GROUPS.values()
+        for names, meaning in terms.items()
+        for name in names
+    }

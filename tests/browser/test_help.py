@@ -1,0 +1,90 @@
+"""Help on terms, targets, the skip link, and the phone's first screen: a walk over the page."""
+
+import pytest
+
+from reports import glossary
+from tests.browser.conftest import NOISY_ID
+from tests.browser.test_page_at_large import PHONE, VIEWS
+
+SCENE = f"#scene={NOISY_ID}"
+
+PLAIN = {
+    "", "scene", "material", "materials", "mean", "max", "name", "r", "g", "b", "a", "x", "y", "z",
+    "l", "pixel", "pixels", "metric", "shape", "of the pixels", "term", "in numbers", "cause",
+    "together", "keys", "lights", "passes", "all passes", "first pass",
+}  # fmt: skip
+"""Headings in everyday words, and names of axes."""
+
+HEADINGS = """() => [...document.querySelectorAll("thead th, .pixel th, dt")].filter((one) =>
+  one.checkVisibility() && !one.dataset.term && !one.querySelector("[data-term]")
+  && !one.closest(".reading, .records, .keys, .terms tbody"))
+  .map((one) => one.innerHTML.replace(/<[^>]*>/g, " ").toLowerCase()
+    .replace(/[^\\p{L}\\p{N}%]+/gu, " ").trim())"""
+
+SMALL = """() => [...document.querySelectorAll(
+    "button, select, input, summary, nav a, .bars a, .regions a, .carriers a, .actions a")]
+  .filter((one) => one.checkVisibility())
+  .map((one) => [one.outerHTML.slice(0, 90), one.getBoundingClientRect()])
+  .filter(([, box]) => box.width && Math.min(box.height, box.width) < 31.9)
+  .map(([name]) => name)"""
+
+CLIPPED = """() => [...document.querySelectorAll("body *")].filter((one) =>
+    one.checkVisibility() && !one.closest(".scroll, svg, .equation, .skip, pre"))
+  .filter((one) => one.getBoundingClientRect().right > document.documentElement.clientWidth + 1
+    || (one.matches("button, select, summary, label") && one.scrollWidth > one.clientWidth + 1))
+  .map((one) => one.outerHTML.slice(0, 90))"""
+
+
+def test_hover_and_focus_tell_what_a_term_means(visitor):
+    page = visitor.open(SCENE)
+    tip = page.locator("#tip")
+    assert tip.is_hidden()
+    page.locator("#inspector").get_by_text("Standard error", exact=True).hover()
+    assert tip.text_content() == glossary.meanings()["standard error"]
+    page.mouse.move(1, 1)
+    assert tip.is_hidden()
+    button = page.get_by_role("button", name="Best exposure")
+    button.focus()
+    assert tip.text_content() == glossary.meanings()["best exposure"]
+    assert button.get_attribute("aria-describedby") == "tip"
+    page.keyboard.press("Escape")
+    assert tip.is_hidden()
+    assert visitor.state()["scene"] == NOISY_ID
+
+
+def test_no_term_is_without_help(visitor):
+    for fragment in ("", "#list=table", SCENE):
+        page = visitor.open(fragment)
+        visitor.unfold()
+        found = {name for name in page.evaluate(HEADINGS) if not name.isdigit()}
+        assert found - PLAIN == set(), fragment
+
+
+@pytest.mark.parametrize("visitor", [{}, PHONE], indirect=True)
+def test_targets_are_large_enough_and_nothing_is_clipped(visitor):
+    for fragment in VIEWS:
+        page = visitor.open(fragment)
+        visitor.unfold()
+        assert page.evaluate(SMALL) == [], fragment
+        assert page.evaluate(CLIPPED) == [], fragment
+
+
+def test_the_first_tab_skips_to_the_results(visitor):
+    page = visitor.open()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    visitor.open(SCENE)
+    page.locator(".skip").focus()
+    page.keyboard.press("Enter")
+    assert visitor.state()["scene"] == NOISY_ID
+    assert page.evaluate("document.activeElement.matches('.scene.open h2')")
+
+
+@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
+@pytest.mark.parametrize(("fragment", "sentence"), [("", ".verdict h2"), (SCENE, ".headline")])
+def test_the_first_screen_of_a_phone_has_the_verdict(visitor, fragment, sentence):
+    page = visitor.open(fragment)
+    box = page.locator(f"{sentence}:visible").bounding_box()
+    assert box["y"] + box["height"] < 500
