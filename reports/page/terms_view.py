@@ -83,8 +83,9 @@ class TermsView(Record):
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        found = plain(structs.replace(self, picked=None))
-        return found | {
+        shown = plain(structs.replace(self, picked=None))
+        del shown["picked"]
+        return shown | {
             "grid": self.grid.manifest() if self.grid else None,
             "incidences": polar.INCIDENCES.tolist(),
             "views": polar.VIEWS.tolist(),
