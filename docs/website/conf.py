@@ -10,8 +10,15 @@ project = "fotismos"
 release = heuristic.__version__
 html_title = f"{project} {release}"
 html_theme = "furo"
-html_static_path = ["static"]
-html_css_files = ["website.css"]
+html_theme_options = {
+    f"{scheme}_css_variables": {
+        "font-stack": "system-ui, sans-serif",
+        "color-brand-primary": accent,
+        "color-brand-content": accent,
+        "color-brand-visited": accent,
+    }
+    for scheme, accent in (("light", "#1a56a0"), ("dark", "#8ab8f0"))
+}
 html_copy_source = False
 html_show_copyright = False
 

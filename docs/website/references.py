@@ -6,7 +6,6 @@ from docutils.nodes import Element
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
-
 from website.api_pages import ROOMS
 
 
