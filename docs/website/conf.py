@@ -36,6 +36,8 @@ myst_heading_anchors = 4
 add_module_names = False
 python_maximum_signature_line_length = 88
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_inherit_docstrings = False  # click's speak of click's own names
 autodoc_default_options = {
     "members": True,
     "ignore-module-all": True,  # names are documented where they are defined
