@@ -31,6 +31,7 @@ extensions = [
 ]
 nitpicky = True
 default_role = "code"
+highlight_language = "text"  # of blocks that name none: commands
 myst_heading_anchors = 4
 
 add_module_names = False
