@@ -71,7 +71,12 @@ class Loaded(HTMLParser):
             self.addresses.append(found.get("src") or found.get("href") or "")
 
 
-BUILD = "import sys; from pathlib import Path; from website import build; sys.exit(build.build(Path(sys.argv[1])))"
+BUILD = """
+import sys
+from pathlib import Path
+from website import build
+sys.exit(build.build(Path(sys.argv[1])))
+"""
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ def lines(folder: Path) -> Iterator[str]:
     for path in sorted(folder.glob("*.py")):
         if not path.stem.startswith("__"):
             module = dotted(path.with_suffix(""))
-            yield from (module, "-" * len(module), "", f".. automodule:: {module}", "")
+            yield from (path.stem, "-" * len(path.stem), "", f".. automodule:: {module}", "")
 
 
 def name(path: str, words: str) -> str:

@@ -44,5 +44,6 @@ autodoc_default_options = {
     "ignore-module-all": True,  # names are documented where they are defined
 }
 napoleon_google_docstring = False
+napoleon_use_param = False  # parameters that share a description stay together
 napoleon_use_rtype = False
 napoleon_custom_sections = [("Attributes", "params_style")]
