@@ -41,7 +41,7 @@ def test_each_guarantee_leads_to_the_source_of_its_test(sources):
 
     page = (sources / "docs/guarantees.md").read_text("utf-8")
     for each in guarantees.guarantees():
-        label = re.search(rf"\[{each.test}\]\(#(\S+)\)", page)[1]
+        label = re.search(rf"\[{each.test}\]\(#([^)]+)\)", page)[1]
         text = (sources / f"files/{each.path}.rst").read_text("utf-8")
         section = text.partition(f".. _{label}:\n")[2].partition("\n.. _")[0]
         assert re.search(rf"(def|class) {each.test}\b", section), each
