@@ -28,7 +28,8 @@ def page(path: str) -> str:
     tests = {key: each for key, each in shown().items() if each.path == path}
     parts = [":orphan:", heading(path, "=")]
     for key, each in tests.items():
-        parts += [f".. _{key}:", heading(each.test, "-"), each.text.replace("`", "``")]
+        words = each.test.removeprefix("test_").replace("_", " ").capitalize()
+        parts += [f".. _{key}:", heading(words, "-"), each.text.replace("`", "``")]
         parts.append(code(*source(text, each.test)))
     if tests:
         parts.append(heading("The whole file", "-"))
