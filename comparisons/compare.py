@@ -156,15 +156,15 @@ def compare(
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    options : Options, optional
+    options
         What to render, and how to judge it.
-    progress : callable, optional
+    progress
         Called as ``progress(stage, done, total)`` after each pass.
     command
         How to repeat the comparison, for the record.
-    kept : optional
+    kept
         Holds the passes of an interrupted run, and takes those of this one
         (:func:`comparisons.render.render`).
 

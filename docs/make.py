@@ -1,5 +1,7 @@
 """Makes the generated parts of the documentation: ``./run docs``; ``--all`` also measures again.
 
+``./run docs --site`` only builds the site.
+
 Pictures and tables come from renderings with fixed seeds. The index of equations comes from the
 docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced; the rest is
 written by hand.
@@ -57,6 +59,8 @@ POLYGONS = (
 
 def main(words):
     """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
+    if words == ["--site"]:
+        return _site()
     set_variant("llvm_ad_rgb")
     if words == ["--accuracy"]:
         return _accuracy()
@@ -161,6 +165,16 @@ def _lobes():
     grid = compare(builtin("plastic-spheres").source(), options).terms
     for name, place in LOBES.items():
         atomic.write(DOCS / f"models-lobes-{name}.svg", term_figure.svg(grid.at(*place)) + "\n")
+
+
+def _site():
+    """Build the site from what is there, in out/site."""
+    from website import build  # next to this script
+
+    folder = DOCS.parent / "out/site"
+    if build.build(folder):
+        raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
+    print(folder / "index.html")
 
 
 def _measurements():

@@ -77,7 +77,7 @@ class Subject(ABC):
 
     @abstractmethod
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """Return what :meth:`response` returns, before it is checked."""
+        """Return what ``response`` returns, before it is checked."""
 
     @abstractmethod
     def settings(self) -> Iterator[Setting]:

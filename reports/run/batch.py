@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from reports.terminal.progress import Bar
 
 More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
-Judge = Callable[[Path, Sequence["SceneView"]], None]
 Calls = Mapping[str, tuple[str, Path, str, Wanted]]
 """The arguments of :func:`reports.run.single.compare` for each place."""
 
@@ -42,7 +41,7 @@ def run(
     pool: Pool,
     more: More | None = None,
     seen: Callable[[Path], object] = lambda _: None,
-    judge: Judge | None = None,
+    judge: Callable[[Path, Sequence[SceneView]], None] | None = None,
 ) -> None:
     """Compare scenes, and write the results of each, then the page and tables of all.
 
