@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from comparisons.audit import angles, gradients
-from comparisons.audit.audit import checks_of
+from comparisons.audit.audit import examined
 from comparisons.audit.scattering import Scattering
-from comparisons.audit.shaded import ALPHA, Shaded, opened
+from comparisons.audit.shaded import Shaded, opened
 from comparisons.audit.subject import Subject
 from heuristic import Range
 from heuristic.errors import InputError
@@ -35,8 +35,7 @@ def shaded(function):
 
 
 def failing(subject):
-    curves = tuple(angles.curve(subject, material) for material in subject.materials)
-    return {check.name for check in checks_of(subject, curves) if check.verdict == "does not hold"}
+    return {check.name for check in examined(subject)["checks"] if check.verdict == "does not hold"}
 
 
 def curves_of(subject):
@@ -93,8 +92,9 @@ def lobe(form, n, degrees):
 def test_the_textbooks_lobes_return_what_a_quadrature_finds(rgb, form):
     subject = opened(form, {})
     subject.grid = (240, 180)
-    n = factors.exponent_of(ALPHA, form)
-    returned = dict(zip(angles.ANGLES, curves_of(subject)["metal"].returned, strict=True))
+    curve = curves_of(subject)["metal, alpha 0.3"]
+    n = factors.exponent_of(curve.alpha, form)
+    returned = dict(zip(angles.ANGLES, curve.returned, strict=True))
     head_on = lobe(form, n, 0)
     for degrees in (0.0, 45.0, 80.0):
         assert returned[degrees] == pytest.approx(lobe(form, n, degrees) / head_on, rel=5e-3)
@@ -111,7 +111,7 @@ def test_roughplastic_loses_light_and_is_reciprocal(rgb):
     curve = angles.curve(subject, "roughplastic")
     known = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), 0.5, 1.49 / 1.000277))
     assert curve.seen[0] == pytest.approx(known.diffuse[0] + known.specular[0], abs=3e-3)
-    found = {check.name: check for check in checks_of(subject, (curve,))}
+    found = {check.name: check for check in examined(subject)["checks"]}
     assert found["white furnace"].verdict == "does not hold"
     holding = ("energy", "reciprocity", "horizon", "light from below", "sampling", "values")
     assert {found[name].verdict for name in holding} == {"holds"}

@@ -32,6 +32,7 @@ def curve(subject: Subject, material: str) -> Curve:
     """Return the two albedos of a white material over :data:`ANGLES`."""
     return Curve(
         material=material,
+        alpha=subject.materials[material],
         seen=tuple(_seen(subject, material, angle) for angle in ANGLES),
         returned=tuple(_returned(subject, material, angle) for angle in ANGLES),
     )
@@ -81,20 +82,29 @@ def energy(curves: tuple[Curve, ...]) -> Checked:
 def reciprocity(subject: Subject) -> Checked:
     """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
     a, b = furnace.random_pairs()
-
-    def difference(material: str) -> np.ndarray:
-        there = subject.response(material, a, b) / a[2]
-        back = subject.response(material, b, a) / b[2]
-        return furnace.relative_differences(there, back)
-
-    found = {material: difference(material) for material in subject.materials}
+    found = {material: asymmetries(subject, material, a, b) for material in subject.materials}
     value, worst = _largest(found, a, b)
     expected = f"at most {RECIPROCAL} of the mean"
     return checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
 
 
+def asymmetries(subject: Subject, material: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the relative differences (C, N) of ``f(a, b)`` and ``f(b, a)``."""
+    there = subject.response(material, a, b) / a[2]
+    back = subject.response(material, b, a) / b[2]
+    return furnace.relative_differences(there, back)
+
+
 def horizon(subject: Subject) -> Checked:
     """Check that no value jumps as a light sets."""
+    found, view = jumps(subject)
+    light = np.tile([[1.0], [0.0], [GRAZING]], view.shape[1])
+    value, worst = _largest(found, light, view)
+    return checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
+
+
+def jumps(subject: Subject) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return the jumps (C, N) of each material as a light along x sets, and the viewers (3, N)."""
     view = furnace.direction(*(_grid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))))
     above, below = (np.tile([[1.0], [0.0], [z]], view.shape[1]) for z in (GRAZING, -GRAZING))
     found = {
@@ -103,8 +113,7 @@ def horizon(subject: Subject) -> Checked:
         )
         for material in subject.materials
     }
-    value, worst = _largest(found, above, view)
-    return checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
+    return found, view
 
 
 def below(subject: Subject) -> Checked:
