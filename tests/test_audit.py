@@ -1,6 +1,7 @@
 """Audits, against closed forms, and of ways to shade that are wrong in one respect each."""
 
 import json
+from pathlib import Path
 
 import drjit as dr
 import jsonschema
@@ -8,16 +9,23 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.audit import angles, gradients
+from comparisons.audit import angles, extremes, gradients
 from comparisons.audit.audit import examined
 from comparisons.audit.scattering import Scattering
-from comparisons.audit.shaded import Shaded, opened
-from comparisons.audit.subject import Subject
+from comparisons.audit.shaded import DISTANCES, EXTREMES, Shaded, opened
+from comparisons.audit.subject import Subject, random_and_mirrored
 from heuristic import Range
 from heuristic.errors import InputError
 from heuristic.functions import heuristic_of
+from heuristic.heuristics import HEURISTICS
 from reference.pairing import albedo, factors
 from tests.schemas import schema
+from tests.test_glsl import opengl
+
+DOCS = Path(__file__).parents[1] / "docs/shaders"
+FUNCTIONS = ("filament", "bevy", "gltf", "layered")
+SHADERS = [str(path) for path in sorted(DOCS.glob("*.py")) if path.stem != "standard_material"]
+SHADERS += [f"{DOCS / 'standard_material.py'}:{name}" for name in FUNCTIONS]
 
 
 def lambert(point):
@@ -225,11 +233,30 @@ def test_the_tables_of_roughplastic_have_no_derivative(rgb):
     assert by["diffuse_reflectance.value"] < gradients.AGREES
 
 
-@pytest.mark.parametrize("name", ["mean-ambient", "shadow-map", "ambient-occlusion"])
-def test_what_prepares_a_scene_is_audited(rgb, name):
+@pytest.mark.guarantee(
+    "audits", "Every built-in heuristic and example shader passes the hard cases of an audit."
+)
+@pytest.mark.parametrize("name", [*sorted(HEURISTICS), *SHADERS])
+def test_every_heuristic_goes_through_the_hard_cases(rgb, name):
     subject: Subject = opened(name, {})
     subject.grid = (24, 18)
+    found = extremes.extremes(subject)
+    assert len(found) >= len(EXTREMES) + len(DISTANCES)
+    assert [each.worst for each in found if each.wrong] == []
     assert "values" not in failing(subject)
+
+
+@opengl
+def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
+    subject = opened(str(DOCS / "phong.glsl"), {})
+    subject.grid = (24, 18)
+    checks = {check.name: check for check in examined(subject)["checks"]}
+    assert checks["gradient"].verdict == "not asked"
+    assert checks["values"].verdict == "holds"
+    pairs = random_and_mirrored()
+    for material in subject.materials:
+        built_in = opened("phong", {}).response(material, *pairs)
+        np.testing.assert_allclose(subject.response(material, *pairs), built_in, atol=1e-4)
 
 
 def test_the_command_writes_a_record_and_a_chart(run, tmp_path):

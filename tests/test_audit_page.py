@@ -87,9 +87,8 @@ def test_a_hard_case_counts_what_is_wrong(rgb):
     subject = shaded(lambert)
     values = np.array([[0.5, np.nan, -0.25, 2.0]] * 3)
     setting = Setting("a case", lambda: values)
-    subject.settings = lambda: iter(
-        [setting, replaced(setting, words="b", values=lambda: values * 0)]
-    )
+    dark = replaced(setting, values=lambda: np.zeros((3, 4)))
+    subject.settings = lambda: iter([setting, dark])
     bad, good = extremes.extremes(subject)
     assert (bad.lowest, bad.highest, bad.wrong) == (-0.25, 2.0, 6)
     assert "nan" in bad.worst
@@ -105,8 +104,7 @@ def test_the_headline_names_every_failure_and_none_where_all_holds(grey):
     assert audit_words.headline(white).startswith("diffuse conserves energy")
     failing = [structs.replace(check, verdict="does not hold", value=2.0) for check in grey.checks]
     said = audit_words.headline(structs.replace(grey, checks=tuple(failing)))
-    parts = ("returns up to 2.00 times", "as bright as", "reciprocal", "jumps", "behind the surface",
-             "derivative", "density", "no light has")  # fmt: skip
+    parts = ("returns up to 2.00 times", "as bright as", "reciprocal", "jumps", "behind", "density")
     assert all(part in said for part in parts)
 
 

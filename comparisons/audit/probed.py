@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,8 @@ class Probed(Subject):
         given = colours | {"n": material.get("n", 1.0), "form": "phong", "normalised": False}
         count = max(light.shape[1], view.shape[1])
         pairs = [np.broadcast_to(each, (3, count)) for each in (light, view, shaded.UP)]
-        key = repr(sorted(given.items())).encode() + b"".join(each.tobytes() for each in pairs)
+        words = repr(sorted(given.items())).encode()
+        key = sha256(b"".join([words, *(each.tobytes() for each in pairs)])).digest()
         if key not in self.known:
             self.wanted[key] = (given, *pairs)
             if self.is_planning:

@@ -119,9 +119,9 @@ class Shaded(Subject):
             yield self._setting(f"a normal of length {length:g}", light, view, normal)
         yield self._setting("a viewer at the point itself", UP, nothing)
         dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
-        yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, views))
+        yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, view))
         if self.heuristic.prepare is None:  # it may prepare one item per light
-            yield Setting("no light at all", partial(self._array, MIDDLE, None, views))
+            yield Setting("no light at all", partial(self._array, MIDDLE, None, view))
 
     def tuned(self) -> Iterator[Tuned]:
         if not self.heuristic.traced:

@@ -1,4 +1,4 @@
-"""MeshPhongMaterial of three.js: a normalised Blinn lobe with Schlick's Fresnel, and Lambert's base.
+"""MeshPhongMaterial of three.js: a normalised Blinn lobe with Schlick's Fresnel, and a base.
 
 The lobe is F D / 4 with D = (n + 2) / (2 pi) (N.H)^n; the base gets all the light, whatever the
 lobe reflects. F is Schlick's, with Karis' power of two for (1 - V.H)^5 ("Real shading in Unreal

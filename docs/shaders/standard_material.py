@@ -79,7 +79,7 @@ def _burley(alpha, cosine, facing, turned):
 
 
 def _karis(roughness, facing):
-    """Return A and B of the lobe's albedo F0 A + B (Karis, "Physically based shading on mobile")."""
+    """Return A and B of the lobe's albedo F0 A + B, after Karis (2014)."""
     x, y = 1 - roughness, 0.0425 - 0.0275 * roughness
     z, w = 1.04 - 0.572 * roughness, 0.022 * roughness - 0.04
     fit = dr.minimum(x * x, dr.exp2(-9.28 * facing)) * x + y
