@@ -234,7 +234,7 @@ def test_the_tables_of_roughplastic_have_no_derivative(rgb):
 
 
 @pytest.mark.guarantee(
-    "audits", "Every built-in heuristic and example shader passes the hard cases of an audit."
+    "kernel", "Every built-in heuristic and example shader passes the hard cases of an audit."
 )
 @pytest.mark.parametrize("name", [*sorted(HEURISTICS), *SHADERS])
 def test_every_heuristic_goes_through_the_hard_cases(rgb, name):
