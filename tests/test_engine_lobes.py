@@ -64,9 +64,8 @@ def gltf(alpha, f0, base, light, view, half):
 
 def layered(alpha, f0, base, light, view, half):
     scale, bias = karis(np.sqrt(alpha), view[2])
-    gain = 1 + f0 * (1 / (scale + bias) - 1)
-    albedo = np.minimum(gain * (f0 * scale + bias), 1)
-    return (1 - albedo) * base / np.pi + gain * ggx(alpha, f0, light, view, half)
+    left = 1 - np.minimum(f0 * scale + bias, 1)
+    return left * base / np.pi + ggx(alpha, f0, light, view, half)
 
 
 FORMS = {

@@ -15,11 +15,13 @@ def filament(point):
 
 
 def bevy(point):
-    """Burley's base, and the lobe scaled by 1 + F0 (1 / A - 1) for light between facets.
+    """Burley's base, and the lobe times 1 + F0 (1 / A - 1) for light between facets.
 
     A is the scale of Karis' fit to the lobe's albedo, F0 A + B.
     """
-    return _shaded(point, lambda at: at.color * at.burley + at.lobe * at.gain(at.scale))
+    return _shaded(
+        point, lambda at: at.color * at.burley + at.lobe * (1 + at.f0 * (1 / at.scale - 1))
+    )
 
 
 def gltf(point):
@@ -28,14 +30,10 @@ def gltf(point):
 
 
 def layered(point):
-    """The lobe scaled by 1 + F0 (1 / (A + B) - 1); the base gets what its albedo leaves."""
-
-    def reflected(at):
-        gain = at.gain(at.scale + at.bias)
-        albedo = gain * (at.f0 * at.scale + at.bias)
-        return at.color * (1 - dr.minimum(albedo, 1)) + at.lobe * gain
-
-    return _shaded(point, reflected)
+    """The base gets what Karis' fit to the lobe's albedo towards the viewer leaves."""
+    return _shaded(
+        point, lambda at: at.color * (1 - dr.minimum(at.f0 * at.scale + at.bias, 1)) + at.lobe
+    )
 
 
 def _shaded(point, reflected):
@@ -47,7 +45,6 @@ def _shaded(point, reflected):
     facing = dr.maximum(dr.dot(point.normal, point.view), 1e-4)
     scale, bias = _karis(dr.sqrt(material.alpha), facing)
     at = SimpleNamespace(color=color, f0=f0, scale=scale, bias=bias)
-    at.gain = lambda albedo: 1 + f0 * (1 / albedo - 1)
     value = point.ambient * color
     for light in point.lights:
         cosine = dr.maximum(dr.dot(point.normal, light.toward), 0)
