@@ -16,7 +16,8 @@ ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
 """Degrees from the normal."""
 
 TOLERANCE = 0.01
-"""Of albedos; the quadrature errs by a tenth of it for lobes wider than a degree or two."""
+"""Of albedos; the quadrature errs by a tenth of it for GGX of an alpha of 0.1, even at 89 degrees,
+where its lobe is 0.2 degrees wide."""
 
 RECIPROCAL = 1e-3
 """Largest relative difference of ``f(i, o)`` and ``f(o, i)`` in single precision."""
@@ -38,8 +39,21 @@ def curve(subject: Subject, material: str) -> Curve:
     )
 
 
+def hemisphere(azimuths: int, heights: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return directions (3, N) above a surface, and the solid angle (N,) of each.
+
+    They are dense about the normal, ``cos(theta) = 1 - t^2``, and about an azimuth of 180 degrees,
+    ``phi = pi (1 + u^3)``: opposite to the fixed direction, grazing lobes are narrow.
+    """
+    t = (np.arange(heights) + 0.5) / heights
+    u = (2 * np.arange(azimuths) + 1) / azimuths - 1
+    t, u = (grid.ravel() for grid in np.meshgrid(t, u))
+    directions = furnace.direction(np.arccos(1 - t * t), np.pi * (1 + u**3))
+    return directions, 2 * t * 3 * np.pi * u**2 * 2 / len(t)
+
+
 def _seen(subject: Subject, material: str, degrees: float) -> float:
-    above, solid_angle = furnace.hemisphere(*subject.grid)
+    above, solid_angle = hemisphere(*subject.grid)
     view = furnace.direction(np.deg2rad(degrees), 0.0)
     total = sum(
         (subject.response(material, light, view) * solid_angle).sum(axis=1)
@@ -49,7 +63,7 @@ def _seen(subject: Subject, material: str, degrees: float) -> float:
 
 
 def _returned(subject: Subject, material: str, degrees: float) -> float:
-    view, solid_angle = furnace.hemisphere(*subject.grid)
+    view, solid_angle = hemisphere(*subject.grid)
     light = furnace.direction(np.deg2rad(degrees), 0.0)
     found = subject.response(material, light, view) / light[2, 0]
     return float((found * view[2] * solid_angle).sum(axis=1).max() / np.pi)

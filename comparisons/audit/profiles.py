@@ -49,10 +49,13 @@ def sunsets(subject: Subject) -> tuple[Sunset, ...]:
     found, views = angles.jumps(subject)
     largest = {name: jumps.max() for name, jumps in found.items()}
     worst: dict[str, str] = {}
-    for name in sorted(found, key=lambda name: largest[name]):
-        worst[name.partition(",")[0]] = name
-    return tuple(_sunset(subject, name, views[:, [found[name].max(axis=0).argmax()]])
-                 for kind, name in sorted(worst.items()))  # fmt: skip
+    for name in found:
+        kind = name.partition(",")[0]
+        worst[kind] = max(name, worst.get(kind, name), key=lambda each: largest[each])
+    return tuple(
+        _sunset(subject, name, views[:, [found[name].max(axis=0).argmax()]])
+        for name in worst.values()
+    )
 
 
 def _sunset(subject: Subject, material: str, view: np.ndarray) -> Sunset:

@@ -71,7 +71,7 @@ class Scattering(Subject):
                 for name, alpha in of.items()
             }
             materials = dict(of)
-        super().__init__(materials, grid=(furnace.AZIMUTHS, furnace.HEIGHTS))
+        super().__init__(materials)
 
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         return self._values(self.bsdfs[material], light, view)

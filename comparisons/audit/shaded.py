@@ -94,7 +94,7 @@ class Shaded(Subject):
         self.white = white(heuristic.form or "phong")
         prepared = {each.name: self.values[each.name] for each in known.values() if each.prepared}
         self.prepared = heuristic.prepared(_square(), prepared)
-        super().__init__({name: each.get("alpha") for name, each in self.white.items()}, (480, 360))
+        super().__init__({name: each.get("alpha") for name, each in self.white.items()})
         if not heuristic.traced:
             self.untuned = "Dr.Jit cannot differentiate it"
 

@@ -84,7 +84,7 @@ class Subject(ABC):
     """
 
     materials: dict[str, float | None]
-    grid: tuple[int, int]
+    grid: tuple[int, int] = (240, 180)
     faults: list[Fault] = field(default_factory=list, kw_only=True)
     untuned: str = field(default="it depends on no number", kw_only=True)
 

@@ -53,11 +53,10 @@ def albedo_chart(record: Audit) -> Spec:
 
 
 def _by_kind(curves: Iterable[Curve]) -> Iterator[tuple[str, list[Curve]]]:
-    def kind(curve: Curve) -> str:
-        return curve.kind
-
-    for name, found in groupby(sorted(curves, key=kind), kind):
-        yield name, list(found)
+    found: dict[str, list[Curve]] = {}
+    for curve in curves:
+        found.setdefault(curve.kind, []).append(curve)
+    yield from found.items()
 
 
 def _albedos(record: Audit, field: str, curves: Sequence[Curve]) -> alt.LayerChart:
