@@ -115,8 +115,7 @@ class Shaded(Subject):
         yield self._setting(GRAZING, edge, edges)
         nothing = np.zeros((3, 1))
         for length in LENGTHS:
-            normal = length * np.array([[0.6], [0.0], [0.8]])
-            yield self._setting(f"a normal of length {length:g}", light, view, normal)
+            yield self._setting(f"a normal of length {length:g}", light, view, length * UP)
         yield self._setting("a viewer at the point itself", UP, nothing)
         dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
         yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, view))
