@@ -184,7 +184,8 @@ def test_its_lobes_are_the_closed_form_for_pairs_of_directions(rgb, kind):
 
 
 @three
-def test_an_audit_asks_the_real_library(run, tmp_path):
+def test_an_audit_asks_the_real_library(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("comparisons.audit.shaded.ALPHAS", (0.3,))
     code, _, _ = run("audit", "--heuristic", "three:lambert", "-o", tmp_path)
     record = json.loads((tmp_path / "audit/three-lambert/audit.json").read_text(encoding="utf-8"))
     verdicts = {check["name"]: check["verdict"] for check in record["checks"]}

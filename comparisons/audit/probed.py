@@ -13,7 +13,7 @@ from heuristic import heuristics
 from heuristic.errors import InputError
 from heuristic.heuristics import THREE
 
-GRID = (72, 54)
+GRID, PAIRS = (48, 36), 2000
 
 
 class Probed(Subject):
@@ -37,7 +37,7 @@ class Probed(Subject):
         self.wanted: dict[bytes, Any] = {}
         self.is_planning = True
         materials = {material: each.get("alpha") for material, each in self.white.items()}
-        super().__init__(materials, GRID, untuned="three.js has no derivatives")
+        super().__init__(materials, GRID, PAIRS, untuned="three.js has no derivatives")
 
     def draw(self) -> None:
         """Draw all values that were asked for; others are drawn as they are asked for."""

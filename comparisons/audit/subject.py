@@ -79,12 +79,15 @@ class Subject(ABC):
         Why no derivative can be checked, if so.
     grid
         Azimuths and heights of the quadrature over a hemisphere.
+    pairs
+        Random pairs of directions for the check of reciprocity.
     faults
         Values that light cannot have, found during any check.
     """
 
     materials: dict[str, float | None]
     grid: tuple[int, int] = (240, 180)
+    pairs: int = 20_000
     faults: list[Fault] = field(default_factory=list, kw_only=True)
     untuned: str = field(default="it depends on no number", kw_only=True)
 

@@ -1,7 +1,7 @@
 """The lobes of three.js: the real library, asked for pairs of directions.
 
 Each pair is a triangle that covers the centre of one pixel. The light shines along z, and the
-camera is at the origin. Its projection only drops z, which three.js' shaders do not know: they take
+camera is at the origin. Its projection drops z, which three.js' shaders do not know: they take
 the direction to the viewer from the position. So a triangle at ``(x, y, -r cot(gamma))``, with
 ``r^2 = x^2 + y^2``, sees light and viewer at the angle ``gamma``, wherever its pixel is; its normal
 then has the angles to both that the pair asks for.
@@ -20,6 +20,10 @@ PIXELS = 1 << 18
 
 STEEPEST = 1e4
 """Cotangent of the smallest angle between light and viewer that is told from 0."""
+
+AWAY = 100.0
+"""Distance of the picture from the axes: corners are snapped to parts of a pixel, which would turn
+the direction to a viewer nearby."""
 
 CORNERS = np.array([(-0.3, -0.3), (0.3, -0.3), (0.0, 0.4)])
 """Of a triangle about the centre of a pixel, in pixels, counter-clockwise."""
@@ -59,15 +63,15 @@ def values(kind: str, asked: Sequence[Asked]) -> list[np.ndarray]:
 
 def _drawn(kind: str, batch: list[Asked]) -> list[np.ndarray]:
     ends = np.cumsum([each.light.shape[1] for each in batch])
-    side = 2 * ceil(sqrt(ends[-1]) / 2)  # even: no centre is at 0
+    side = ceil(sqrt(ends[-1]))
     rows, columns = np.divmod(np.arange(ends[-1]), side)
-    centres = np.stack([2 * (columns + 0.5) / side - 1, 1 - 2 * (rows + 0.5) / side])
+    centres = AWAY + np.stack([2 * (columns + 0.5) / side - 1, 1 - 2 * (rows + 0.5) / side])
     parts = np.split(centres, ends[:-1], axis=1)
     sun = {"type": "DirectionalLight", "color": [1, 1, 1], "intensity": pi, "target": [0, 0, 0]}
     picture = browser.draw(
         {
             "view": np.eye(4).tolist(),
-            "projection": np.diag([1, 1, -0.1 / STEEPEST, 1]).tolist(),
+            "projection": _projection().tolist(),
             "width": side,
             "height": side,
             "meshes": [_mesh(kind, *each, side) for each in zip(batch, parts, strict=True)],
@@ -76,6 +80,13 @@ def _drawn(kind: str, batch: list[Asked]) -> list[np.ndarray]:
     )
     pixels = picture.reshape(-1, 4)[: ends[-1], :3].T.astype(float)
     return np.split(pixels, ends[:-1], axis=1)
+
+
+def _projection() -> np.ndarray:
+    """Return the matrix that moves the picture to the middle, and flattens it."""
+    flat = np.diag([1, 1, -0.5 / (2 * AWAY * STEEPEST), 1])
+    flat[:2, 3] = -AWAY
+    return flat
 
 
 def _mesh(kind: str, asked: Asked, centres: np.ndarray, side: int) -> dict[str, Any]:
