@@ -116,7 +116,8 @@ def test_the_page_says_all_checks_and_cases_and_loads_nothing(grey):
         assert audit_words.MEANINGS[check.name].split("’")[0] in html
     for each in grey.extremes:
         assert each.case in html
-    assert "3 wrong, such as nan (&lt;i&gt;)" in html
+    assert "3 wrong" in html
+    assert "Such as nan (&lt;i&gt;)" in html
     assert "<b>" not in html
     assert "<script" not in html
     assert "default-src 'none'" in html

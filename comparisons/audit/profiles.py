@@ -9,7 +9,7 @@ from comparisons.audit.audit_record import Asymmetry, Lobe, Sunset
 from comparisons.audit.subject import Subject, told
 from comparisons.hard import furnace
 
-LIGHTS = (10.0, 45.0, 75.0)
+LIGHTS = (0.0, 30.0, 60.0)
 """Degrees from the normal."""
 
 VIEWS = tuple(np.arange(-88.0, 89.0, 2.0))
