@@ -44,12 +44,14 @@ def albedo_charts(record: Audit, field: str) -> Iterator[tuple[str, Spec]]:
 
 def albedo_chart(record: Audit) -> Spec:
     """Return one chart of all albedos: a row for each of :data:`ALBEDOS`, a column per kind."""
-    rows = [
-        alt.hconcat(*(_albedos(record, field, curves).properties(title=kind)
-                      for kind, curves in _by_kind(record.curves)))
+    charts = [
+        _albedos(record, field, curves).properties(title=kind)
         for field in ALBEDOS
-    ]  # fmt: skip
-    return specification(alt.vconcat(*rows)) | {"title": record.subject}
+        for kind, curves in _by_kind(record.curves)
+    ]
+    grid = alt.concat(*charts, columns=len(charts) // len(ALBEDOS))
+    own = grid.resolve_scale(color="independent", strokeDash="independent")
+    return specification(own) | {"title": record.subject}
 
 
 def _by_kind(curves: Iterable[Curve]) -> Iterator[tuple[str, list[Curve]]]:
