@@ -1,4 +1,4 @@
-"""The content of docs/audit.md: audits of this project's shaders and some Mitsuba BSDFs."""
+"""The content of docs/audit.md: audits of shaders, of three.js, and of some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,7 @@ from reports.terminal.printing import number
 from reports.terminal.tables import markdown
 
 SHADERS = Path(__file__).parent / "shaders"
-PICTURED = "phong"
+PICTURED, THREE = "phong", "three:phong"
 SHADED = ("cook_torrance", "oren_nayar", "toon", "wrapped")
 ENGINES = {
     "three.js, MeshPhong": "mesh_phong.py",
@@ -34,7 +34,7 @@ BSDFS = (
 
 def audits() -> dict[str, Audit]:
     """Return all audits, by their names in the table."""
-    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn")}
+    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn", THREE)}
     for name in SHADED:
         link = f"[{name.replace('_', ' ')}](shaders/{name}.py)"
         found[link] = audit("heuristic", str(SHADERS / f"{name}.py"), {})
