@@ -13,7 +13,7 @@ from comparisons.audit.shaded import opened
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 DIELECTRIC = 0.04
-GRID = (240, 180)
+GRID = (120, 90)
 
 
 def schlick(f0, cosine):

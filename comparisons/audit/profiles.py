@@ -67,7 +67,8 @@ def _sunset(subject: Subject, material: str, view: np.ndarray) -> Sunset:
 
 def asymmetry(subject: Subject) -> Asymmetry:
     """Return the map of the material that is the least reciprocal."""
-    light, view, azimuth = np.meshgrid(*map(np.deg2rad, (POLAR, POLAR, AZIMUTHS)), indexing="ij")
+    polar = np.deg2rad(POLAR)
+    light, view, azimuth = np.meshgrid(polar, polar, np.deg2rad(AZIMUTHS), indexing="ij")
     a = furnace.direction(light.ravel(), 0.0)
     b = furnace.direction(view.ravel(), azimuth.ravel())
     found = {
