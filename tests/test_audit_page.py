@@ -81,6 +81,10 @@ def test_the_map_of_reciprocity_has_its_closed_form(rgb):
     expected = np.abs(light - view) / ((light + view) / 2)
     np.testing.assert_allclose(found.differences, expected, atol=1e-4)
     assert np.max(profiles.asymmetry(shaded(lambert)).differences) < 1e-5
+    phong = profiles.asymmetry(opened("phong", {}))  # f ∝ 1 / cos(theta_l), about the mirror
+    grazing = np.cos(np.deg2rad(profiles.POLAR[-1]))
+    expected = (1 - grazing) / ((1 + grazing) / 2)
+    assert np.max(phong.differences) == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_hard_case_counts_what_is_wrong(rgb):

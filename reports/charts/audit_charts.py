@@ -165,4 +165,4 @@ def _rule(**at: float) -> alt.Chart:
 
 
 def _sized(*layers: alt.Chart, height: int = HEIGHT) -> alt.LayerChart:
-    return alt.layer(*layers, width=WIDTH, height=height)
+    return alt.LayerChart(layer=list(layers), width=WIDTH, height=height)
