@@ -27,7 +27,7 @@ from reference.planning.plan import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant
 from reports.charts import figures, term_figure, vega
-from reports.charts.albedo_chart import albedo_chart
+from reports.charts.audit_charts import albedo_chart
 from reports.charts.error_over_time import error_over_time
 from reports.files import images
 from reports.terminal import tables
@@ -241,6 +241,7 @@ def _audits():
     found = audits.audits()
     replace("audit.md", "audits", audits.table(found))
     atomic.write(DOCS / "audit.svg", vega.paper(albedo_chart(found[audits.PICTURED])))
+    replace("audit.md", "engines", audits.argued(audits.engines()))
 
 
 def _shaders():
