@@ -311,8 +311,6 @@ def test_a_picture_excludes_what_renders_again(run, tmp_path):
         Options(heuristic="blinn", image=(file,))
     code, _, said = run("compare", "fig-8-9", "fig-8-8a", "--image", file)
     assert (code, "one scene" in said) == (2, True)
-    code, _, said = run("compare", "fig-8-9", "--cost", "--image", file)
-    assert (code, "without --why" in said) == (2, True)
 
 
 def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):

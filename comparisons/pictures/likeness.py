@@ -1,6 +1,6 @@
 """What a picture seems to lack: the small rendering between the halves that it is nearest to."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,28 +53,39 @@ class Candidates:
         (h, w): the pixels that see a surface.
     rows, columns
         (h, H) and (w, W): the weights that average a picture down, as the scene's film would.
+    viewing
+        Viewing conditions.
     """
 
     images: dict[Effects, NDArray]
     counted: NDArray[np.bool_]
     rows: NDArray
     columns: NDArray
+    viewing: Viewing
 
     def reduced(self, image: NDArray) -> NDArray[np.float64]:
         """Return an image (H, W) or (H, W, 3) at the size of the renderings."""
         return np.einsum("yY,xX,YX...->yx...", self.rows, self.columns, image, optimize=True)
 
-    def distances(self, picture: NDArray, viewing: Viewing) -> dict[Effects, NDArray]:
-        """Return the ΔE2000 (R + 1, N) of a picture (H, W, 3) from each rendering.
+    def measured(self, picture: NDArray) -> Callable[[NDArray], Nearest | None]:
+        """Return a function of a mask (H, W): the rendering that a picture is nearest to there.
 
-        See :meth:`comparisons.effects.noiseless.Noiseless.errors`; the picture's noise is unknown,
-        and stays.
+        It returns None if no small pixel sees the mask. The picture's noise is unknown, and stays.
         """
         small = self.reduced(picture)
         none = np.zeros_like(small)
-        judge = Judge(Estimate(small, none, none, REPLICATES), self.counted, viewing)
+        judge = Judge(Estimate(small, none, none, REPLICATES), self.counted, self.viewing)
         noiseless = Noiseless(judge, np.stack([small] * REPLICATES))
-        return {effects: noiseless.errors(image) for effects, image in self.images.items()}
+        errors = {effects: noiseless.errors(image) for effects, image in self.images.items()}
+
+        def within(mask: NDArray) -> Nearest | None:
+            weights = self.reduced(mask.astype(float))[self.counted]
+            if not weights.sum() > 0:
+                return None
+            mean = weights / weights.sum()
+            return nearest({effects: each @ mean for effects, each in errors.items()})
+
+        return within
 
 
 def candidates(
@@ -106,6 +117,7 @@ def candidates(
         counted=ready.counted,
         rows=_weights(height, size[1], rfilter),
         columns=_weights(width, size[0], rfilter),
+        viewing=options.viewing,
     )
 
 
@@ -118,10 +130,7 @@ def named(
     """
     record, images = comparison.record, comparison.images
     found = candidates(source, options, images.counted.shape, progress)
-    distances = found.distances(images.heuristic, options.viewing)
-
-    def of(mask: NDArray[np.bool_]) -> Nearest | None:
-        return _nearest(distances, found.reduced(mask.astype(float))[found.counted])
+    of = found.measured(images.heuristic)
 
     def carried(carriers: Sequence[Any], places: NDArray) -> tuple[Any, ...]:
         return tuple(
@@ -170,13 +179,6 @@ def small_size(width: int, height: int) -> tuple[int, int]:
     )
     short = max(1, round(long * shorter / longer))
     return (long, short) if width >= height else (short, long)
-
-
-def _nearest(distances: dict[Effects, NDArray], weights: NDArray) -> Nearest | None:
-    """Return the nearest rendering by weighted means; None if no small pixel has weight."""
-    if not weights.sum() > 0:
-        return None
-    return nearest({each: found @ weights / weights.sum() for each, found in distances.items()})
 
 
 def _weights(large: int, small: int, rfilter: mi.ReconstructionFilter) -> NDArray[np.float64]:
