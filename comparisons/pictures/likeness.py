@@ -21,6 +21,7 @@ from comparisons.effects.nearness import Effects, Nearest, Renderings, nearest
 from comparisons.effects.noiseless import Noiseless
 from comparisons.effects.shapley import subsets
 from comparisons.options import Options
+from comparisons.pictures import pictured
 from comparisons.record import Comparison
 from reference.effects.effect import Effect
 from reference.rendering.passes import Progress
@@ -67,23 +68,28 @@ class Candidates:
         """Return an image (H, W) or (H, W, 3) at the size of the renderings."""
         return np.einsum("yY,xX,YX...->yx...", self.rows, self.columns, image, optimize=True)
 
-    def measured(self, picture: NDArray) -> Callable[[NDArray], Nearest | None]:
-        """Return a function of a mask (H, W): the rendering that a picture is nearest to there.
+    def measured(self, pictures: Sequence[NDArray]) -> Callable[[NDArray], Nearest | None]:
+        """Return a function of a mask (H, W): the rendering that pictures are nearest to there.
 
-        It returns None if no small pixel sees the mask. The picture's noise is unknown, and stays.
+        It returns None if no small pixel sees the mask. The pictures are repeats; with fewer than
+        :data:`REPLICATES`, their noise is unknown, and stays.
         """
-        small = self.reduced(picture)
-        none = np.zeros_like(small)
-        judge = Judge(Estimate(small, none, none, REPLICATES), self.counted, self.viewing)
-        noiseless = Noiseless(judge, np.stack([small] * REPLICATES))
+        small = np.stack([self.reduced(picture) for picture in pictures])
+        mean = small.mean(axis=0)
+        groups = [mean] * REPLICATES
+        if len(small) >= REPLICATES:
+            groups = [small[place::REPLICATES].mean(axis=0) for place in range(REPLICATES)]
+        none = np.zeros_like(mean)
+        judge = Judge(Estimate(mean, none, none, REPLICATES), self.counted, self.viewing)
+        noiseless = Noiseless(judge, np.stack(groups))
         errors = {effects: noiseless.errors(image) for effects, image in self.images.items()}
 
         def within(mask: NDArray) -> Nearest | None:
             weights = self.reduced(mask.astype(float))[self.counted]
             if not weights.sum() > 0:
                 return None
-            mean = weights / weights.sum()
-            return nearest({effects: each @ mean for effects, each in errors.items()})
+            share = weights / weights.sum()
+            return nearest({effects: each @ share for effects, each in errors.items()})
 
         return within
 
@@ -130,7 +136,7 @@ def named(
     """
     record, images = comparison.record, comparison.images
     found = candidates(source, options, images.counted.shape, progress)
-    of = found.measured(images.heuristic)
+    of = found.measured(pictured.read(options))
 
     def carried(carriers: Sequence[Any], places: NDArray) -> tuple[Any, ...]:
         return tuple(
@@ -173,12 +179,10 @@ def small_size(width: int, height: int) -> tuple[int, int]:
     longer, shorter = max(width, height), min(width, height)
     if longer <= LARGEST:
         return width, height
-    sides = range(LARGEST, LARGEST // 2, -1)
-    long = min(
-        sides, key=lambda side: abs(side * shorter / longer - round(side * shorter / longer))
-    )
-    short = max(1, round(long * shorter / longer))
-    return (long, short) if width >= height else (short, long)
+    wanted = {side: side * shorter / longer for side in range(LARGEST, LARGEST // 2, -1)}
+    sizes = {side: max(1, round(other)) for side, other in wanted.items()}
+    long = min(sizes, key=lambda side: abs(sizes[side] - wanted[side]))
+    return (long, sizes[long]) if width >= height else (sizes[long], long)
 
 
 def _weights(large: int, small: int, rfilter: mi.ReconstructionFilter) -> NDArray[np.float64]:
