@@ -61,6 +61,7 @@ def test_what_is_not_told_apart_is_undecided(noise, both, undecided):
 def test_a_picture_that_no_rendering_is_near_is_not_explained():
     assert nearest(distances(none=9, a=4, b=8, both=7)).outcome == "unexplained"
     assert nearest(distances(none=9, a=3, b=8, both=7)).outcome == "named"
+    assert nearest(distances(none=9, a=0.9, b=8, both=1.1)).outcome == "named"
     itself = nearest(distances(none=9, a=8, b=8, both=3))
     assert itself.outcome == "unexplained"
     assert "the reference itself, the nearest, is 3.00 away" in nearest_lines.told(itself)
@@ -157,7 +158,6 @@ def test_a_picture_of_a_rendering_is_nearest_to_it(found, pictures):
         repeats = [picture * random.normal(1, 0.2, picture.shape).clip(0) for _ in range(4)]
         noisy = found.measured(repeats)(whole)
         assert set(noisy.simulates) <= set(effects) <= {*noisy.simulates, *noisy.undecided}
-        assert noisy.outcome == told.outcome
         assert noisy.dE2000 < found.measured(repeats[:1])(whole).dE2000 / 2
 
 

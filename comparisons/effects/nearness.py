@@ -16,10 +16,10 @@ from comparisons import intervals
 from comparisons.records import Amount, Estimated, Record, Resolution, Size
 
 ALIKE = 1.0
-"""Mean ΔE2000: a picture that is nearer to the reference lacks nothing that can be seen."""
+"""Mean ΔE2000: a picture that is nearer to a rendering hardly differs from it."""
 
 EXPLAINED = 0.5
-"""Share of the reference's distance that the nearest rendering may have, to explain a picture."""
+"""Share of the reference's distance up to which the nearest rendering explains a picture, too."""
 
 APART = 0.1
 """Share of its distance by which a rendering must be farther than the nearest, to be told apart."""
@@ -86,7 +86,7 @@ def nearest(distances: Mapping[Effects, NDArray]) -> Nearest:
     outcome: Literal["named", "unexplained", "alike"] = "named"
     if reference < ALIKE:
         outcome = "alike"
-    elif away > EXPLAINED * reference:
+    elif away > max(ALIKE, EXPLAINED * reference):
         outcome = "unexplained"
     simulates, some = set.intersection(*tied), set.union(*tied)
     return Nearest(
