@@ -253,7 +253,8 @@ class PictureRecord(Record):
     edges
         Correlation of their edges with the expected ones.
     ratio
-        Means of red, green and blue over those of the reference.
+        Means of red, green and blue over those of the reference, which is clipped at display
+        white if they are.
     odd
         What is odd about them, in words, their position first.
     nearest
