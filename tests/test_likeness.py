@@ -161,6 +161,17 @@ def test_a_picture_of_a_rendering_is_nearest_to_it(found, pictures):
         assert noisy.dE2000 < found.measured(repeats[:1])(whole).dE2000 / 2
 
 
+@pytest.mark.parametrize("factor", [0.7, 0.9, 1.1, 1.4])
+def test_another_exposure_is_doubted(found, pictures, factor):
+    """It looks like a missing effect; with the right one, nothing is said."""
+    random = np.random.default_rng(5)
+    for picture in pictures.values():
+        words = found.exposure(factor * picture)
+        assert float(re.match(r"Times (\S+),", words)[1]) == pytest.approx(1 / factor, rel=0.04)
+        noisy = picture * random.normal(1, 0.05, picture.shape)
+        assert [found.exposure(shown) for shown in (picture, noisy)] == ["", ""]
+
+
 def test_each_part_has_its_own(found, pictures):
     """The left half without light between surfaces, the right half without shadows."""
     (everything,) = (each for each in pictures if len(each) == len(max(pictures, key=len)))

@@ -13,6 +13,7 @@ from comparisons.compare import guarded
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.judging import Judge
 from comparisons.cost.methods import Methods
+from comparisons.departure.metrics import LEADING
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import Viewing
 from comparisons.effects.corners import labels
@@ -37,6 +38,10 @@ REPLICATES, SPP = 4, 16
 EXACT_EFFECTS = 5
 """Effects up to which every combination is rendered. Of more, those with at most one effect, and
 those without at most two."""
+
+BETTER, LEVEL = 0.5, 1.04
+"""An exposure is doubted if another leaves at most this share of the distance, and if it differs by
+this factor at least."""
 
 FINER = 4
 """Points along a side of a picture's pixel, when it is averaged down."""
@@ -93,6 +98,26 @@ class Candidates:
 
         return within
 
+    def exposure(self, picture: NDArray) -> str:
+        """Return in words by which factor a picture would be much nearer; empty if by none."""
+        small = self.reduced(picture)[self.counted]
+        found = []
+        for images in self.images.values():
+            image = images.mean(axis=0)[self.counted]
+            distance = LEADING.against(image, ..., self.viewing)
+            factor = _factor(small, image)
+            found.append((LEADING.mean(distance(factor * small)), factor))
+            found.append((LEADING.mean(distance(small)), 1.0))
+        nearer, factor = min(found)
+        plain = min(away for away, other in found if other == 1.0)
+        if nearer > BETTER * plain or 1 / LEVEL < factor < LEVEL:
+            return ""
+        return (
+            f"Times {factor:.3g}, the picture would be {nearer:.2g} away from a rendering of this"
+            f" scene, and is {plain:.2g} away as it is: another exposure? It looks like a missing"
+            " effect."
+        )
+
 
 def candidates(
     source: Source, options: Options, shape: tuple[int, ...], progress: Progress | None = None
@@ -137,6 +162,8 @@ def named(
     record, images = comparison.record, comparison.images
     found = candidates(source, options, images.counted.shape, progress)
     of = found.measured(pictured.read(options))
+    doubt = found.exposure(images.heuristic)
+    odd = (doubt,) if doubt else ()
 
     def carried(carriers: Sequence[Any], places: NDArray) -> tuple[Any, ...]:
         return tuple(
@@ -147,6 +174,7 @@ def named(
     assert record.picture, "the comparison is of a picture"
     picture = structs.replace(
         record.picture,
+        odd=(*record.picture.odd, *odd),
         nearest=of(images.counted),
         renderings=Renderings(
             count=len(found.images), resolution=(width, height), spp=REPLICATES * SPP
@@ -155,6 +183,7 @@ def named(
     return structs.replace(
         record,
         picture=picture,
+        warnings=(*odd, *record.warnings),
         regions=tuple(
             structs.replace(region, nearest=of(_inside(region, images.counted)))
             for region in record.regions
@@ -183,6 +212,13 @@ def small_size(width: int, height: int) -> tuple[int, int]:
     sizes = {side: max(1, round(other)) for side, other in wanted.items()}
     long = min(sizes, key=lambda side: abs(sizes[side] - wanted[side]))
     return (long, sizes[long]) if width >= height else (sizes[long], long)
+
+
+def _factor(image: NDArray, wanted: NDArray) -> float:
+    """Return the factor between two images (N, 3): a median, which lamps do not move."""
+    shown, other = (each @ (0.2126, 0.7152, 0.0722) for each in (image, wanted))
+    lit = np.minimum(shown / max(shown.mean(), 1e-9), other / max(other.mean(), 1e-9)) > 1e-3
+    return float(np.median(other[lit] / shown[lit])) if lit.any() else 1.0
 
 
 def _weights(large: int, small: int, rfilter: mi.ReconstructionFilter) -> NDArray[np.float64]:

@@ -32,7 +32,7 @@ from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
 from reports.ranking import rankings
 from reports.run.stages import Failure, Run
-from reports.terminal.nearest_lines import caution, lacking, told
+from reports.terminal.nearest_lines import caution, lacking
 from reports.terminal.printing import (
     NOTICEABLE,
     about_noise,
@@ -220,7 +220,6 @@ def _environment() -> Environment:
         code_spans=code_spans,
         region_view=viewer_data.region_view,
         plain=plain,
-        told=told,
         lacking=lacking,
         caution=caution,
         uri=_data_uri,
