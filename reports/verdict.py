@@ -106,7 +106,8 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
         parts=_parts(metric.mean, cost) if cost else (),
         remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
         is_exact=metric.high <= EXACT,
-        **({"subject": "The picture", "nearest": picture.nearest} if picture else {}),
+        subject="The picture" if picture else "Textbook shading",
+        nearest=picture.nearest if picture else None,
     )
 
 
