@@ -43,6 +43,7 @@ def test_the_nearest_says_what_is_there_and_what_is_not():
     assert (found.outcome, found.simulates, found.lacks) == ("named", A, B)
     assert (found.undecided, found.dE2000, found.next_dE2000) == ((), 0.5, 4)
     assert found.gap.value == 3.5
+    assert nearest_lines.lacking(found) == "gloss"
     assert nearest_lines.told(found) == (
         "is nearest to textbook shading, with shadow, without gloss (mean ΔE2000 0.500; the next"
         " 4.00)"
@@ -56,6 +57,7 @@ def test_what_is_not_told_apart_is_undecided(noise, both, undecided):
     """Neither a gap that noise may make, nor one much smaller than what no rendering explains."""
     found = nearest(distances(noise, none=9, a=0.5, b=8, both=both) | {BOTH: np.full(5, both)})
     assert found.undecided == undecided
+    assert nearest_lines.lacking(found) == ("perhaps gloss" if undecided else "gloss")
 
 
 def test_a_picture_that_no_rendering_is_near_is_not_explained():

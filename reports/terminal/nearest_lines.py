@@ -46,8 +46,8 @@ def lacking(nearest: Nearest | None) -> str:
         return "unknown"
     if nearest.outcome != "named":
         return {"alike": "nothing visible", "unexplained": "unexplained"}[nearest.outcome]
-    found = [*nearest.lacks, *(f"perhaps {effect}" for effect in nearest.undecided)]
-    return ", ".join(found) or "nothing"
+    perhaps = f"perhaps {', '.join(nearest.undecided)}" if nearest.undecided else ""
+    return "; ".join(filter(None, (", ".join(nearest.lacks), perhaps))) or "nothing"
 
 
 def caution(renderings: Renderings) -> str:
