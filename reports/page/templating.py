@@ -16,6 +16,7 @@ from comparisons.records import plain
 from reports.charts import theme, vega
 from reports.files import images
 from reports.page import viewer_data
+from reports.terminal.nearest_lines import caution, lacking
 from reports.terminal.printing import (
     NOTICEABLE,
     about_noise,
@@ -90,6 +91,8 @@ def environment() -> Environment:
         code_spans=code_spans,
         region_view=viewer_data.region_view,
         plain=plain,
+        lacking=lacking,
+        caution=caution,
         uri=_data_uri,
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)

@@ -113,7 +113,7 @@ def _finished(
 def _explained(
     case: Case, progress: Progress, comparison: Comparison
 ) -> tuple[Comparison, Study | None]:
-    """Return a comparison with its study of cost, None if that fails."""
+    """Return a comparison with its causes, and its study of cost if there is one."""
     from heuristic.errors import FotismosError
 
     try:
@@ -124,15 +124,25 @@ def _explained(
         return replace(comparison, record=record), None
 
 
-def _priced(case: Case, progress: Progress, comparison: Comparison) -> tuple[Comparison, Study]:
-    """Study what accuracy costs, name the dominating effects, and record the time."""
+def _priced(
+    case: Case, progress: Progress, comparison: Comparison
+) -> tuple[Comparison, Study | None]:
+    """Study what accuracy costs, name the dominating effects, and record the time.
+
+    A picture cannot be studied; it names the renderings that it is nearest to.
+    """
     from comparisons.comparison import CAUSES
     from comparisons.cost.cost import quick
     from comparisons.effects.naming import named
+    from comparisons.pictures import likeness
 
     begin = perf_counter()
-    study = quick(case.source, case.options, progress, case.command() + " --why")
-    record = named(comparison, study.effects)
+    study = None
+    if case.options.image:
+        record = likeness.named(comparison, case.source, case.options, progress)
+    else:
+        study = quick(case.source, case.options, progress, case.command() + " --why")
+        record = named(comparison, study.effects)
     stages = record.time.stages | {CAUSES: perf_counter() - begin}
     time = structs.replace(record.time, stages=stages)
     return replace(comparison, record=structs.replace(record, time=time)), study

@@ -19,7 +19,7 @@ from rich.text import Text
 from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
 from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
-from reports.terminal import verbosity
+from reports.terminal import nearest_lines, verbosity
 from reports.terminal.printing import seconds
 from reports.terminal.tables import printed
 
@@ -108,6 +108,7 @@ def summary(records: Iterable[ComparisonRecord]) -> Iterator[str]:
             yield from _picture(record, record.picture)
     yield from printed(_table(records), right=1)
     for record in records:
+        yield from nearest_lines.lines(record)
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
             yield from record.suspicions
