@@ -50,8 +50,8 @@ def test_a_report_grows_from_coarse_to_whole_to_hard_cases(run, small_report, pa
     coarse = [[v.is_coarse for v in views] for views, _ in pages]
     assert coarse[:4] == [[True], [True, True], [False, True], [False, False]]
     done = [shown["making"] and shown["making"].done for _, shown in pages]
-    assert done == [0, 0, 1, 2, 2, None]
-    assert ["hard_cases" in shown for _, shown in pages] == [False] * 5 + [True]
+    assert done == [0, 0, 1, 2, None]
+    assert ["hard_cases" in shown for _, shown in pages] == [False] * 4 + [True]
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "reload to see more" not in page
     assert "<b>Preview:</b>" not in page
