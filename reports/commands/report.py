@@ -73,7 +73,7 @@ def report(
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
-    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh)
+    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh, coarse=quick)
     rendered = jobs.pool(timeout, workers, scheduler)
     more = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, wanted, rendered, more, opening.seen(is_opened))

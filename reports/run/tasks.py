@@ -65,9 +65,11 @@ def hard_cases() -> HardCases:
     """Evaluate the hard cases."""
     from comparisons.case import RGB
     from comparisons.hard import collection
+    from heuristic import plugins
     from reference.scene.graph import set_variant
 
     set_variant(RGB)
+    plugins.register()
     return collection.collect()
 
 
