@@ -30,7 +30,7 @@ def pages(monkeypatch):
 def small_report(monkeypatch):
     """A report of two scenes without causes, whose page is written at every occasion."""
     monkeypatch.setattr(builtin, "SCENES", {name: builtin.SCENES[name] for name in NAMES})
-    monkeypatch.setattr(single, "_explained", lambda case, progress, made: (made, None))
+    monkeypatch.setattr(single, "_explained", lambda case, progress, made, coarse: (made, None))
     monkeypatch.setattr(growing, "INTERVAL_S", 0.0)
     monkeypatch.setattr(growing, "SHARE", 1.0)
     monkeypatch.setattr(tasks, "hard_cases", lambda: None)

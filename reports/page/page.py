@@ -27,7 +27,7 @@ from comparisons.departure.metrics import LEADING, METRICS
 from comparisons.records import plain
 from reports.charts import histograms, theme, vega
 from reports.files import images
-from reports.page import overview, verdict_view, viewer_data
+from reports.page import embedding, overview, switchboard, verdict_view, viewer_data
 from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
 from reports.ranking import rankings
@@ -114,7 +114,7 @@ def render(
     ]
     charted = any(scene.histograms or scene.charts for scene in scenes)
     code = "\n".join(_source(f"viewer/{part}.js") for part in SCRIPTS)
-    scripts = [EARLY, *([vega.bundle() + LOADED] if charted else []), '"use strict";\n' + code]
+    scripts = [EARLY, *([_vega()] if charted else []), '"use strict";\n' + code]
     return (
         _environment()
         .get_template("page.html.j2")
@@ -122,6 +122,7 @@ def render(
             title=title,
             style=Markup("".join(_source(f"styles/{part}.css") for part in STYLES)),
             scripts=[{"code": Markup(script), "source": _hash(script)} for script in scripts],
+            vega=embedding.deflated(_vega().encode(), 9) if charted else "",
             page_data=_page_data(scenes, failed),
             verdict=verdict_view.context(scenes) if scenes else None,
             scenes=scenes,
@@ -138,6 +139,10 @@ def render(
             making=making,
         )
     )
+
+
+def _vega() -> str:
+    return vega.bundle() + LOADED
 
 
 def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[str, Any]:
@@ -220,6 +225,7 @@ def _environment() -> Environment:
         region_view=viewer_data.region_view,
         plain=plain,
         uri=_data_uri,
+        webp_uri=switchboard.webp_uri,
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
     environment.globals.update(
