@@ -1,7 +1,7 @@
 """Charts: pictures that fit the page, and text that stays text."""
 
-import json
 import base64
+import json
 import re
 import zlib
 
