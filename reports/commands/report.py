@@ -42,7 +42,7 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-@click.option("--quick", is_flag=True, help="Everything at a small size, in a minute or two.")
+@click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @opening.option
 def report(
     output: Path,

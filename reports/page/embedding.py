@@ -1,7 +1,7 @@
 """A comparison's images inside the page, as numbers: exact to the digits that the page prints.
 
-Every value is rounded to three significant decimal digits, the standard error to two, and stored as
-a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
+Every value is rounded to three significant decimal digits, the standard error to one, as is usual,
+and stored as a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
 bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one
 8-bit level.
 
@@ -26,7 +26,7 @@ from comparisons.departure.metrics import drawn
 from comparisons.records import Record, plain
 
 #: Significant digits of values, and of the standard error.
-DIGITS, ERROR_DIGITS = 3, 2
+DIGITS, ERROR_DIGITS = 3, 1
 
 #: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
 EXPONENTS = (-18, 16)
