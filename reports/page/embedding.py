@@ -1,9 +1,9 @@
 """A comparison's images inside the page, as numbers: exact to the digits that the page prints.
 
 Every value is rounded to three significant decimal digits, the standard error to one, as is usual,
-and stored as a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
-bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one
-8-bit level.
+and stored as a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would
+take more bits and sometimes print another last digit. Steps between codes are at most 1 %, near
+white one 8-bit level.
 
 A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
 to the left neighbour, and split into low and high bytes; all planes are deflated together.
