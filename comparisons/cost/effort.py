@@ -84,8 +84,8 @@ QUICK = Effort(
 """For many scenes in one report, at :data:`QUICK_WIDTH`. There, tracing takes most of the time, so
 renderings are few, with many samples each."""
 
-COARSE = replace(QUICK, rounds=2, replicates=3, depths=(), orders=4, stand_ins=False)
-"""For a report within a minute."""
+COARSE = replace(QUICK, depths=(), orders=4, stand_ins=False)
+"""For a report within a minute: fewer methods, since each is traced anew."""
 
 QUICK_WIDTH = 48
 
