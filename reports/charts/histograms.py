@@ -125,4 +125,4 @@ def _marks(summary: Summary, low: float, top: float) -> list[dict[str, Any]]:
 
 def _short(value: float) -> float:
     """A number with more digits than a chart shows, and no more."""
-    return float(f"{value:.7g}")
+    return float(f"{value:.5g}")
