@@ -34,6 +34,9 @@ EXPONENTS = (-18, 16)
 #: Added to the code of a magnitude if the value is negative.
 NEGATIVE = 0x8000
 
+#: Smaller differences are printed as "< 0.01", and stored as half of it, if maps reach 1.
+LEAST = 0.01
+
 #: Pixels; longer images are averaged over square blocks inside the page, never in the files.
 LONGEST = 1024
 
@@ -99,8 +102,11 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
         for colour in "GRB":
             name, base = f"{layer}.{colour}", None if colour == "G" else f"{layer}.G"
             add(name, _means(channels[name], block), DIGITS, base)
-    for name in drawn():
-        add(name, _means(channels[f"{name}.Y"], block), DIGITS)
+    for name, metric in drawn().items():
+        values = _means(channels[f"{name}.Y"], block)
+        if metric.map_range[1] >= 1.0:  # the rounding of exact pairs would fill most of a page
+            values = np.where((values > 0.0) & (values < LEAST), LEAST / 2, values)
+        add(name, values, DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
     add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)
     marked = np.asarray(channels["significant.Y"], np.float64)
