@@ -60,13 +60,17 @@ class Bar:
             total = (self._progress.tasks[0].total or 0.0) - skipped * weight
             self._progress.update(self._whole, total=total, description=self._words())
 
-    def over(self, update: Callable[..., None] | None) -> None:
-        """End the task with this callback: remove its bar, and advance the run's."""
+    def over(self, update: Callable[..., None] | None, weight: float | None = None) -> None:
+        """End the task with this callback: remove its bar, and advance the run's.
+
+        A task with its own weight is not one of the stage's.
+        """
         if isinstance(update, partial):
             self._progress.remove_task(update.args[0])
-        self._done += 1
+        self._done += weight is None
         if self._whole is not None:
-            self._progress.update(self._whole, advance=self._weight, description=self._words())
+            advance = self._weight if weight is None else weight
+            self._progress.update(self._whole, advance=advance, description=self._words())
 
     def _words(self) -> str:
         return f"{self._stage}, {self._done} of {self._count}"
