@@ -58,9 +58,9 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
 
 def xyz_to_lab(xyz: Array3f64, white: Sequence[float]) -> Array3f64:
     """Return CIE L*a*b* of XYZ relative to a white: ``L* = 116 f(Y/Y_n) − 16``."""
-    ratio = xyz / Array3f64(*map(float, white))
+    ratio = xyz / type(xyz)(*map(float, white))
     x, y, z = dr.select(ratio > _EPSILON, dr.cbrt(ratio), _SLOPE * ratio + 16 / 116)
-    return Array3f64(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+    return type(xyz)(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 
 
 def rgb_to_ictcp(rgb: Array3f64, peak: float) -> Array3f64:
@@ -173,7 +173,7 @@ def _cosine(degrees: Float64) -> Float64:
 def times(matrix: Array, vector: Array3f64) -> Array3f64:
     """Return matrix times vector; the matrix becomes part of the kernel."""
     x, y, z = vector
-    return Array3f64(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
+    return type(vector)(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
 
 
 def opaque(value: float) -> Float64:
