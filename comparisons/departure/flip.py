@@ -63,7 +63,6 @@ _RELATIVE = _XYZ / _XYZ.sum(axis=1, keepdims=True)
 # Y, X − Y and Y − Z, relative to white.
 _OPPONENT = np.array([[0.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]]) @ _RELATIVE
 _FROM_OPPONENT = np.linalg.inv(_OPPONENT)
-_EDGES, _POINTS = slice(3, 5), slice(5, 7)
 
 
 def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
@@ -127,7 +126,7 @@ def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curv
             seen = eye.seen(curve(truth), len(near))
             for own, light in zip(found, shown, strict=True):
                 error = _error(seen, eye.seen(curve(light), len(near)))
-                np.maximum(own[rows], error, out=own[rows])
+                np.maximum(own[rows], error.reshape(-1, width), out=own[rows])
     return found.reshape(test.shape[:-1])
 
 
@@ -174,22 +173,27 @@ class _Eye:
         blurs = tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY)
         return cls(reach, blurs, *map(_band, (smooth / smooth.sum(), *map(_balanced, derivatives))))
 
-    def seen(self, rgb: Array3f, height: int) -> list[Plane]:
-        """Return what is seen of displayed colours: seven planes, without their margins.
+    def seen(self, rgb: Array3f, height: int) -> tuple[Array3f, Float32, Float32]:
+        """Return the blurred colours, the slope and the curvature of lightness, without margins.
 
-        The blurred opponent channels, then slopes and curvatures of the achromatic one. ``rgb`` is
-        of ``height`` rows, 2 reach of them margins, as of the columns.
+        The displayed colours ``rgb`` are of ``height`` rows, 2 reach of them margins.
         """
         channels = times(_OPPONENT, rgb)
         dr.eval(channels)
         planes = [channel.numpy().reshape(height, -1) for channel in channels]
-        found = [
+        blurred = [
             sum(share * _across(_down(plane, band), band) for share, band in parts)
             for plane, parts in zip(planes, self.blurs, strict=True)
         ]
-        smooth = _down(planes[0], self.smooth)
-        for band in (self.edge, self.point):
-            found += [_across(smooth, band), _across(_down(planes[0], band), self.smooth)]
+        light, smooth = planes[0], _down(planes[0], self.smooth)
+        slope, curvature = (
+            dr.hypot(
+                _values(_across(smooth, band)), _values(_across(_down(light, band), self.smooth))
+            )
+            for band in (self.edge, self.point)
+        )
+        found = _hunted(Array3f(*map(_values, blurred))), slope, curvature
+        dr.eval(found)
         return found
 
 
@@ -235,20 +239,30 @@ def _down(image: Plane, band: Plane) -> Plane:
 
 def _across(image: Plane, band: Plane) -> Plane:
     """Filter the rows of an image (h, w + 2 reach)."""
-    return _down(image.T, band).T
+    margin = band.shape[1] - band.shape[0]
+    found = np.empty((len(image), image.shape[1] - margin), np.float32)
+    step = max(1, _PRODUCT // band.size)
+    for left in range(0, found.shape[1], _TILE):
+        for top in range(0, len(found), step):
+            part = found[top : top + step, left : left + _TILE]
+            size = part.shape[1]
+            around = image[top : top + step, left : left + size + margin]
+            np.matmul(around, band[:size, : size + margin].T, out=part)
+    return found
 
 
-def _error(truth: Sequence[Plane], shown: Sequence[Plane]) -> Plane:
-    """Return FLIP (h, w) of what is seen of two images."""
-    first, second = ([Float32(plane.ravel()) for plane in seen] for seen in (truth, shown))
-    colours = (_hunted(Array3f(*planes[:3])) for planes in (first, second))
-    edges, points = (
-        dr.abs(dr.hypot(*first[part]) - dr.hypot(*second[part])) for part in (_EDGES, _POINTS)
-    )
-    colour, feature = _redistributed(_apart(*colours)), dr.sqrt(dr.maximum(edges, points))
+def _values(plane: Plane) -> Float32:
+    return Float32(plane.ravel())
+
+
+def _error(truth: tuple, shown: tuple) -> NDArray[np.float32]:
+    """Return FLIP (N,) of what is seen of two images."""
+    (first, *edges), (second, *others) = truth, shown
+    slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))
+    feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slopes, curvatures))
+    colour = _redistributed(_apart(first, second))
     # Equal colours are 0 apart, whatever the power.
-    error = dr.select(colour > 0.0, dr.power(colour, 1.0 - sqrt(sqrt(0.5)) * feature), 0.0)
-    return error.numpy().reshape(truth[0].shape)
+    return dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0).numpy()
 
 
 def _hunted(opponent: Array3f) -> Array3f:
