@@ -9,8 +9,8 @@ ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three, flip-evaluator computes the last two. The signed ratio of
-luminances in stops comes with them, but is not a distance. Statistics over an image are in
+colour-science defines the first three, flip-evaluator the last two. The signed ratio of luminances
+in stops comes with them, but is not a distance. Statistics over an image are in
 `comparisons.departure.statistics`.
 """
 
