@@ -38,7 +38,8 @@ DARKEST = 1e-9
 """Luminance, in units of display white, below which a pixel is black: exposing it overflows."""
 
 MOST_STOPS = 8.0
-"""Stops between the first and last exposure of HDR-FLIP; each exposure takes as long as FLIP."""
+"""Most stops between the first and last exposure of HDR-FLIP: each takes as long as FLIP, and the
+authors' program takes 23 if most of the reference is black."""
 
 # The white of the authors' matrices differs from BT.709's in the fifth digit.
 _PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.31271, 0.32902))
@@ -89,7 +90,7 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     Linear images, as for `ldr_flip`, are only clipped to [0, 65504]. It is not symmetric: the
     reference determines the exposures. Raises nothing for finite images.
     """
-    start, stop = exposures(np.clip(viewing.exposure * reference, 0.0, LARGEST))
+    start, stop = exposures(_exposed(reference, viewing))
     factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
     curves = [partial(_toned, factor=dr.opaque(Float32, each)) for each in factors.tolist()]
     return _flip(test, reference, viewing, curves)
@@ -130,9 +131,13 @@ def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curv
     return found.reshape(test.shape[:-1])
 
 
-def _light(image: Array, viewing: Viewing) -> Array3f:
+def _exposed(image: Array, viewing: Viewing) -> Array:
     exposed = np.multiply(image, viewing.exposure, dtype=float)
-    shown = np.clip(exposed, 0.0, LARGEST).astype(np.float32)
+    return np.clip(exposed, 0.0, LARGEST, out=exposed)
+
+
+def _light(image: Array, viewing: Viewing) -> Array3f:
+    shown = _exposed(image, viewing).astype(np.float32)
     return dr.unravel(Array3f, Float32(shown.ravel()))
 
 

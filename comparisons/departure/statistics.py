@@ -266,19 +266,20 @@ def best_exposure(
     chosen = np.random.default_rng(0).choice(len(places), count, replace=False)
     drawn = np.unravel_index(places[chosen], mask.shape)
     shown, truth = (image[drawn].astype(np.float64) for image in (test, reference))
+    distances = metric.against(truth, ..., viewing)
 
-    sizes = min(count, _BRACKET_PIXELS), count
-    distances = {size: metric.against(truth[:size], ..., viewing) for size in sizes}
-
-    def mean_at(stops: float, size: int = count) -> float:
-        return metric.mean(distances[size](2.0**stops * shown[:size]))
+    def mean_at(stops: float) -> float:
+        return metric.mean(distances(2.0**stops * shown))
 
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
-    start = whole_stops[np.argmin([mean_at(stops, sizes[0]) for stops in whole_stops])]
+    bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
+    some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
+    found = metric.against(some, ..., viewing)(bracketing)
+    start = whole_stops[np.argmin([metric.mean(each) for each in found])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
-    found = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     least_squares = np.log2(least_squares_factor(shown, truth))
-    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), found.x]
+    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), finest.x]
     return float(2.0 ** min(candidates, key=mean_at))
 
 
