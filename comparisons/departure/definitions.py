@@ -86,13 +86,16 @@ def flip(name: str, test: Array, reference: Array, viewing: Viewing) -> NDArray[
     from flip_evaluator import evaluate
 
     is_high = name == "hdr_flip"
-    images = [viewing.exposure * image for image in (reference, test)]
-    shown = (np.clip(image, 0.0, LARGEST if is_high else 1.0) for image in images)
-    stops = exposures(images[0]) if is_high else ()
+    truth, shown = (
+        np.clip(viewing.exposure * image, 0.0, LARGEST if is_high else 1.0)
+        for image in (reference, test)
+    )
     parameters = {"ppd": float(viewing.pixels_per_degree)}
-    parameters |= dict(zip(("startExposure", "stopExposure"), stops, strict=False))
+    if is_high:
+        parameters["startExposure"], parameters["stopExposure"] = exposures(truth)
     found, *_ = evaluate(
-        *(np.ascontiguousarray(image, np.float32) for image in shown),
+        np.ascontiguousarray(truth, np.float32),
+        np.ascontiguousarray(shown, np.float32),
         "HDR" if is_high else "LDR",
         inputsRGB=False,
         applyMagma=False,
@@ -113,6 +116,6 @@ def farthest(count: int = 4096) -> float:
             apart = max(apart, float(np.abs(found - defined).max()))
     images = [colours.reshape(64, -1, 3) for colours in (test, reference)]
     for name in FLIPS:
-        defined = flip(name, *images, DEFAULT_VIEWING)
+        defined = flip(name, images[0], images[1], DEFAULT_VIEWING)
         apart = max(apart, float(np.abs(METRICS[name](*images) - defined).max()))
     return apart

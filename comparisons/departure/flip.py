@@ -187,7 +187,7 @@ class _Eye:
         dr.eval(channels)
         planes = [channel.numpy().reshape(height, -1) for channel in channels]
         blurred = [
-            sum(share * _across(_down(plane, band), band) for share, band in parts)
+            np.sum([share * _across(_down(plane, band), band) for share, band in parts], axis=0)
             for plane, parts in zip(planes, self.blurs, strict=True)
         ]
         light, smooth = planes[0], _down(planes[0], self.smooth)

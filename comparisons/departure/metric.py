@@ -53,7 +53,7 @@ RESERVED = frozenset(
 )  # fmt: skip
 """Names of layers and columns other than metrics."""
 
-Distances = Callable[[Array], Array]
+Distances = Callable[[Array], NDArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ class Metric:
     definition: str
     caution: str
     map_range: tuple[float, float]
-    function: Callable[[Array, Array, Viewing], Array] | None = None
+    function: Callable[[Array, Array, Viewing], NDArray] | None = None
     visible: tuple[float, ...] = ()
     rounding: float = 1e-3
     heading: str = ""
@@ -116,7 +116,7 @@ class Metric:
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-    ) -> Array:
+    ) -> NDArray:
         """Return the map (H, W) of distances between two linear images (H, W, 3)."""
         test, reference = checked_pair(test, reference)
         return self.against(reference, ..., viewing)(test)
@@ -137,7 +137,7 @@ class Metric:
             )
         function = self.function
 
-        def distances(test: Array) -> Array:
+        def distances(test: Array) -> NDArray:
             shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
             return function(shown, truth, viewing)[where]
 
@@ -145,7 +145,7 @@ class Metric:
 
     def each(
         self, tests: Sequence[Array], reference: Array, where: Any, viewing: Viewing
-    ) -> list[Array]:
+    ) -> list[NDArray]:
         """Return the distances of several images, as from `against`."""
         if self.stacks and self.function is not None:
             return [found[where] for found in self.function(np.stack(tests), reference, viewing)]
