@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.departure.metrics import LOG2_EPSILON
-from comparisons.departure.spaces import Viewing, cam16ucs, luminance
+from comparisons.departure.spaces import Viewing, cam16ucs_unclipped, luminance
 
 STEP = 1e-4
 """Relative step of the finite differences of colour spaces; their own error is its square."""
@@ -89,7 +89,7 @@ def _log_derivative(rgb, viewing):
 
 
 def _perceptual(rgb, viewing):
-    return cam16ucs(rgb, viewing, white=inf)
+    return cam16ucs_unclipped(rgb, viewing)
 
 
 def _perceptual_derivative(rgb, viewing):
