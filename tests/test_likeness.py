@@ -57,7 +57,8 @@ def test_what_is_not_told_apart_is_undecided(noise, both, undecided):
     """Neither a gap that noise may make, nor one much smaller than what no rendering explains."""
     found = nearest(distances(noise, none=9, a=0.5, b=8, both=both) | {BOTH: np.full(5, both)})
     assert found.undecided == undecided
-    assert nearest_lines.lacking(found) == ("perhaps gloss" if undecided else "gloss")
+    plain = nearest(distances(none=0.5, a=0.52, b=8, both=9))
+    assert nearest_lines.lacking(plain) == "gloss; perhaps shadow"
 
 
 def test_a_picture_that_no_rendering_is_near_is_not_explained():
