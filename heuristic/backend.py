@@ -6,6 +6,7 @@ LLVM wheel. `check` examines the library found before anything is compiled: with
 first kernel aborts the whole process.
 """
 
+import ctypes
 import glob
 import importlib.metadata
 import os
@@ -24,6 +25,7 @@ VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 WHEEL = "karellen-llvm-core"
+ATOMIC = "libatomic.so.1"
 OLDEST_USABLE = 17
 
 FEWEST_THREADS = 2
@@ -96,6 +98,18 @@ def configure() -> None:
             warnings.warn(f"The first kernel will fail. {_TOO_EARLY}", RuntimeWarning, stacklevel=2)
         return
     os.environ[VARIABLE] = str(library)
+
+
+def require_libraries() -> None:
+    """Raise `InstallationError` if Dr.Jit cannot be loaded for want of a system library.
+
+    Its own handler of that error fails with a NameError, wherever it is imported first.
+    """
+    if sys.platform == "linux":
+        try:
+            ctypes.CDLL(ATOMIC)
+        except OSError as error:
+            raise InstallationError(_not_imported(error)) from error
 
 
 def check() -> LLVMInfo:
@@ -173,15 +187,19 @@ def _version() -> tuple[int, int, int] | None:
     try:
         import drjit
     except ImportError as error:
-        raise InstallationError(
-            f"Dr.Jit cannot be imported: {error}.\n"
-            "Needed: the packages of requirements.txt and, on Linux, libatomic.so.1.\n"
-            "How to get them: ./run installs the packages; "
-            "apt-get install libatomic1 (Debian, Ubuntu) or dnf install libatomic (Fedora)."
-        ) from error
+        raise InstallationError(_not_imported(error)) from error
     major, minor, patch = drjit.detail.llvm_version()
     # Dr.Jit returns -1 for no library, one that it cannot load, and one older than 15.
     return None if major < 0 else (major, minor, patch)
+
+
+def _not_imported(error: Exception) -> str:
+    return (
+        f"Dr.Jit cannot be imported: {error}.\n"
+        f"Needed: the packages of requirements.txt and, on Linux, {ATOMIC}.\n"
+        "How to get them: ./run installs the packages; "
+        "apt-get install libatomic1 (Debian, Ubuntu) or dnf install libatomic (Fedora)."
+    )
 
 
 def _loaded_library() -> Path | None:

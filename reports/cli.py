@@ -17,6 +17,7 @@ import click
 
 import reports.commands
 from comparisons.processes import interruption
+from heuristic import backend
 from heuristic.errors import FotismosError, suggestion
 from heuristic.program import program
 from heuristic.version import __version__
@@ -72,6 +73,7 @@ def cli() -> None:
 
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
+    backend.require_libraries()
 
 
 def main() -> None:

@@ -117,6 +117,16 @@ def test_a_file_that_is_no_library(tmp_path):
     assert f"{text}, which is not an LLVM library" in said
 
 
+def test_a_missing_system_library_is_named_by_every_command():
+    without = "import sys; from heuristic import backend; backend.ATOMIC = 'libabsent.so.1'"
+    for command in ("doctor", "compare fig-8-9"):
+        run = f"sys.argv = 'fotismos {command}'.split(); from reports.__main__ import main; main()"
+        done = python("-c", f"{without}; {run}")
+        assert done.returncode == 2
+        assert done.stderr.startswith("fotismos: error: Dr.Jit cannot be imported: libabsent.so.1")
+        assert "apt-get install libatomic1" in done.stderr
+
+
 def test_the_users_choice_is_left_alone():
     library = any_llvm()
     # The same file by another path, since not every machine has two that work.
