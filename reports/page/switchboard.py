@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from functools import lru_cache
 from io import BytesIO
 from typing import Any
 
@@ -49,6 +50,12 @@ def webp(picture: Image.Image) -> bytes:
     buffer = BytesIO()
     picture.save(buffer, "WEBP", quality=QUALITY, method=4)
     return buffer.getvalue()
+
+
+@lru_cache(maxsize=4096)
+def webp_of(png: bytes) -> bytes:
+    """Return a small PNG picture as WebP, kept for the next time that the page is written."""
+    return webp(Image.open(BytesIO(png)).convert("RGB"))
 
 
 def webp_uri(file: bytes) -> str:

@@ -95,6 +95,7 @@ def environment() -> Environment:
         caution=caution,
         uri=_data_uri,
         webp_uri=switchboard.webp_uri,
+        webp_of=switchboard.webp_of,
         deflated=lambda code: embedding.deflated(code.encode(), 9),
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
-from PIL import Image
 
 from comparisons import atomic
 from comparisons.comparison import ComparisonRecord
@@ -161,7 +159,7 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     return SceneView(
         record=comparison.record,
         thumbnails={
-            name: switchboard.webp(Image.open(BytesIO(png)).convert("RGB"))
+            name: switchboard.webp_of(png)
             for name, png in images.thumbnails(shown, comparison.record.viewing.exposure).items()
         },
         embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
