@@ -108,7 +108,7 @@ def sheet(
 
     With labels, the last row is a map of errors, and has its legend.
     """
-    left, right = (0.3, 0.5) if labels else (0.0, 0.0)
+    left, right = (0.3, 0.62) if labels else (0.0, 0.0)
     width, height = len(titles) * INCH + left + right, len(rows) * INCH + 0.3
     with rc_context(STYLE):
         figure = Figure(figsize=(width, height), facecolor=GROUND)
@@ -131,7 +131,7 @@ def sheet(
 
 
 def _legend(figure: Figure, width: float, height: float) -> None:
-    axes = figure.add_axes(((width - 0.44) / width, 0.02, 0.1 / width, INCH / height - 0.04))
+    axes = figure.add_axes(((width - 0.56) / width, 0.02, 0.1 / width, INCH / height - 0.04))
     figures.legend(figure, axes)
 
 
@@ -161,6 +161,6 @@ def _arrow(axes: Axes, letter: str, angle: float) -> None:
               style="italic", family="serif")  # fmt: skip
 
 
-def _at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):  # noqa: ANN202
+def _at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):
     """Return x and y of an angle from the normal, in degrees to the right."""
     return radius * np.sin(np.radians(angle)), radius * np.cos(np.radians(angle))
