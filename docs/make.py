@@ -262,12 +262,18 @@ def _renderers():
 
 
 def _notebook():
-    """Execute the tutorial; keep the output of its cells, but not their times."""
+    """Execute the tutorial; keep the output of its cells, but not their times.
+
+    Of a comparison only the picture is kept: hosts of code do not show frames.
+    """
     path = DOCS / "tutorial.ipynb"
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
+        for output in cell.get("outputs", ()):
+            if "image/png" in output.get("data", ()):
+                output.data.pop("text/html", None)
     atomic.write(path, nbformat.writes(notebook) + "\n")
 
 
