@@ -151,22 +151,25 @@ def compare(
     progress: Progress | None = None,
     command: str = "",
     kept: Kept | None = None,
+    with_terms: bool = True,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    options : Options, optional
+    options
         What to render, and how to judge it.
-    progress : callable, optional
+    progress
         Called as ``progress(stage, done, total)`` after each pass.
     command
         How to repeat the comparison, for the record.
-    kept : optional
+    kept
         Holds the passes of an interrupted run, and takes those of this one
         (:func:`comparisons.render.render`).
+    with_terms
+        Whether to read the terms of equation 8.10.
 
     Returns
     -------
@@ -182,7 +185,7 @@ def compare(
     options = options or Options()
     said: list[str] = []
     with messages.collected(said):
-        comparison = _compare(source, options, progress, command, kept)
+        comparison = _compare(source, options, progress, command, kept, with_terms)
     told = messages.counted([*source.said, *said])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *told))
     return replace(comparison, record=made)
@@ -194,6 +197,7 @@ def _compare(
     progress: Progress | None,
     command: str,
     kept: Kept | None,
+    with_terms: bool,
 ) -> Comparison:
     stages = _Stages()
     ready = guarded(source, options)
@@ -221,7 +225,7 @@ def _compare(
         images.counted,
     )
     stages.done("limits of the reference")
-    terms, no_terms = tracing.trace(ready, options)
+    terms, no_terms = tracing.trace(ready, options) if with_terms else (None, "")
     stages.done("terms")
     made = ComparisonRecord(
         scene=source.name,

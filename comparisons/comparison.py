@@ -9,6 +9,7 @@ from comparisons.departure.objects import Carrier
 from comparisons.departure.regions import Region
 from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
+from comparisons.effects.nearness import Nearest, Renderings
 from comparisons.records import (
     VERSION,
     Amount,
@@ -252,9 +253,14 @@ class PictureRecord(Record):
     edges
         Correlation of their edges with the expected ones.
     ratio
-        Means of red, green and blue over those of the reference.
+        Means of red, green and blue over those of the reference, which is clipped at display
+        white if they are.
     odd
         What is odd about them, in words, their position first.
+    nearest
+        The rendering that they are nearest to as a whole; null if none was looked for.
+    renderings
+        Those that were compared with them; null if none was.
     """
 
     files: tuple[str, ...]
@@ -264,6 +270,8 @@ class PictureRecord(Record):
     edges: float
     ratio: tuple[float, float, float]
     odd: tuple[str, ...] = ()
+    nearest: Nearest | None = None
+    renderings: Renderings | None = None
 
 
 class ComparisonRecord(Record, kw_only=True):

@@ -66,7 +66,7 @@ def schedule(
 
     Parameters
     ----------
-    plan : reference.planning.plan.Plan
+    plan
         Its samples and passes are the defaults.
     pixels
         Number of pixels of the image.
@@ -126,15 +126,15 @@ def render(
 
     Parameters
     ----------
-    ready : comparisons.compare.Prepared
+    ready
         Both halves and their schedule.
-    options : comparisons.options.Options
+    options
         Seed, noise target and viewing.
     counted
         (H, W): the pixels whose noise counts.
-    progress : callable, optional
+    progress
         ``progress(stage, done, total)``; with a noise target, ``total`` is the limit.
-    kept : optional
+    kept
         Holds the state of an interrupted run, and is offered the new one after each pass.
 
     Returns

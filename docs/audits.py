@@ -1,4 +1,4 @@
-"""The content of docs/audit.md: audits of this project's shaders and some Mitsuba BSDFs."""
+"""The content of docs/audit.md: audits of shaders, of three.js, and of some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,18 @@ from reports.terminal.printing import number
 from reports.terminal.tables import markdown
 
 SHADERS = Path(__file__).parent / "shaders"
-PICTURED = "phong"
+PICTURED, THREE = "phong", "three:phong"
+SHADED = ("cook_torrance", "oren_nayar", "toon", "wrapped")
+ENGINES = {
+    "three.js, MeshPhong": "mesh_phong.py",
+    "Filament": "standard_material.py:filament",
+    "bevy": "standard_material.py:bevy",
+    "glTF, Fresnel’s mix": "standard_material.py:gltf",
+    "layered by albedo": "standard_material.py:layered",
+}
+"""Lobes of engines, by their published formulas."""
+
+ARGUED = ("white furnace", "energy", "reciprocity")
 BSDFS = (
     ("diffuse", {}),
     ("roughplastic", {"alpha": 0.1}),
@@ -23,15 +34,35 @@ BSDFS = (
 
 def audits() -> dict[str, Audit]:
     """Return all audits, by their names in the table."""
-    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn")}
-    for path in sorted(SHADERS.glob("*.py")):
-        if path.stem != PICTURED:
-            link = f"[{path.stem.replace('_', ' ')}](shaders/{path.name})"
-            found[link] = audit("heuristic", str(path), {})
+    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn", THREE)}
+    for name in SHADED:
+        link = f"[{name.replace('_', ' ')}](shaders/{name}.py)"
+        found[link] = audit("heuristic", str(SHADERS / f"{name}.py"), {})
     for plugin, given in BSDFS:
         words = "".join(f", {name} {value:g}" for name, value in given.items())
         found[f"`{plugin}`{words}"] = audit("bsdf", plugin, given)
     return found
+
+
+def engines() -> dict[str, Audit]:
+    """Return the audits of :data:`ENGINES`, by name."""
+    return {name: audit("heuristic", str(SHADERS / file), {}) for name, file in ENGINES.items()}
+
+
+def argued(found: dict[str, Audit]) -> Iterator[str]:
+    """Yield the table of engines: the worst value of each check, and where it was found."""
+    rows = [
+        (f"[{name}](shaders/{ENGINES[name].partition(':')[0]})",
+         *(_where(record.named(check)) for check in ARGUED))
+        for name, record in found.items()
+    ]  # fmt: skip
+    yield from markdown([("Form", *ARGUED), *rows], right=4)
+
+
+def _where(check: Checked) -> str:
+    if check.verdict == "holds":
+        return f"holds ({number(check.value)})"
+    return f"**{number(check.value)}**: {check.worst}"
 
 
 def table(found: dict[str, Audit]) -> Iterator[str]:

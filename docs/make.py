@@ -1,5 +1,7 @@
 """Makes the generated parts of the documentation: ``./run docs``; ``--all`` also measures again.
 
+``./run docs --site`` only builds the site.
+
 Pictures and tables come from renderings with fixed seeds. The index of equations comes from the
 docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced; the rest is
 written by hand.
@@ -24,7 +26,7 @@ from reference.planning.plan import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant
 from reports.charts import figures, term_figure, vega
-from reports.charts.albedo_chart import albedo_chart
+from reports.charts.audit_charts import albedo_chart
 from reports.charts.error_over_time import error_over_time
 from reports.files import images
 from reports.terminal import tables
@@ -56,6 +58,8 @@ POLYGONS = (
 
 def main(words):
     """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
+    if words == ["--site"]:
+        return _site()
     set_variant("llvm_ad_rgb")
     if words == ["--accuracy"]:
         return _accuracy()
@@ -173,6 +177,16 @@ def _lobes():
         atomic.write(DOCS / f"models-lobes-{name}.svg", term_figure.svg(grid.at(*place)) + "\n")
 
 
+def _site():
+    """Build the site from what is there, in out/site."""
+    from website import build  # next to this script
+
+    folder = DOCS.parent / "out/site"
+    if build.build(folder):
+        raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
+    print(folder / "index.html")
+
+
 def _measurements():
     """Measure all errors and times in the documents again, for a quarter of an hour."""
     import measured  # next to this script
@@ -237,6 +251,7 @@ def _audits():
     found = audits.audits()
     replace("audit.md", "audits", audits.table(found))
     atomic.write(DOCS / "audit.svg", vega.paper(albedo_chart(found[audits.PICTURED])))
+    replace("audit.md", "engines", audits.argued(audits.engines()))
 
 
 def _shaders():

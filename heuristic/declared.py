@@ -103,7 +103,7 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         return sum(1 for _ in self)
 
     def _all_own(self) -> dict[str, Declaration]:
-        """Return the package's own declarations, including those of its :attr:`home`."""
+        """Return the package's own declarations, including those of its ``home``."""
         if self.home:
             import_module(self.home)
         return self._own

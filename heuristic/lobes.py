@@ -26,7 +26,7 @@ def lobe(
 
     Parameters
     ----------
-    material : Material
+    material
         Its form and exponent.
     normal, view
         Of any length.

@@ -32,9 +32,9 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
 
     Parameters
     ----------
-    mesh : mitsuba.Mesh
+    mesh
         The mesh; if it has no vertex normals, those of 6.34 are used.
-    interpolation : Interpolation
+    interpolation
         GOURAUD for the vertices with their normals, FLAT for the faces' centroids with theirs.
 
     Returns
@@ -100,7 +100,7 @@ def shade_mesh(
         See :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
     twosided
         Also store the values of the back, with reversed normals.
-    model : callable
+    model
         The model, with the arguments of :func:`heuristic.shade`.
 
     Returns
@@ -155,7 +155,7 @@ class MeshCorners:
 
     Parameters
     ----------
-    scene : mitsuba.Scene
+    scene
         Its meshes are treated as in :func:`shading_points`, except that with ``face_normals`` each
         face has its own normal at its vertices.
 

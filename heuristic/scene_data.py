@@ -23,7 +23,7 @@ KINDS = {kind: plugin.removeprefix("heuristic_") for plugin, kind in PLUGINS.ite
 class Triangles:
     """A shape: positions and normals (V, 3), texture coordinates (V, 2), faces (F, 3).
 
-    ``normals`` is None where faces are flat; ``material`` is a number in :class:`Exported`.
+    ``normals`` is None where faces are flat; ``material`` is a number in ``Exported``.
     """
 
     name: str

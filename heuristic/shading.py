@@ -37,14 +37,14 @@ def shade(
         Normals and views of any length are normalised; a zero vector receives no light. Three plain
         numbers stand for all points if another of the three is a Dr.Jit array. Half precision and
         integers are computed in single precision.
-    material : Material
+    material
         The coefficients.
-    lights : sequence of PointLight, DirectionalLight or SpotLight
+    lights
         Any number of them. Numbers in up to :data:`heuristic.shading.BLOCK` lights, and in the
         material, are compiled into the kernel; opaque Dr.Jit values are not.
     ambient
         ``I_a``: a number, RGB, one value per wavelength, or a Dr.Jit array.
-    visible : callable, optional
+    visible
         ``visible(toward, distance)`` returns a mask of the points that a light in that direction,
         at that distance, reaches. The chapters' model has no shadows; if omitted, nothing is
         hidden.
@@ -151,13 +151,13 @@ def sum_lights(
     ----------
     position, normal, view
         See :func:`heuristic.shade`: normals and views of any length.
-    material : Material
+    material
         Determines which of the two sums are needed, and the form and exponent of the specular term.
-    lights : sequence
+    lights
         Any number. More than :data:`BLOCK` are evaluated in blocks, so compile time, kernel size
         and memory do not grow with their number. They are unrolled if there is nothing to evaluate
         (scalar arrays) or it is impossible (in a symbolic loop or call).
-    visible : callable, optional
+    visible
         ``visible(toward, distance)`` returns a mask of the points that the light reaches.
 
     Returns

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING
+from comparisons.effects.nearness import Nearest
 from reports.charts.theme import EFFECT_COLOURS
+from reports.terminal.nearest_lines import told
 from reports.terminal.printing import seconds
 
 if TYPE_CHECKING:
@@ -69,6 +71,10 @@ class Finding:
         ``{tolerance: cheapest method, or None}``; empty without a study of cost.
     is_exact
         Whether the mean is at most :data:`EXACT`.
+    subject
+        What is judged, as the first words of a sentence.
+    nearest
+        The rendering that a picture is nearest to; None if it is unknown, or not a picture.
     """
 
     scene: str
@@ -77,6 +83,8 @@ class Finding:
     parts: tuple[Part, ...]
     remedies: dict[float, Remedy | None]
     is_exact: bool
+    subject: str = "Textbook shading"
+    nearest: Nearest | None = None
 
     def is_right(self, tolerance: float) -> bool:
         """Return whether the scene looks right at one of :data:`TOLERANCES`."""
@@ -90,7 +98,7 @@ class Finding:
 
 def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
     """Return the finding of a scene."""
-    metric = record.metrics[LEADING.name]
+    metric, picture = record.metrics[LEADING.name], record.picture
     return Finding(
         scene=record.scene,
         mean=metric.mean,
@@ -98,6 +106,8 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
         parts=_parts(metric.mean, cost) if cost else (),
         remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
         is_exact=metric.high <= EXACT,
+        subject="The picture" if picture else "Textbook shading",
+        nearest=picture.nearest if picture else None,
     )
 
 
@@ -126,9 +136,9 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
         (only,) = findings
         share = only.beyond[tolerance]
         said = [
-            f"Textbook shading looks right in {only.scene}."
+            f"{only.subject} looks right in {only.scene}."
             if right
-            else f"Textbook shading is visibly wrong in {100 * share:.0f} % of {only.scene}."
+            else f"{only.subject} is visibly wrong in {100 * share:.0f} % of {only.scene}."
         ]
     else:
         said = [f"Textbook shading looks right in {right} of {len(findings)} scenes."]
@@ -143,12 +153,12 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
 def about(found: Finding, tolerance: float = USUAL) -> str:
     """Return one scene's finding: how much is wrong, mostly why, and a remedy."""
     if found.is_exact:
-        return "Textbook shading is exact here, as far as can be seen."
+        return f"{found.subject} is exact here, as far as can be seen."
     share = found.beyond[tolerance]
     wrong = f"is visibly wrong in {100 * share:.0f} % of the pixels"
-    said = [
-        "Textbook shading " + ("looks right here." if found.is_right(tolerance) else f"{wrong}.")
-    ]
+    said = [f"{found.subject} {'looks right here' if found.is_right(tolerance) else wrong}."]
+    if found.nearest:
+        said.append(f"It {told(found.nearest)}.")
     if found.cause:
         said.append(f"It lacks mostly {found.cause}.")
     remedy = found.remedies.get(tolerance)
@@ -162,7 +172,7 @@ def about(found: Finding, tolerance: float = USUAL) -> str:
 
 def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
     """Return a line for each scene that does not look right: what it lacks, and a remedy."""
-    if not any(found.remedies for found in findings):
+    if not any(found.remedies or found.nearest for found in findings):
         return [f"For causes and remedies, give the same command with {WITH_CAUSES}."]
     lines = []
     for found in findings:

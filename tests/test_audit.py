@@ -1,6 +1,7 @@
 """Audits, against closed forms, and of ways to shade that are wrong in one respect each."""
 
 import json
+from pathlib import Path
 
 import drjit as dr
 import jsonschema
@@ -8,16 +9,23 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.audit import angles, gradients
-from comparisons.audit.audit import checks_of
+from comparisons.audit import angles, extremes, gradients
+from comparisons.audit.audit import examined
 from comparisons.audit.scattering import Scattering
-from comparisons.audit.shaded import ALPHA, Shaded, opened
-from comparisons.audit.subject import Subject
+from comparisons.audit.shaded import DISTANCES, EXTREMES, Shaded, opened
+from comparisons.audit.subject import Subject, random_and_mirrored
 from heuristic import Range
 from heuristic.errors import InputError
 from heuristic.functions import heuristic_of
+from heuristic.heuristics import HEURISTICS
 from reference.pairing import albedo, factors
 from tests.schemas import schema
+from tests.test_glsl import opengl
+
+DOCS = Path(__file__).parents[1] / "docs/shaders"
+FUNCTIONS = ("filament", "bevy", "gltf", "layered")
+SHADERS = [str(path) for path in sorted(DOCS.glob("*.py")) if path.stem != "standard_material"]
+SHADERS += [f"{DOCS / 'standard_material.py'}:{name}" for name in FUNCTIONS]
 
 
 def lambert(point):
@@ -35,8 +43,7 @@ def shaded(function):
 
 
 def failing(subject):
-    curves = tuple(angles.curve(subject, material) for material in subject.materials)
-    return {check.name for check in checks_of(subject, curves) if check.verdict == "does not hold"}
+    return {check.name for check in examined(subject)["checks"] if check.verdict == "does not hold"}
 
 
 def curves_of(subject):
@@ -93,8 +100,9 @@ def lobe(form, n, degrees):
 def test_the_textbooks_lobes_return_what_a_quadrature_finds(rgb, form):
     subject = opened(form, {})
     subject.grid = (240, 180)
-    n = factors.exponent_of(ALPHA, form)
-    returned = dict(zip(angles.ANGLES, curves_of(subject)["metal"].returned, strict=True))
+    curve = curves_of(subject)["metal, alpha 0.3"]
+    n = factors.exponent_of(curve.alpha, form)
+    returned = dict(zip(angles.ANGLES, curve.returned, strict=True))
     head_on = lobe(form, n, 0)
     for degrees in (0.0, 45.0, 80.0):
         assert returned[degrees] == pytest.approx(lobe(form, n, degrees) / head_on, rel=5e-3)
@@ -111,7 +119,7 @@ def test_roughplastic_loses_light_and_is_reciprocal(rgb):
     curve = angles.curve(subject, "roughplastic")
     known = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), 0.5, 1.49 / 1.000277))
     assert curve.seen[0] == pytest.approx(known.diffuse[0] + known.specular[0], abs=3e-3)
-    found = {check.name: check for check in checks_of(subject, (curve,))}
+    found = {check.name: check for check in examined(subject)["checks"]}
     assert found["white furnace"].verdict == "does not hold"
     holding = ("energy", "reciprocity", "horizon", "light from below", "sampling", "values")
     assert {found[name].verdict for name in holding} == {"holds"}
@@ -225,11 +233,31 @@ def test_the_tables_of_roughplastic_have_no_derivative(rgb):
     assert by["diffuse_reflectance.value"] < gradients.AGREES
 
 
-@pytest.mark.parametrize("name", ["mean-ambient", "shadow-map", "ambient-occlusion"])
-def test_what_prepares_a_scene_is_audited(rgb, name):
+@pytest.mark.guarantee(
+    "kernel", "Every built-in heuristic and example shader passes the hard cases of an audit."
+)
+@pytest.mark.parametrize("name", [*sorted(HEURISTICS), *SHADERS])
+def test_every_heuristic_goes_through_the_hard_cases(rgb, name):
     subject: Subject = opened(name, {})
     subject.grid = (24, 18)
+    found = extremes.extremes(subject)
+    assert len(found) >= len(EXTREMES) + len(DISTANCES)
+    assert [each.worst for each in found if each.wrong] == []
     assert "values" not in failing(subject)
+
+
+@opengl
+def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
+    subject = opened(str(DOCS / "phong.glsl"), {})
+    subject.grid = (24, 18)
+    checks = {check.name: check for check in examined(subject)["checks"]}
+    assert checks["gradient"].verdict == "not asked"
+    assert checks["values"].verdict == "holds"
+    pairs = random_and_mirrored()
+    for material in subject.materials:
+        built_in = opened("phong", {}).response(material, *pairs)
+        found = subject.response(material, *pairs)
+        np.testing.assert_allclose(found, built_in, rtol=1e-4, atol=1e-5)
 
 
 def test_the_command_writes_a_record_and_a_chart(run, tmp_path):

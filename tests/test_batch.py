@@ -68,7 +68,8 @@ def test_a_finished_scene_is_not_rendered_again(run, folder, tmp_path, monkeypat
     assert not rendered
     assert {p: p.read_bytes() for p in (tmp_path / "out/a").iterdir()} == files
     again = (tmp_path / "out/index.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") == again.count("data:image/png") == 3
+    thumbnail = 'src="data:image/webp'
+    assert page.count(thumbnail) == again.count(thumbnail) == 3
     for other in (("--fresh",), ("--seed", 1), ("--noise", 9), ("--figures",), ("--why",)):
         assert run(*words, *other)[0] == 130
     (folder / "a.xml").write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"))

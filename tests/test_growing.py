@@ -1,9 +1,12 @@
 """The page grows while it is made: coarse pictures first, then scene by scene, then the rest."""
 
+import json
+
 import pytest
 
 from comparisons.gallery import builtin
-from heuristic.errors import OutputError
+from comparisons.verification import Verification
+from heuristic.errors import InputError, OutputError
 from reports.commands import report
 from reports.page.scene_view import SceneView
 from reports.run import growing, output, single, tasks
@@ -30,7 +33,7 @@ def pages(monkeypatch):
 def small_report(monkeypatch):
     """A report of two scenes without causes, whose page is written at every occasion."""
     monkeypatch.setattr(builtin, "SCENES", {name: builtin.SCENES[name] for name in NAMES})
-    monkeypatch.setattr(single, "_explained", lambda case, progress, made: (made, None))
+    monkeypatch.setattr(single, "_explained", lambda case, progress, made, coarse: (made, None))
     monkeypatch.setattr(growing, "INTERVAL_S", 0.0)
     monkeypatch.setattr(growing, "SHARE", 1.0)
     monkeypatch.setattr(tasks, "hard_cases", lambda: None)
@@ -50,11 +53,43 @@ def test_a_report_grows_from_coarse_to_whole_to_hard_cases(run, small_report, pa
     coarse = [[v.is_coarse for v in views] for views, _ in pages]
     assert coarse[:4] == [[True], [True, True], [False, True], [False, False]]
     done = [shown["making"] and shown["making"].done for _, shown in pages]
-    assert done == [0, 0, 1, 2, 2, None]
-    assert ["hard_cases" in shown for _, shown in pages] == [False] * 5 + [True]
+    assert done == [0, 0, 1, 2, None]
+    assert ["hard_cases" in shown for _, shown in pages] == [False] * 4 + [True]
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "reload to see more" not in page
     assert "<b>Preview:</b>" not in page
+
+
+def verified(name, *_):
+    return Verification(
+        scene=name, planned="direct", everything="path", resolution=(8, 8), significant=0,
+        pixels=64, largest=0.0, heuristic_largest=0.0, planned_s=0.1, everything_s=0.2,
+        planned_noise=0.1, everything_noise=0.1, gain=2.0, factors=(), planning_s=0.0, saved_s=0.1,
+    )  # fmt: skip
+
+
+def test_verifications_stand_beside_the_scenes_of_their_names(
+    run, small_report, pages, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(tasks, "verified", verified)
+    assert run("report", "-o", tmp_path / "out", *WORDS[:-1])[0] == 0
+    views, shown = pages[-1]
+    assert [v.record.scene for v in views] == list(NAMES)
+    assert [v.scene for v in shown["verifications"]] == list(NAMES)
+    stages = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))["stages"]
+    assert stages["verification and hard cases"] > 0.0
+
+
+def test_a_verification_that_fails_leaves_the_scenes(run, small_report, tmp_path, monkeypatch):
+    def fails(*_):
+        raise InputError("it cannot be verified")
+
+    monkeypatch.setattr(tasks, "verified", fails)
+    code, _, told = run("report", "-o", tmp_path / "out", *WORDS[:-1])
+    assert code == InputError.exit_code
+    assert "it cannot be verified" in told
+    text = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert all(f'data-scene="{name}"' in text for name in NAMES)
 
 
 def test_an_interrupted_report_keeps_its_page(run, small_report, tmp_path, monkeypatch):

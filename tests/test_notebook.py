@@ -37,6 +37,6 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     assert (tag, attributes["sandbox"]) == ("iframe", "allow-scripts")
     page = attributes["srcdoc"]
     assert page.lstrip().startswith("<!")
-    assert page.count("data:image/png") == 3
+    assert page.count('src="data:image/webp') == 3
     assert "box <b>" not in page
     assert "box &lt;b&gt;" in page

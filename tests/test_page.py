@@ -308,4 +308,8 @@ def test_verifications_are_printed(record, pictures):
     assert "5.70 (5.30 to 6.10)" in html
     assert "96 × 80 pixels" in html
     assert HOSTILE not in html
+    assert "A quick report verifies" not in html
+    assert "verifies only 1 of its 2 scenes" in page.render(
+        [view] * 2, verifications=[verification]
+    )
     assert "Pruning" not in page.render([view])

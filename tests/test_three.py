@@ -9,9 +9,10 @@ import pytest
 
 from comparisons.case import Request, open_case
 from comparisons.compare import compare, prepare
+from comparisons.hard import furnace
 from heuristic.errors import InputError, InstallationError
 from heuristic.heuristics import Heuristic, declare, named
-from heuristic.three_js import browser
+from heuristic.three_js import browser, three_lobes
 
 SIDE = 64
 
@@ -147,10 +148,52 @@ def test_a_light_that_three_js_does_not_have_is_refused(rgb):
         compare(case.source, case.options)
 
 
+def form(material, kind, light, view):
+    """Return the closed form of three.js for a normal along z, in float64."""
+    n = 4 * material["n"]
+    specular = 8 * np.array(material["k_s"])[:, None] / (n + 2)
+    half = light + view
+    half /= np.linalg.norm(half, axis=0)
+    facing = (view * half).sum(axis=0)
+    away = 2 ** ((-5.55473 * facing - 6.98316) * facing)
+    lobe = (specular + (1 - specular) * away) * (n + 2) / 8 * half[2] ** n
+    base = np.array(material["k_d"])[:, None]
+    return np.maximum(light[2], 0) * (base + (kind == "phong") * lobe)
+
+
 @three
-def test_an_audit_of_pixels_is_refused(run, tmp_path):
-    code, _, said = run("audit", "--heuristic", "three:phong", "-o", tmp_path)
-    assert (code, "reads only positions" in said) == (2, True)
+@pytest.mark.parametrize("kind", ["phong", "lambert"])
+def test_its_lobes_are_the_closed_form_for_pairs_of_directions(rgb, kind):
+    random = [furnace.random_pairs(5000), [-each for each in furnace.random_pairs(50)]]
+    materials = [
+        {"k_i": [0] * 3, "k_a": [0] * 3, "k_d": [0.5, 0.2, 0.7], "k_s": [0.3 * n] * 3, "n": n}
+        | {"form": "phong", "normalised": False}
+        for n in (1.0, 40.0)
+    ]
+    asked = [
+        three_lobes.Asked(material, light, view, np.tile([[0.0], [0.0], [1.0]], light.shape[1]))
+        for material in materials
+        for light, view in random
+    ]
+    for each, found in zip(asked, three_lobes.values(kind, asked), strict=True):
+        if each.light[2].min() < 0:
+            np.testing.assert_array_equal(found, 0)
+        else:
+            expected = form(each.material, kind, each.light, each.view)
+            np.testing.assert_allclose(found, expected, rtol=2e-4, atol=1e-5)
+
+
+@three
+def test_an_audit_asks_the_real_library(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("comparisons.audit.shaded.ALPHAS", (0.3,))
+    code, _, _ = run("audit", "--heuristic", "three:lambert", "-o", tmp_path)
+    record = json.loads((tmp_path / "audit/three-lambert/audit.json").read_text(encoding="utf-8"))
+    verdicts = {check["name"]: check["verdict"] for check in record["checks"]}
+    assert code == 0
+    assert verdicts["values"] == verdicts["energy"] == verdicts["reciprocity"] == "holds"
+    matte = next(curve for curve in record["curves"] if curve["material"] == "matte")
+    np.testing.assert_allclose(matte["seen"], 1, atol=2e-3)
+    np.testing.assert_allclose(matte["returned"], 1, atol=2e-3)
 
 
 def test_what_is_missing_is_said(monkeypatch, tmp_path):

@@ -1,15 +1,33 @@
 """Check that values are finite and not negative, in hard cases and wherever a check looked."""
 
+import numpy as np
+
 from comparisons.audit.angles import checked
-from comparisons.audit.audit_record import Checked
-from comparisons.audit.subject import Subject
+from comparisons.audit.audit_record import Checked, Extreme
+from comparisons.audit.subject import Setting, Subject
+
+
+def extremes(subject: Subject) -> tuple[Extreme, ...]:
+    """Evaluate all hard cases of a subject."""
+    return tuple(_extreme(subject, setting) for setting in subject.settings())
+
+
+def _extreme(subject: Subject, setting: Setting) -> Extreme:
+    values = setting.values()
+    wrong = subject.noted(values, setting.told)
+    finite = values[np.isfinite(values)]
+    return Extreme(
+        case=setting.words,
+        lowest=float(finite.min()) if finite.size else None,
+        highest=float(finite.max()) if finite.size else None,
+        wrong=wrong,
+        worst=subject.faults[-1].told() if wrong else "",
+    )
 
 
 def values(subject: Subject) -> Checked:
-    """Check that no value, here or in the checks before, is NaN, infinite or negative."""
-    for setting in subject.settings():
-        subject.noted(setting.values(), setting.told)
+    """Check that no value met so far is NaN, infinite or negative."""
     faults = subject.faults
-    worst = f"{faults[0].value:.3g} ({faults[0].where})" if faults else "none"
+    worst = faults[0].told() if faults else "none"
     expected = "0 cases of NaN, infinity or a negative value"
     return checked("values", not faults, len(faults), expected, worst)

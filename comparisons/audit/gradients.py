@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.audit.angles import checked
-from comparisons.audit.audit_record import Checked
+from comparisons.audit.audit_record import Checked, Derivative
 from comparisons.audit.subject import Subject, Tuned
 
 STEP = 0.02
@@ -31,17 +31,24 @@ OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""
 
 
-def gradients(subject: Subject) -> Checked:
-    """Check the derivative with respect to every number that the subject depends on."""
-    found = {tuned.name: _disagreement(tuned) for tuned in subject.tuned()}
+def derivatives(subject: Subject) -> tuple[Derivative, ...]:
+    """Compare the derivatives with respect to every number that a subject depends on."""
+    return tuple(
+        Derivative(by=tuned.name, difference=_disagreement(tuned)) for tuned in subject.tuned()
+    )
+
+
+def gradients(subject: Subject, found: tuple[Derivative, ...]) -> Checked:
+    """Check that all derivatives agree."""
     expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
     if not found:
         return Checked(
             name="gradient", verdict="not asked", value=None, expected=expected,
-            worst="it depends on no number",
+            worst=subject.untuned,
         )  # fmt: skip
-    worst = max(found, key=lambda name: found[name])
-    return checked("gradient", found[worst] <= AGREES, found[worst], expected, f"by {worst}")
+    worst = max(found, key=lambda each: each.difference)
+    value = worst.difference
+    return checked("gradient", value <= AGREES, value, expected, f"by {worst.by}")
 
 
 def _disagreement(tuned: Tuned) -> float:

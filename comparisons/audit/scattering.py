@@ -10,7 +10,7 @@ import numpy as np
 
 from comparisons.audit.angles import checked
 from comparisons.audit.audit_record import Checked
-from comparisons.audit.subject import Setting, Subject, Tuned
+from comparisons.audit.subject import ALPHAS, Setting, Subject, Tuned, random_and_mirrored
 from comparisons.hard import furnace
 from heuristic.errors import InputError
 
@@ -42,6 +42,8 @@ SHARPEST = 50.0
 class Scattering(Subject):
     """A BSDF of some type, with its parameters; those omitted are of :data:`WHITE`.
 
+    If no roughness is given, and it has one, it is evaluated at each of :data:`ALPHAS`.
+
     Raises
     ------
     InputError
@@ -60,10 +62,19 @@ class Scattering(Subject):
                 f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
                 " reflection with a density: give roughplastic, roughconductor or the like."
             )
-        super().__init__((plugin,), grid=(furnace.AZIMUTHS, furnace.HEIGHTS))
+        self.bsdfs = {plugin: self.bsdf}
+        materials: dict[str, float | None] = {plugin: None}
+        if key := self._roughness():
+            of = {f"{plugin}, alpha {alpha:g}": alpha for alpha in ALPHAS}
+            self.bsdfs = {
+                name: self._made(**{key: alpha if key == "alpha" else alpha**0.5})
+                for name, alpha in of.items()
+            }
+            materials = dict(of)
+        super().__init__(materials)
 
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        return self._values(self.bsdf, light, view)
+        return self._values(self.bsdfs[material], light, view)
 
     def settings(self) -> Iterator[Setting]:
         azimuth = np.deg2rad([0.0, 90.0, 180.0])
@@ -76,7 +87,7 @@ class Scattering(Subject):
         yield self._setting("grazing and from behind", {}, light, view)
         nothing, up = np.zeros((3, 1)), np.array([[0.0], [0.0], [1.0]])
         yield self._setting("a direction of length 0", {}, nothing, up)
-        light, view = furnace.random_pairs(256)
+        light, view = random_and_mirrored()
         if "alpha" in self._keys():
             for alpha in (1e-4, 1.0):
                 yield self._setting(f"alpha = {alpha:g}", {"alpha": alpha}, light, view)
@@ -93,7 +104,7 @@ class Scattering(Subject):
     def sampling(self) -> Checked:
         """Check the density of samples against ``pdf``: χ² over directions (Mitsuba's test)."""
         light, view = furnace.random_pairs(256)
-        if not self.response(self.plugin, light, view).any():
+        if not self.response(next(iter(self.materials)), light, view).any():
             return Checked(
                 name="sampling", verdict="not asked", value=None, expected="p of χ²",
                 worst="it reflects nothing",
@@ -134,6 +145,13 @@ class Scattering(Subject):
                 f"BSDF {self.plugin!r} with {self.given} cannot be made: give a Mitsuba BSDF type,"
                 f" and its parameters as -p name=value. Mitsuba reports: {reason}"
             ) from error
+
+    def _roughness(self) -> str:
+        """Return the name of the roughness if it was not given; empty if there is none."""
+        keys = set() if NARROWEST.keys() & self.given.keys() else self._keys()
+        return (
+            "alpha" if keys & {"alpha", "alpha_u"} else "roughness" if "roughness" in keys else ""
+        )
 
     def _keys(self) -> set[str]:
         return {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from comparisons.audit.subject import Setting, Subject, Tuned
+from comparisons.audit.subject import ALPHAS, Setting, Subject, Tuned, random_and_mirrored
 from comparisons.hard import furnace
 from heuristic import heuristics, terms
 from heuristic.errors import InputError, unknown
@@ -18,8 +18,7 @@ from heuristic.materials import PairedMaterial
 from heuristic.points import Given
 from reference.pairing import albedo, factors
 
-ALPHA, IOR = 0.3, 1.5
-"""Of the glossy material and the metal: the quadrature resolves their lobes at every angle."""
+IOR = 1.5
 
 UP = np.array([[0.0], [0.0], [1.0]])
 COLOURS = ("k_i", "k_a", "k_d", "k_s", "base_color")
@@ -35,22 +34,34 @@ EXTREMES = (
     ("a black surface", dict.fromkeys(COLOURS, 0)), ("metallic = 1", {"metallic": 1.0}),
 )  # fmt: skip
 
+GRAZING = "grazing, head on and from behind"
+
+LENGTHS = (0.0, 1e-30, 1e30)
+"""Of normals."""
+
 DISTANCES = (0.0, 1e-30, 1e-6, 1e6, 1e15, 1e30)
 
 
 def white(form: str) -> dict[str, dict[str, float]]:
-    """Return the white materials matte, glossy and metal, as pairing makes them.
+    """Return the white materials matte, glossy and metal, by name, as pairing makes them.
 
-    The glossy one is the counterpart of white rough plastic. The metal's lobe returns all light at
+    Glossy ones are the counterparts of white rough plastic. A metal's lobe returns all light at
     normal incidence.
     """
-    n = factors.exponent_of(ALPHA, form)
+    found = {"matte": {"k_a": 1.0, "k_d": 1.0, "base_color": 1.0}}
+    for alpha in ALPHAS:
+        for kind, material in _rough(form, alpha).items():
+            found[f"{kind}, alpha {alpha:g}"] = material
+    return found
+
+
+def _rough(form: str, alpha: float) -> dict[str, dict[str, float]]:
+    n = factors.exponent_of(alpha, form)
     lobe = float(terms.normalisation(form, n))
-    plastic = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), ALPHA, IOR))
+    plastic = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), alpha, IOR))
     diffuse, specular = float(plastic.diffuse[0]), float(plastic.specular[0])
-    rough = {"base_color": 1.0, "n": n, "alpha": ALPHA, "ior": IOR}
+    rough = {"base_color": 1.0, "n": n, "alpha": alpha, "ior": IOR}
     return {
-        "matte": {"k_a": 1.0, "k_d": 1.0, "base_color": 1.0},
         "glossy": {"k_a": diffuse, "k_d": diffuse, "k_s": specular * lobe, **rough},
         "metal": {"k_s": lobe, "metallic": 1.0, **rough},
     }
@@ -83,13 +94,15 @@ class Shaded(Subject):
         self.white = white(heuristic.form or "phong")
         prepared = {each.name: self.values[each.name] for each in known.values() if each.prepared}
         self.prepared = heuristic.prepared(_square(), prepared)
-        super().__init__(tuple(self.white), grid=(480, 360))
+        super().__init__({name: each.get("alpha") for name, each in self.white.items()})
+        if not heuristic.traced:
+            self.untuned = "Dr.Jit cannot differentiate it"
 
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         return self._array(self.white[material], DirectionalLight(mi.Vector3f(-light), 1.0), view)
 
     def settings(self) -> Iterator[Setting]:
-        light, view = furnace.random_pairs(256)
+        light, view = random_and_mirrored()
         for words, change in EXTREMES:
             yield self._setting(words, light, view, **(MIDDLE | change))
         for distance in DISTANCES:
@@ -98,20 +111,20 @@ class Shaded(Subject):
                 f"a light at a distance of {distance:g}",
                 partial(self._array, MIDDLE, near, view),
             )
-        edge = _edge()
-        views = np.concatenate([UP, edge], axis=1)
-        lights = np.concatenate([views, -views], axis=1)
-        light, view = np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
-        yield self._setting("grazing, head on and from behind", light, view)
+        edge, edges = grazing()
+        yield self._setting(GRAZING, edge, edges)
         nothing = np.zeros((3, 1))
-        yield self._setting("a normal of length 0", UP, UP, nothing)
+        for length in LENGTHS:
+            yield self._setting(f"a normal of length {length:g}", light, view, length * UP)
         yield self._setting("a viewer at the point itself", UP, nothing)
         dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
-        yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, views))
+        yield Setting("a light of intensity 0", partial(self._array, MIDDLE, dark, view))
         if self.heuristic.prepare is None:  # it may prepare one item per light
-            yield Setting("no light at all", partial(self._array, MIDDLE, None, views))
+            yield Setting("no light at all", partial(self._array, MIDDLE, None, view))
 
     def tuned(self) -> Iterator[Tuned]:
+        if not self.heuristic.traced:
+            return
         light, view = furnace.random_pairs(512)
         sun = DirectionalLight(mi.Vector3f(-light), 1.0)
 
@@ -194,14 +207,17 @@ def _within(parameter: heuristics.Parameter, value: float) -> float | None:
     return centre or None
 
 
-def _edge() -> np.ndarray:
+def grazing() -> tuple[np.ndarray, np.ndarray]:
+    """Return lights and viewers (3, N) at the horizon and the normal, and lights below them."""
     azimuth = np.deg2rad([0.0, 90.0, 180.0])
     rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
-    return np.concatenate(rows, axis=1)
+    views = np.concatenate([UP, *rows], axis=1)
+    lights = np.concatenate([views, -views], axis=1)
+    return np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
 
 
 def _square() -> Any:
-    """Return the scene that a heuristic may prepare: a white square under one light."""
+    """Return the scene that a heuristic may prepare: a white square under one light, at night."""
     return mi.load_dict(
         {
             "type": "scene",
@@ -212,6 +228,7 @@ def _square() -> Any:
             },
             "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
             "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
+            "night": {"type": "constant", "radiance": 0.0},
         },
         optimize=False,
     )  # fmt: skip

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.hard import furnace
+
+ALPHAS = (0.1, 0.3, 0.6, 1.0)
+"""Roughness of the materials; the quadrature resolves their lobes at every angle."""
+
 ROUNDING = 1e-5
 """A value below 0 by less than this, in units of display white, is a rounding error."""
 
@@ -17,6 +22,10 @@ class Fault:
 
     where: str
     value: float
+
+    def told(self) -> str:
+        """Describe it."""
+        return f"{self.value:.3g} ({self.where})"
 
 
 @dataclass(frozen=True)
@@ -64,20 +73,27 @@ class Subject(ABC):
     Attributes
     ----------
     materials
-        Names of the white materials that it is evaluated with, which absorb nothing.
+        The white materials that it is evaluated with, which absorb nothing: names, and the
+        roughness of those that have several.
+    untuned
+        Why no derivative can be checked, if so.
     grid
         Azimuths and heights of the quadrature over a hemisphere.
+    pairs
+        Random pairs of directions for the check of reciprocity.
     faults
         Values that light cannot have, found during any check.
     """
 
-    materials: tuple[str, ...]
-    grid: tuple[int, int]
+    materials: dict[str, float | None]
+    grid: tuple[int, int] = (240, 180)
+    pairs: int = 20_000
     faults: list[Fault] = field(default_factory=list, kw_only=True)
+    untuned: str = field(default="it depends on no number", kw_only=True)
 
     @abstractmethod
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """Return what :meth:`response` returns, before it is checked."""
+        """Return what ``response`` returns, before it is checked."""
 
     @abstractmethod
     def settings(self) -> Iterator[Setting]:
@@ -99,12 +115,20 @@ class Subject(ABC):
         self.noted(found, lambda place: f"{material}, {told(light[:, place], view[:, place])}")
         return np.where(np.isfinite(found) & (found > 0), found, 0.0)
 
-    def noted(self, values: np.ndarray, where: Callable[[int], str]) -> None:
-        """Note the first value (C, N) that is not finite, or negative."""
+    def noted(self, values: np.ndarray, where: Callable[[int], str]) -> int:
+        """Note the first value (C, N) that is not finite, or negative; return their number."""
         is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
         if is_wrong.any():
             channel, place = np.argwhere(is_wrong)[0]
             self.faults.append(Fault(where(place), float(values[channel, place])))
+        return int(is_wrong.sum())
+
+
+def random_and_mirrored() -> tuple[np.ndarray, np.ndarray]:
+    """Return random directions (3, 512) to lights and viewers; half face each other's mirror."""
+    light, view = furnace.random_pairs(256)
+    mirrored = light * [[-1], [-1], [1]]
+    return np.hstack([light, light]), np.hstack([view, mirrored])
 
 
 def told(light: np.ndarray, view: np.ndarray) -> str:

@@ -81,7 +81,7 @@ def climb(
     ready = guarded(source, replace(options, spp=None, allow_empty=False))
     reference, groups = converged(ready, effort, options.seed, progress, groups=effort.replicates)
     judge = Judge(reference, ready.counted, options.viewing, metric)
-    methods = Methods(source, options, ready, effort.depths)
+    methods = Methods(source, options, ready, effort.depths, effort.stand_ins)
     measured, images = _measured(methods, effort, judge, options.seed, progress)
     return Climbed(options, effort, ready, methods, reference, groups, judge, measured, images)
 

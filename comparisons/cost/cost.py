@@ -202,11 +202,12 @@ def quick(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
+    effort: Effort = QUICK,
 ) -> Study:
     """Study a scene as :func:`cost` does, but quickly: for many scenes in one report."""
     options = options or Options()
     small = replace(options, resolution=reduced(source, options, QUICK_WIDTH), spp=None)
-    return cost(source, small, QUICK, progress, command)
+    return cost(source, small, effort, progress, command)
 
 
 def _compared(measured: Sequence[Measured]) -> dict[str, Any]:

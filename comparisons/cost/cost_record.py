@@ -147,7 +147,7 @@ class Price(Record):
     alone, last
         The same if it is the first effect added, and the last.
     adds_s
-        Seconds that it adds to one rendering with :attr:`Prices.spp` samples per pixel.
+        Seconds that it adds to one rendering with Prices.spp samples per pixel.
     sampling_error
         Standard error of ``removes`` from drawing orders; 0 if all subsets were rendered.
     """

@@ -1,6 +1,6 @@
 """How much is rendered for a study of cost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count as count_from
 from itertools import takewhile
 
@@ -33,6 +33,8 @@ class Effort:
         Samples per pixel of the other rungs.
     depths
         Depths of ``path`` that are rungs.
+    stand_ins
+        Whether what engines use in place of transport is measured too.
     reference_spp
         Samples per pixel of each pass of the converged reference.
     replicates, replicate_spp
@@ -51,6 +53,7 @@ class Effort:
     largest: int = 64
     deterministic: tuple[int, ...] = DETERMINISTIC_SPP
     depths: tuple[int, ...] = DEPTHS
+    stand_ins: bool = True
     reference_spp: int = 64
     replicates: int = 8
     replicate_spp: int = 64
@@ -80,6 +83,9 @@ QUICK = Effort(
 )
 """For many scenes in one report, at :data:`QUICK_WIDTH`. There, tracing takes most of the time, so
 renderings are few, with many samples each."""
+
+COARSE = replace(QUICK, depths=(), orders=4, stand_ins=False)
+"""For a report within a minute: fewer methods, since each is traced anew."""
 
 QUICK_WIDTH = 48
 

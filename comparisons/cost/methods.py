@@ -31,6 +31,8 @@ class Methods:
         The scene, paired and planned.
     depths
         Depths of ``path`` that are rungs.
+    stand_ins
+        Whether heuristics in place of transport are rungs.
 
     Attributes
     ----------
@@ -46,8 +48,9 @@ class Methods:
         options: Options,
         ready: Prepared,
         depths: tuple[int, ...] = DEPTHS,
+        stand_ins: bool = True,
     ):
-        self.ready = ready
+        self.ready, self._stand_ins = ready, stand_ins
         self.viewing = options.viewing
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
 
@@ -122,4 +125,6 @@ class Methods:
                 name = getattr(rung.method, "heuristic", "")
                 refuse = named(name).refuse if name else None
                 refused[name] = refuse(self.ready.heuristic.scene) if refuse else ""
+                if name and not self._stand_ins:
+                    refused[name] = "A quick report does not measure it."
         return refused

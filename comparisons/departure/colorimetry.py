@@ -1,4 +1,4 @@
-"""Colour spaces and differences as Dr.Jit formulas in double precision.
+"""Colour spaces and differences as Dr.Jit formulas, in double precision unless given single.
 
 colour-science defines them; tests require agreement to 1e-4 of a colour difference. In NumPy they
 take as long as rendering; these are compiled, and run on all cores. Functions take and return any
@@ -13,13 +13,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import cos, exp, pi, radians, sin
+from typing import TypeVar
 
 import drjit as dr
 import numpy as np
-from drjit.llvm import Array3f64, Float64
+from drjit.llvm import Array3f, Array3f64, Float64
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Colour = TypeVar("Colour", Array3f, Array3f64)
 
 BT709 = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3127, 0.3290))
 """CIE x, y of red, green, blue and white."""
@@ -56,11 +58,11 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
     return colours * np.linalg.solve(colours, white)
 
 
-def xyz_to_lab(xyz: Array3f64, white: Sequence[float]) -> Array3f64:
+def xyz_to_lab(xyz: Colour, white: Sequence[float]) -> Colour:
     """Return CIE L*a*b* of XYZ relative to a white: ``L* = 116 f(Y/Y_n) − 16``."""
-    ratio = xyz / Array3f64(*map(float, white))
+    ratio = xyz / type(xyz)(*map(float, white))
     x, y, z = dr.select(ratio > _EPSILON, dr.cbrt(ratio), _SLOPE * ratio + 16 / 116)
-    return Array3f64(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+    return type(xyz)(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 
 
 def rgb_to_ictcp(rgb: Array3f64, peak: float) -> Array3f64:
@@ -170,10 +172,10 @@ def _cosine(degrees: Float64) -> Float64:
     return dr.cos(radians(1.0) * degrees)
 
 
-def times(matrix: Array, vector: Array3f64) -> Array3f64:
+def times(matrix: Array, vector: Colour) -> Colour:
     """Return matrix times vector; the matrix becomes part of the kernel."""
     x, y, z = vector
-    return Array3f64(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
+    return type(vector)(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
 
 
 def opaque(value: float) -> Float64:

@@ -107,8 +107,9 @@ def debiased(
     shown = test.reshape(-1, 3)[grouped.places].astype(np.float64)
     coordinates = metric.coordinates(shown, viewing)
 
-    def distances(difference: Array) -> Array:
-        return metric.difference(metric.coordinates(shown - difference, viewing), coordinates)
+    def distances(differences: Array) -> Array:
+        references = metric.coordinates(shown - differences, viewing)
+        return metric.difference(references, np.broadcast_to(coordinates, references.shape))
 
     whole = _Extrapolated.of(metric, distances, grouped, range(count))
     left_out = [
@@ -175,8 +176,8 @@ class _Extrapolated:
     ) -> _Extrapolated:
         means, sizes = grouped.means[chosen], grouped.sizes[chosen]
         mean = np.average(means, axis=0, weights=sizes)
-        plain = distances(mean)
-        noisy = [distances(mean + np.tensordot(w, means, 1)) for w in contrasts(sizes)]
+        added_noise = np.tensordot(contrasts(sizes), means, 1)
+        plain, *noisy = distances(np.concatenate([mean[None], mean + added_noise]))
         pixels = grouped.by_block(np.ones(len(plain)))
         before, after = grouped.by_block(plain), grouped.by_block(np.mean(noisy, axis=0))
         if metric.linear:

@@ -1,24 +1,32 @@
 """FLIP: the differences that a viewer sees when flipping between two images.
 
-It filters both images by the eye's contrast sensitivity before it compares colours, and compares
-edges and points separately. So it needs the number of pixels per degree of view. The authors' own
-code computes it (``flip-evaluator``): Andersson et al., *FLIP: A Difference Evaluator for
-Alternating Images*, HPG 2020; *Visualizing Errors in Rendered High Dynamic Range Images*,
-Eurographics 2021.
+Andersson et al., *FLIP: A Difference Evaluator for Alternating Images* (Proc. ACM Comput. Graph.
+Interact. Tech. 3(2), 2020) and *Visualizing Errors in Rendered High Dynamic Range Images*
+(Eurographics 2021, short papers). Tests compare it with the authors' program.
 
-The exposures of HDR-FLIP are chosen here, by the formulas of the second paper: their code ends the
-process if the reference is black, and takes 23 exposures if most of it is.
+Images are blurred as the eye blurs them at a distance, and compared in CIE L*a*b*. Where edges or
+points differ, the colour difference counts more. All filters are sums of separable ones, so each is
+two products with a band matrix; the formulas in between are compiled.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from math import ceil, pi, sqrt
 
+import drjit as dr
 import numpy as np
+from drjit.llvm import Array3f, Float32
+from numpy.typing import NDArray
 
+from comparisons.departure.blocks import bands
+from comparisons.departure.colorimetry import rgb_to_xyz, times, xyz_to_lab
 from comparisons.departure.spaces import Array, Viewing, luminance
+
+Plane = NDArray[np.float32]
+Curve = Callable[[Array3f], Array3f]
 
 SHOWN = 2.118872
 """Luminance that the tone curve of HDR-FLIP (ACES, by Narkowicz) shows as 0.85."""
@@ -30,28 +38,62 @@ DARKEST = 1e-9
 """Luminance, in units of display white, below which a pixel is black: exposing it overflows."""
 
 MOST_STOPS = 8.0
-"""Stops between the first and last exposure of HDR-FLIP; each exposure takes as long as FLIP."""
+"""Most stops between the first and last exposure of HDR-FLIP: each takes as long as FLIP, and the
+authors' program takes 23 if most of the reference is black."""
+
+# The white of the authors' matrices differs from BT.709's in the fifth digit.
+_PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.31271, 0.32902))
+
+# Section 4.1.1: contrast sensitivity of each opponent channel, as (height, width) of Gaussians.
+_SENSITIVITY = (((1.0, 0.0047),), ((1.0, 0.0053),), ((34.1, 0.04), (13.5, 0.025)))
+_FEATURE = 0.082
+"""Section 4.2: width of the detectors of edges and points, in degrees."""
+
+_POWER, _KNEE, _KNEE_SHOWN = 0.7, 0.4, 0.95
+_ACES = (0.9036, 0.018, 0.8748, 0.354, 0.14)
+"""ACES by Narkowicz at an exposure of 0.6: ``x (a x + b) / (x (c x + d) + e)``."""
+
+_TILE = 32
+"""Rows or columns filtered by one product."""
+
+_PRODUCT = 2**18
+"""Most multiplications in one product: beyond, OpenBLAS uses threads, which wait at full load."""
+
+_XYZ = rgb_to_xyz(_PRIMARIES)
+_RELATIVE = _XYZ / _XYZ.sum(axis=1, keepdims=True)
+# Y, X − Y and Y − Z, relative to white.
+_OPPONENT = np.array([[0.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]]) @ _RELATIVE
+_FROM_OPPONENT = np.linalg.inv(_OPPONENT)
 
 
-def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Array:
-    """Return LDR-FLIP (H, W) from 0 to 1 of linear images (H, W, 3) as a display shows them.
+def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
+    """Return LDR-FLIP (..., H, W) from 0 to 1 of linear images as a display shows them.
 
     Images are exposed, then clipped to [0, 1]. Equal images are 0 apart, black and white 0.967,
     green and blue 1. It is symmetric. Raises nothing for finite images.
+
+    Parameters
+    ----------
+    test
+        One image (H, W, 3), or several (..., H, W, 3).
+    reference
+        The reference (H, W, 3).
+    viewing
+        Its exposure and pixels per degree count.
     """
-    shown = [np.clip(viewing.exposure * image, 0.0, 1.0) for image in (reference, test)]
-    return _evaluated("LDR", shown, viewing)
+    return _flip(test, reference, viewing, [_clipped])
 
 
-def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Array:
-    """Return HDR-FLIP (H, W) from 0 to 1: the largest LDR-FLIP over the range of `exposures`.
+def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
+    """Return HDR-FLIP (..., H, W) from 0 to 1: the largest LDR-FLIP over the range of `exposures`.
 
-    Linear images (H, W, 3) are only clipped to [0, 65504]. It is not symmetric: the reference
-    determines the exposures. Raises nothing for finite images.
+    Linear images, as for `ldr_flip`, are only clipped to [0, 65504]. It is not symmetric: the
+    reference determines the exposures. Raises nothing for finite images.
     """
-    shown = [np.clip(viewing.exposure * image, 0.0, LARGEST) for image in (reference, test)]
-    start, stop = exposures(shown[0])
-    return _evaluated("HDR", shown, viewing, startExposure=start, stopExposure=stop)
+    start, stop = exposures(_exposed(reference, viewing))
+    factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
+    curves = [partial(_toned, factor=dr.opaque(Float32, each)) for each in factors.tolist()]
+    return _flip(test, reference, viewing, curves)
 
 
 def exposures(reference: Array) -> tuple[float, float]:
@@ -70,18 +112,185 @@ def exposures(reference: Array) -> tuple[float, float]:
     return start, min(stop, start + MOST_STOPS)
 
 
-def _evaluated(kind: str, shown: Iterable[Array], viewing: Viewing, **more: Any) -> Array:
-    # Threads that spin while waiting take most of a busy machine.
-    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    from flip_evaluator import evaluate
+def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curve]) -> Plane:
+    """Return the largest FLIP over tone curves, by bands of rows to keep temporaries small."""
+    eye = _Eye.at(float(viewing.pixels_per_degree))
+    tests = test.reshape(-1, *reference.shape)
+    found: Plane = np.zeros(tests.shape[:-1], np.float32)
+    height, width = reference.shape[:2]
+    columns = np.clip(np.arange(-eye.reach, width + eye.reach), 0, width - 1)
+    for rows in bands(height):
+        near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
+        around = np.ix_(near, columns)
+        truth, *shown = (_light(image[around], viewing) for image in (reference, *tests))
+        for curve in curves:
+            seen = eye.seen(curve(truth), len(near))
+            for own, light in zip(found, shown, strict=True):
+                error = _error(seen, eye.seen(curve(light), len(near)))
+                np.maximum(own[rows], error.reshape(-1, width), out=own[rows])
+    return found.reshape(test.shape[:-1])
 
-    images = (np.ascontiguousarray(image, np.float32) for image in shown)
-    found, *_ = evaluate(
-        *images,
-        kind,
-        inputsRGB=False,
-        applyMagma=False,
-        computeMeanError=False,
-        parameters={"ppd": float(viewing.pixels_per_degree), **more},
+
+def _exposed(image: Array, viewing: Viewing) -> Array:
+    exposed = np.multiply(image, viewing.exposure, dtype=float)
+    return np.clip(exposed, 0.0, LARGEST, out=exposed)
+
+
+def _light(image: Array, viewing: Viewing) -> Array3f:
+    shown = _exposed(image, viewing).astype(np.float32)
+    return dr.unravel(Array3f, Float32(shown.ravel()))
+
+
+def _clipped(light: Array3f) -> Array3f:
+    return dr.minimum(light, 1.0)
+
+
+def _toned(light: Array3f, factor: Float32) -> Array3f:
+    """Return what the tone curve makes of light after an exposure."""
+    x = light * factor
+    a, b, c, d, e = _ACES
+    return dr.minimum(x * (a * x + b) / (x * (c * x + d) + e), 1.0)
+
+
+@dataclass(frozen=True)
+class _Eye:
+    """The filters at a number of pixels per degree, as band matrices (n, n + 2 reach).
+
+    ``blurs`` are of the opponent channels: each has Gaussians, with their shares. ``smooth``,
+    ``edge`` and ``point`` are a Gaussian and its derivatives, for the achromatic channel.
+    """
+
+    reach: int
+    blurs: tuple[tuple[tuple[float, Plane], ...], ...]
+    smooth: Plane
+    edge: Plane
+    point: Plane
+
+    @classmethod
+    @lru_cache(maxsize=2)
+    def at(cls, pixels: float) -> _Eye:
+        widest = max(width for parts in _SENSITIVITY for _, width in parts)
+        reach = ceil(3.0 * sqrt(widest / 2.0) / pi * pixels)
+        spread = 0.5 * _FEATURE * pixels
+        x = np.arange(-reach, reach + 1.0)
+        smooth = np.where(np.abs(x) <= ceil(3.0 * spread), np.exp(-((x / spread) ** 2) / 2.0), 0.0)
+        derivatives = x * smooth, ((x / spread) ** 2 - 1.0) * smooth
+        blurs = tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY)
+        return cls(reach, blurs, *map(_band, (smooth / smooth.sum(), *map(_balanced, derivatives))))
+
+    def seen(self, rgb: Array3f, height: int) -> tuple[Array3f, Float32, Float32]:
+        """Return the blurred colours, the slope and the curvature of lightness, without margins.
+
+        The displayed colours ``rgb`` are of ``height`` rows, 2 reach of them margins.
+        """
+        channels = times(_OPPONENT, rgb)
+        dr.eval(channels)
+        planes = [channel.numpy().reshape(height, -1) for channel in channels]
+        blurred = [
+            np.sum([share * _across(_down(plane, band), band) for share, band in parts], axis=0)
+            for plane, parts in zip(planes, self.blurs, strict=True)
+        ]
+        light, smooth = planes[0], _down(planes[0], self.smooth)
+        slope, curvature = (
+            dr.hypot(
+                _values(_across(smooth, band)), _values(_across(_down(light, band), self.smooth))
+            )
+            for band in (self.edge, self.point)
+        )
+        found = _hunted(Array3f(*map(_values, blurred))), slope, curvature
+        dr.eval(found)
+        return found
+
+
+def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> tuple:
+    """Return the shares and the bands of a channel's Gaussians, sampled at some degrees."""
+    curves = [np.exp(-(pi**2) * degrees**2 / width) for _, width in parts]
+    shares = [
+        weight * sqrt(pi / width) * curve.sum() ** 2
+        for (weight, width), curve in zip(parts, curves, strict=True)
+    ]
+    return tuple(
+        (np.float32(share / sum(shares)), _band(curve / curve.sum()))
+        for share, curve in zip(shares, curves, strict=True)
     )
-    return found[..., 0].astype(np.float64)
+
+
+def _balanced(weights: Array) -> Array:
+    """Scale weights so that the positive ones add up to 1, and the negative ones to -1."""
+    sides = [np.maximum(sign * weights, 0.0) for sign in (1.0, -1.0)]
+    return sides[0] / sides[0].sum() - sides[1] / sides[1].sum()
+
+
+def _band(weights: Array) -> Plane:
+    """Return the matrix (_TILE, _TILE + 2 reach) that filters columns."""
+    strip = np.pad(weights, _TILE - 1).astype(np.float32)
+    windows = np.lib.stride_tricks.sliding_window_view(strip, _TILE + len(weights) - 1)
+    return np.ascontiguousarray(windows[::-1])
+
+
+def _down(image: Plane, band: Plane) -> Plane:
+    """Filter the columns of an image (h + 2 reach, w)."""
+    margin = band.shape[1] - band.shape[0]
+    found = np.empty((len(image) - margin, image.shape[1]), np.float32)
+    step = max(1, _PRODUCT // band.size)
+    for top in range(0, len(found), _TILE):
+        for left in range(0, image.shape[1], step):
+            part = found[top : top + _TILE, left : left + step]
+            size = len(part)
+            around = image[top : top + size + margin, left : left + step]
+            np.matmul(band[:size, : size + margin], around, out=part)
+    return found
+
+
+def _across(image: Plane, band: Plane) -> Plane:
+    """Filter the rows of an image (h, w + 2 reach)."""
+    margin = band.shape[1] - band.shape[0]
+    found = np.empty((len(image), image.shape[1] - margin), np.float32)
+    step = max(1, _PRODUCT // band.size)
+    for left in range(0, found.shape[1], _TILE):
+        for top in range(0, len(found), step):
+            part = found[top : top + step, left : left + _TILE]
+            size = part.shape[1]
+            around = image[top : top + step, left : left + size + margin]
+            np.matmul(around, band[:size, : size + margin].T, out=part)
+    return found
+
+
+def _values(plane: Plane) -> Float32:
+    return Float32(plane.ravel())
+
+
+def _error(truth: tuple, shown: tuple) -> NDArray[np.float32]:
+    """Return FLIP (N,) of what is seen of two images."""
+    (first, *edges), (second, *others) = truth, shown
+    slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))
+    feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slopes, curvatures))
+    colour = _redistributed(_apart(first, second))
+    # Equal colours are 0 apart, whatever the power.
+    return dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0).numpy()
+
+
+def _hunted(opponent: Array3f) -> Array3f:
+    """Return CIE L*a*b* of blurred opponent colours, chroma scaled by lightness (Hunt)."""
+    rgb = dr.clip(times(_FROM_OPPONENT, opponent), 0.0, 1.0)
+    lightness, a, b = xyz_to_lab(times(_XYZ, rgb), _XYZ.sum(axis=1))
+    return Array3f(lightness, 0.01 * lightness * a, 0.01 * lightness * b)
+
+
+def _apart(first: Array3f, second: Array3f) -> Float32:
+    """Return the compressed HyAB distance."""
+    delta = first - second
+    return dr.power(dr.abs(delta.x) + dr.hypot(delta.y, delta.z), _POWER)
+
+
+@lru_cache(maxsize=1)
+def _largest() -> float:
+    """Return the distance of green and blue."""
+    green, blue = (Array3f(*column.tolist()) for column in _OPPONENT.T[1:])
+    return float(_apart(_hunted(green), _hunted(blue))[0])
+
+
+def _redistributed(distance: Float32) -> Float32:
+    knee = _KNEE * _largest()
+    above = _KNEE_SHOWN + (distance - knee) * ((1.0 - _KNEE_SHOWN) / (_largest() - knee))
+    return dr.select(distance < knee, distance * (_KNEE_SHOWN / knee), above)

@@ -155,7 +155,8 @@ def terminator(surfaces: Surfaces) -> np.ndarray:
     """Return where shading and geometric normals disagree about a light or the viewer."""
     mask = surfaces.hit & (surfaces.shading != surfaces.geometric).any(axis=-1)
     position, shading, geometric, view = (
-        getattr(surfaces, name)[mask] for name in ("position", "shading", "geometric", "view")
+        getattr(surfaces, name)[mask].astype(float)
+        for name in ("position", "shading", "geometric", "view")
     )
 
     def disagree(direction: np.ndarray) -> np.ndarray:
@@ -217,7 +218,7 @@ def of_scene(
     hit = si.is_valid()
 
     def grid(vector: Any) -> np.ndarray:
-        return np.array(dr.select(hit, mi.Vector3f(vector), 0), float).T.reshape(height, width, 3)
+        return np.array(dr.select(hit, mi.Vector3f(vector), 0)).T.reshape(height, width, 3)
 
     index = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
     alpha, albedo = np.full((height, width), np.inf), np.ones((height, width))

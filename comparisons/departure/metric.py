@@ -26,14 +26,21 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
+from comparisons.departure.spaces import (
+    DEFAULT_VIEWING,
+    Array,
+    Distance,
+    Space,
+    Viewing,
+    between,
+)
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from reference.rendering.renderer import require_finite
@@ -46,7 +53,7 @@ RESERVED = frozenset(
 )  # fmt: skip
 """Names of layers and columns other than metrics."""
 
-Distances = Callable[..., Array]
+Distances = Callable[[Array], NDArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +82,8 @@ class Metric:
     linear
         Whether it is a difference of linear values: its mean is then a root mean square, and its
         best exposure minimises squares.
+    stacks
+        Whether `function` also takes several test images (n, H, W, 3), and returns (n, H, W).
     """
 
     name: str
@@ -83,12 +92,13 @@ class Metric:
     definition: str
     caution: str
     map_range: tuple[float, float]
-    function: Callable[[Array, Array, Viewing], Array] | None = None
+    function: Callable[[Array, Array, Viewing], NDArray] | None = None
     visible: tuple[float, ...] = ()
     rounding: float = 1e-3
     heading: str = ""
     drawn: bool = True
     linear: bool = False
+    stacks: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier() or self.name in RESERVED:
@@ -106,16 +116,13 @@ class Metric:
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-    ) -> Array:
+    ) -> NDArray:
         """Return the map (H, W) of distances between two linear images (H, W, 3)."""
         test, reference = checked_pair(test, reference)
         return self.against(reference, ..., viewing)(test)
 
     def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
-        """Return a function that maps test images to distances from the reference at some pixels.
-
-        The function is ``(test, within=None, factor=1.0)``: distances of ``factor · test`` at
-        `where`, or at those of its pixels in the mask `within` (`where` must then be a mask).
+        """Return a function that maps images (H, W, 3) to distances from the reference, (N,).
 
         Parameters
         ----------
@@ -130,12 +137,19 @@ class Metric:
             )
         function = self.function
 
-        def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
+        def distances(test: Array) -> NDArray:
             shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
-            values = function(factor * shown, truth, viewing)
-            return values[where if within is None else within]
+            return function(shown, truth, viewing)[where]
 
         return distances
+
+    def each(
+        self, tests: Sequence[Array], reference: Array, where: Any, viewing: Viewing
+    ) -> list[NDArray]:
+        """Return the distances of several images, as from `against`."""
+        if self.stacks and self.function is not None:
+            return [found[where] for found in self.function(np.stack(tests), reference, viewing)]
+        return list(map(self.against(reference, where, viewing), tests))
 
     def mean(self, values: NDArray) -> float:
         """Return the metric's mean of distances; 0 if there are none."""
@@ -164,12 +178,13 @@ class Pixelwise(Metric):
 
     def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
         """Return a function like `Metric.against`; images may be lists of pixels (N, 3)."""
+        if isinstance(self.coordinates, Space) and isinstance(self.difference, Distance):
+            return between(self.coordinates, self.difference, reference[where], where, viewing)
         fixed = self.coordinates(reference[where], viewing)
 
-        def distances(test: Array, within: Array | None = None, factor: float = 1.0) -> Array:
-            pixels = np.asarray(test[where if within is None else within], np.float64)
-            shown = self.coordinates(factor * pixels, viewing)
-            return self.difference(fixed if within is None else fixed[within[where]], shown)
+        def distances(test: Array) -> Array:
+            pixels = np.asarray(test[where], np.float64)
+            return self.difference(fixed, self.coordinates(pixels, viewing))
 
         return distances
 

@@ -9,8 +9,8 @@ ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three, flip-evaluator computes the last two. The signed ratio of
-luminances in stops comes with them, but is not a distance. Statistics over an image are in
+colour-science defines the first three, flip-evaluator the last two. The signed ratio of luminances
+in stops comes with them, but is not a distance. Statistics over an image are in
 `comparisons.departure.statistics`.
 """
 
@@ -39,21 +39,15 @@ from comparisons.departure.spaces import (
     euclidean,
     itp,
     lab,
+    linear,
     luminance,
+    root_mean_square,
 )
 
 __all__ = ["METRICS", "declare", "drawn"]
 
 LOG2_EPSILON = 1e-4
 """Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""
-
-
-def _linear(rgb: ArrayLike, viewing: Viewing) -> Array:
-    return np.asarray(rgb, np.float64)
-
-
-def _root_mean_square(a: Array, b: Array) -> Array:
-    return np.sqrt(np.mean((b - a) ** 2, axis=-1))
 
 
 LEADING = METRICS.own(
@@ -114,8 +108,8 @@ RMSE = METRICS.own(
         heading="RMSE, linear",
         drawn=False,
         linear=True,
-        coordinates=_linear,
-        difference=_root_mean_square,
+        coordinates=linear,
+        difference=root_mean_square,
     )
 )
 
@@ -131,6 +125,7 @@ METRICS.own(
         map_range=(0.0, 1.0),
         rounding=1e-4,
         function=ldr_flip,
+        stacks=True,
     )
 )
 METRICS.own(
@@ -145,6 +140,7 @@ METRICS.own(
         rounding=1e-4,
         drawn=False,
         function=hdr_flip,
+        stacks=True,
     )
 )
 

@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.effects.nearness import Nearest
 from comparisons.records import Amount, Count, Record, Share, Size
 
 CELLS = 48
@@ -38,6 +39,9 @@ class Region(Record):
     mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
     effect: Annotated[
         str | None, Meta(description="The dominant effect there, in words, if known.")
+    ] = None
+    nearest: Annotated[
+        Nearest | None, Meta(description="The rendering that a picture is nearest to there.")
     ] = None
 
 

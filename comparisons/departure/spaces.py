@@ -8,11 +8,14 @@ computes them on all cores (`comparisons.departure.colorimetry`).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import inf
 from typing import Annotated, Any, Literal
 
 import drjit as dr
 import numpy as np
-from drjit.llvm import Array3f64, Float64
+from drjit.llvm import Array3f, Array3f64, Float32, Float64
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
@@ -31,6 +34,7 @@ from comparisons.records import Positive, Record, plain
 from heuristic.errors import InputError
 
 Array = NDArray[np.float64]
+Formula = Callable[[Array3f64], Array3f64]
 
 PQ_PEAK = 10_000.0
 """ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m²."""
@@ -91,6 +95,50 @@ def luminance(rgb: ArrayLike) -> Array:
     return np.asarray(rgb, np.float64) @ rgb_to_xyz(BT709)[1]
 
 
+@dataclass(frozen=True)
+class Space:
+    """A colour space as a compiled formula.
+
+    ``formula(viewing)`` returns a function of Dr.Jit colours. A call converts linear RGB (..., 3).
+    """
+
+    formula: Callable[[Viewing], Formula]
+
+    def __call__(self, rgb: ArrayLike, viewing: Viewing) -> Array:
+        return _by_blocks(self.formula(viewing), rgb, out=np.shape(rgb))
+
+
+@dataclass(frozen=True)
+class Distance:
+    """A distance of two Dr.Jit colours as a compiled formula. A call takes arrays (..., 3)."""
+
+    formula: Callable[[Array3f64, Array3f64], Float64]
+
+    def __call__(self, a: ArrayLike, b: ArrayLike) -> Array:
+        return _by_blocks(self.formula, a, b, out=np.shape(a)[:-1])
+
+
+def between(
+    space: Space, distance: Distance, reference: Array, where: Any, viewing: Viewing
+) -> Callable[[Array], Array]:
+    """Return a function from images to their distances (...) from a reference (..., 3).
+
+    Their pixels are those at the index `where`. Conversion and distance are one kernel.
+    """
+    convert = space.formula(viewing)
+    fixed = convert(_colours(reference)) if reference.size else None
+    dr.eval(fixed)
+
+    def distances(test: Array) -> Array:
+        pixels = test[where]
+        if fixed is None:
+            return np.zeros(pixels.shape[:-1])
+        found = distance.formula(fixed, convert(_colours(pixels)))
+        return found.numpy().reshape(pixels.shape[:-1])
+
+    return distances
+
+
 def _by_blocks(function: Callable[..., Any], *arrays: ArrayLike, out: tuple[int, ...]) -> Array:
     """Apply a function of Dr.Jit colours to (..., 3) arrays in blocks; `out` is its shape."""
     flat = [np.asarray(array).reshape(-1, 3) for array in arrays]
@@ -103,55 +151,69 @@ def _by_blocks(function: Callable[..., Any], *arrays: ArrayLike, out: tuple[int,
 
 
 def _colours(pixels: Array) -> Array3f64:
+    """Return pixels (..., 3) as Dr.Jit colours; single precision is widened within kernels."""
+    if pixels.dtype == np.float32:
+        return Array3f64(dr.unravel(Array3f, Float32(np.ascontiguousarray(pixels).ravel())))
     return dr.unravel(Array3f64, Float64(np.ascontiguousarray(pixels, np.float64).ravel()))
 
 
-def _displayed(viewing: Viewing, white: float = 1.0) -> Callable[[Array3f64], Array3f64]:
+def _displayed(viewing: Viewing, white: float = 1.0) -> Formula:
     """Return a function from linear RGB to the XYZ that a display shows; Y of white is 1."""
     exposure, largest = opaque(viewing.exposure), opaque(white)
     matrix = rgb_to_xyz(BT709)
     return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
 
 
-def lab(rgb: ArrayLike, viewing: Viewing) -> Array:
-    """Return CIE L*a*b* (D65, 2°) of linear RGB (..., 3) as displayed; L* is 0 to 100."""
+def _lab(viewing: Viewing) -> Formula:
     shown, white = _displayed(viewing), rgb_to_xyz(BT709).sum(axis=1)
-    return _by_blocks(lambda block: xyz_to_lab(shown(block), white), rgb, out=np.shape(rgb))
+    return lambda rgb: xyz_to_lab(shown(rgb), white)
 
 
-def cam16ucs(rgb: ArrayLike, viewing: Viewing, white: float = 1.0) -> Array:
-    """Return CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed; J' is 0 to 100.
-
-    `white` is the largest value that the display shows, in units of the white that CAM16 adapts to;
-    above 1, J' exceeds 100.
-    """
+def _cam16ucs(viewing: Viewing, white: float = 1.0) -> Formula:
     shown = _displayed(viewing, white)
     adapted = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
     convert = xyz_to_cam16ucs(
         adapted, 0.2 * viewing.ambient_illuminance / np.pi, viewing.background
     )
-    return _by_blocks(lambda block: convert(100.0 * shown(block)), rgb, out=np.shape(rgb))
+    return lambda rgb: convert(100.0 * shown(rgb))
 
 
-def itp(rgb: ArrayLike, viewing: Viewing) -> Array:
-    """Return 720 · (I, T, P) of linear RGB (..., 3), whose Euclidean distance is ΔE_ITP."""
+def _itp(viewing: Viewing) -> Formula:
     matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
     level = opaque(viewing.exposure * viewing.white_luminance)
     scale = Array3f64(720.0, 360.0, 720.0)
 
-    def convert(block: Array3f64) -> Array3f64:
-        absolute = dr.clip(times(matrix, block) * level, 0.0, PQ_PEAK)
+    def convert(rgb: Array3f64) -> Array3f64:
+        absolute = dr.clip(times(matrix, rgb) * level, 0.0, PQ_PEAK)
         return scale * rgb_to_ictcp(absolute, PQ_PEAK)
 
-    return _by_blocks(convert, rgb, out=np.shape(rgb))
+    return convert
 
 
-def ciede2000(lab_a: Array, lab_b: Array) -> Array:
-    """Return ΔE00 between CIE L*a*b* colours (..., 3), with k_L = k_C = k_H = 1."""
-    return _by_blocks(delta_e_00, lab_a, lab_b, out=np.shape(lab_a)[:-1])
+def _squared(a: Array3f64, b: Array3f64) -> Float64:
+    return dr.squared_norm(a - b)
 
 
-def euclidean(a: Array, b: Array) -> Array:
-    """Return the distance between points (..., 3)."""
-    delta = a - b
-    return np.sqrt(np.einsum("...i,...i->...", delta, delta))
+lab = Space(_lab)
+"""CIE L*a*b* (D65, 2°) of linear RGB as displayed; L* is 0 to 100."""
+
+cam16ucs = Space(_cam16ucs)
+"""CAM16-UCS J'a'b' of linear RGB as displayed; J' is 0 to 100."""
+
+cam16ucs_unclipped = Space(partial(_cam16ucs, white=inf))
+"""CAM16-UCS of a display without a largest value; above white, J' exceeds 100."""
+
+itp = Space(_itp)
+"""720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
+
+linear = Space(lambda viewing: lambda rgb: rgb)
+"""Linear RGB itself."""
+
+ciede2000 = Distance(delta_e_00)
+"""ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
+
+euclidean = Distance(lambda a, b: dr.sqrt(_squared(a, b)))
+"""The distance between points."""
+
+root_mean_square = Distance(lambda a, b: dr.sqrt(_squared(a, b) / 3.0))
+"""The root mean square difference of three values."""

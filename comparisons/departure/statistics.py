@@ -19,7 +19,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import debiasing
-from comparisons.departure.metric import Distances, Metric, Pixelwise, checked_pair
+from comparisons.departure.metric import Metric, Pixelwise, checked_pair
 from comparisons.departure.metrics import log2_luminance_ratio
 from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
 from comparisons.records import Amount, Count, Positive, Record, Share
@@ -106,29 +106,15 @@ def summarise(
     mask = np.asarray(mask, bool)
     factor = best_exposure(metric, test, reference, mask, viewing)
     grain = np.asarray(noise) if noise is not None and np.any(noise) else None
-    # Single precision keeps seven digits of a distance, in half the memory.
-    distance: NDArray[np.float32] = np.zeros(test.shape[:-1], np.float32)
-    exposed, noisy = [], []
-    pixelwise = isinstance(metric, Pixelwise)
-    for rows in _blocks(metric, test):
-        shown, truth, here = test[rows], reference[rows], mask[rows]
-        # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
-        measured = here | (not pixelwise or (shown != truth).any(axis=-1))
-        distances = metric.against(truth, measured, viewing)
-        distance[rows][measured] = distances(shown)
-        if factor != 1.0:
-            exposed.append(distances(shown, here, factor).astype(np.float32))
-        if grain is not None:
-            noisy.append(distances(_noisy(truth, grain[rows]), here).astype(np.float32))
-    values = distance[mask]
+    maps = _maps(metric, test, reference, mask, viewing, factor, grain)
+    values, exposed, noise_alone = (found[mask] for found in maps)
     numbers = after = _numbers(metric, values)
     if factor != 1.0:
-        after = _numbers(metric, np.concatenate(exposed))
+        after = _numbers(metric, exposed)
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
     shares = (share(values > limit) for limit in metric.visible)
     visible = dict(zip(metric.thresholds, shares, strict=True))
-    noise_alone = np.concatenate(noisy) if noisy else np.zeros(0)
     clean = None
     if not noise_alone.any():
         clean = debiasing.exactly(numbers["mean"], visible)
@@ -145,7 +131,38 @@ def summarise(
         noise_floor=metric.mean(noise_alone),
         after_exposure=Exposed(exposure=factor, **after),
     )
-    return summary, distance
+    return summary, maps[0]
+
+
+def _maps(
+    metric: Metric,
+    test: Array,
+    reference: Array,
+    mask: NDArray[np.bool_],
+    viewing: Viewing,
+    factor: float,
+    grain: Array | None,
+) -> NDArray[np.float32]:
+    """Return maps (3, H, W) of the test image, after exposure, and of noise alone.
+
+    The last two are of the mask only, and 0 without a factor or without noise.
+    """
+    # Single precision keeps seven digits of a distance, in half the memory.
+    maps: NDArray[np.float32] = np.zeros((3, *mask.shape), np.float32)
+    is_pixelwise = isinstance(metric, Pixelwise)
+    wide = np.float64 if is_pixelwise else test.dtype
+    for rows in _blocks(metric, test):
+        images = {0: test[rows]}
+        if factor != 1.0:
+            images[1] = np.multiply(test[rows], factor, dtype=wide)
+        if grain is not None:
+            images[2] = np.add(reference[rows], grain[rows], dtype=wide)
+        # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
+        measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
+        found = metric.each(list(images.values()), reference[rows], measured, viewing)
+        for place, values in zip(images, found, strict=True):
+            maps[place][rows][measured] = values
+    return maps
 
 
 def summarise_log2_luminance(
@@ -181,14 +198,12 @@ def noise_floor(
     if not mask.any() or not noise.any():
         return 0.0
     values = [
-        metric.against(reference[rows], mask[rows], viewing)(_noisy(reference[rows], noise[rows]))
+        metric.against(reference[rows], mask[rows], viewing)(
+            np.add(reference[rows], noise[rows], dtype=np.float64)
+        )
         for rows in _blocks(metric, reference)
     ]
     return metric.mean(np.concatenate(values))
-
-
-def _noisy(image: Array, noise: Array) -> Array:
-    return np.add(image, noise, dtype=np.float64)
 
 
 def _numbers(metric: Metric, values: NDArray) -> dict[str, float]:
@@ -250,18 +265,21 @@ def best_exposure(
     count = min(len(places), _SEARCH_PIXELS)
     chosen = np.random.default_rng(0).choice(len(places), count, replace=False)
     drawn = np.unravel_index(places[chosen], mask.shape)
-    some = tuple(index[:_BRACKET_PIXELS] for index in drawn)
-    distances, bracketing = (metric.against(reference, at, viewing) for at in (drawn, some))
+    shown, truth = (image[drawn].astype(np.float64) for image in (test, reference))
+    distances = metric.against(truth, ..., viewing)
 
-    def mean_at(stops: float, distances: Distances = distances) -> float:
-        return metric.mean(distances(test, factor=2.0**stops))
+    def mean_at(stops: float) -> float:
+        return metric.mean(distances(2.0**stops * shown))
 
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
-    start = whole_stops[np.argmin([mean_at(s, bracketing) for s in whole_stops])]
+    bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
+    some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
+    found = metric.against(some, ..., viewing)(bracketing)
+    start = whole_stops[np.argmin([metric.mean(each) for each in found])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
-    found = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-    least_squares = np.log2(least_squares_factor(test[drawn], reference[drawn]))
-    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), found.x]
+    finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    least_squares = np.log2(least_squares_factor(shown, truth))
+    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), finest.x]
     return float(2.0 ** min(candidates, key=mean_at))
 
 

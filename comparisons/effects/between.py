@@ -33,6 +33,9 @@ GLOWING = tuple(effect for effect in EFFECTS if effect.glow)
 class Between:
     """The scenes between the halves of a pair, in the current variant.
 
+    Only the last scene is kept, for subsets that differ only in what the integrator does: Dr.Jit
+    traces every BSDF that is alive, in any scene.
+
     Parameters
     ----------
     pair
@@ -41,9 +44,6 @@ class Between:
         The reference's plan.
     scene
         The physical half, with the plan's sampler.
-
-    Only the last scene is kept, for subsets that differ only in what the integrator does: Dr.Jit
-    traces every BSDF that is alive, in any scene.
     """
 
     pair: Pair

@@ -136,7 +136,7 @@ class Lattice:
         return self._known[key]
 
     def simulating(self, effects: Set[Effect]) -> Replicates:
-        """Return the image in which some of :attr:`effects` are simulated.
+        """Return the image in which some of ``effects`` are simulated.
 
         None is the kernel as requested, all are the reference. Only the kernel has flat and Gouraud
         shading; where they remain, an image gets the difference that they make there.

@@ -16,7 +16,7 @@ Euclidean too, but dominated by the darkest pixels, where the models differ for 
 - Unlike the metric, it is not clipped at display white: a clipped highlight would not show how high
   and narrow it is, and its lobe would be used to fit something else.
 - The distance is averaged, not its square, as in the reports: otherwise a shadow, which no
-  parameter makes, would pull all of them towards itself. Below :attr:`Loss.rounding` the distance
+  parameter makes, would pull all of them towards itself. Below ``Loss.rounding`` the distance
   turns into its square, ``sqrt(d^2 + c^2) - c``, to have derivatives everywhere. That is a tenth of
   a just noticeable difference: the loss is the mean distance to less than 0.1, and so is its
   minimum.
@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.departure.metrics import LOG2_EPSILON
-from comparisons.departure.spaces import Viewing, cam16ucs, luminance
+from comparisons.departure.spaces import Viewing, cam16ucs_unclipped, luminance
 
 STEP = 1e-4
 """Relative step of the finite differences of colour spaces; their own error is its square."""
@@ -89,7 +89,7 @@ def _log_derivative(rgb, viewing):
 
 
 def _perceptual(rgb, viewing):
-    return cam16ucs(rgb, viewing, white=inf)
+    return cam16ucs_unclipped(rgb, viewing)
 
 
 def _perceptual_derivative(rgb, viewing):

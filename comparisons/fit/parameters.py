@@ -1,16 +1,15 @@
 """Which parameters are fitted, within which bounds, and how a vector of numbers stands for them.
 
-=============  ==================================  ===========================  ====================
-Parameter      Number in the vector                Bounds                       A natural change
-=============  ==================================  ===========================  ====================
-``k_a, k_d``   itself                              0 to 1                       1
-``k_s``        the lobe's albedo at normal         0 to 1                       1
-               incidence, ``k_s`` over
+=============  ======================================  ==================  ================
+Parameter      Number in the vector                    Bounds              A natural change
+=============  ======================================  ==================  ================
+``k_a, k_d``   itself                                  0 to 1              1
+``k_s``        the lobe's albedo at normal incidence,  0 to 1              1
+               ``k_s`` over
                :func:`heuristic.terms.normalisation`
-``n``          ``ln n``                            :data:`EXPONENTS`            a factor e
-an intensity   ``ln`` of a factor on the paired    :data:`FACTORS`              a factor e
-               one
-=============  ==================================  ===========================  ====================
+``n``          ``ln n``                                :data:`EXPONENTS`   a factor e
+an intensity   ``ln`` of a factor on the paired one    :data:`FACTORS`     a factor e
+=============  ======================================  ==================  ================
 
 An image shows the lobe's albedo for any ``n``, so the two are nearly independent in the search. It
 also makes a form and its normalised variant one and the same fit: they are the same set of images,

@@ -15,11 +15,11 @@ samples. Both are measured with the installed Mitsuba.
 
 from functools import cache
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from comparisons.hard.cases import HardCase
+from reference.rendering.renderer import Renderer
 from reference.scene.sampler import SAMPLER, register
 
 REFLECTANCE = 0.9
@@ -55,10 +55,8 @@ def mean(sampler: str, count: int) -> float:
     """Return the mean radiance that a sampler gives, with ``count`` samples per pixel and pass."""
     register()
     scene = mi.load_dict(sphere(REFLECTANCE, WIDTH, {"type": sampler, "sample_count": count}))
-    images = [
-        mi.render(scene, spp=count, seed=dr.opaque(mi.UInt32, 7919 * number))
-        for number in range(SAMPLES // count)
-    ]
+    renderer = Renderer(scene, None, count, "image of the sphere")
+    images = (renderer.render(7919 * number) for number in range(SAMPLES // count))
     return float(np.mean([np.array(image).mean() for image in images]))
 
 

@@ -27,7 +27,7 @@ class Pictured:
     ----------
     images
         Linear, (H, W, 3) each.
-    half : reference.rendering.renderer.Renderer
+    half
         The heuristic half that they replace.
     """
 

@@ -29,6 +29,8 @@ BETTER = 0.5
 
 def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
     """Return the means of a picture's channels over those of the reference, both (N, 3)."""
+    if picture.max() <= 1:  # clipped at display white, as a PNG is: a lamp would decide
+        reference = np.minimum(reference, 1)
     least = 1e-6
     found = (picture.mean(axis=0) + least) / (reference.mean(axis=0) + least)
     red, green, blue = map(float, found)

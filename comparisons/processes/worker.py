@@ -4,6 +4,7 @@ Each leads its own process group, which ends as a whole: with the process, when 
 when the parent ends in any way.
 """
 
+import gc
 import logging
 import os
 import shutil
@@ -206,6 +207,9 @@ def _work(pipe: Any) -> NoReturn:
     while True:
         number, *call = _asked(pipe)
         _tell(pipe, number, *_answer(pipe, number, waiting, *call))
+        del call
+        gc.collect()
+        gc.freeze()  # what outlives a task stays: later collections need not look at it
 
 
 def _asked(pipe: Any) -> Any:

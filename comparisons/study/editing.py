@@ -160,7 +160,7 @@ def set_values(graph: Graph, values: dict[str, float]) -> None:
 
     Parameters
     ----------
-    graph : reference.scene.graph.Graph
+    graph
         The scene.
     values
         Numbers by path, ``<id of the element>.<parameter>``, such as ``"red.reflectance"``. The

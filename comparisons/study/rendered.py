@@ -33,7 +33,9 @@ estimate the noise."""
 
 
 def row(part: Part, point: Point, identity: str) -> Row:
-    """Render a point and return its columns; for the identity see :class:`point.Block`.
+    """Render a point and return its columns.
+
+    For the identity see :class:`comparisons.study.point.Block`.
 
     The columns :data:`comparisons.study.columns.STEPS` are the root mean square changes of the
     image as each step is added; ``dominant`` names the largest.

@@ -73,16 +73,16 @@ def run(
 
     Parameters
     ----------
-    study : comparisons.study.design.Study
+    study
         The study.
     folder
         Keeps finished blocks, in ``points/``.
-    spread : callable, optional
+    spread
         Takes a list of blocks and yields ``(block, rows)`` as they finish, in any order
         (:func:`processes`, :func:`workers_of`). If omitted, this process does all.
-    progress : callable, optional
+    progress
         Called as ``progress(stage, done, total)`` with numbers of points.
-    blocks : optional
+    blocks
         The result of :func:`all_blocks`, if called elsewhere: it reads scenes and runs scripts.
 
     Returns

@@ -20,8 +20,9 @@ def shade(point):
         half = light.toward + view
         half *= dr.rsqrt(dr.maximum(dr.squared_norm(half), 1e-12))  # opposite directions have none
         cosine = dr.maximum(dr.dot(normal, light.toward), 0)
-        top = dr.maximum(dr.dot(normal, half), 0)
-        distribution = square / dr.square(top * top * (square - 1) + 1)  # times pi
+        top = dr.clip(dr.dot(normal, half), 0, 1)
+        spread = 1 - top * top + square * top * top  # (square - 1) would round to -1
+        distribution = square / dr.square(spread)  # times pi
         masking = 1 / (4 * (facing * (1 - k) + k) * (cosine * (1 - k) + k))
         grazing = (1 - dr.clip(dr.dot(half, view), 0, 1)) ** 5
         fresnel = f0 + (1 - f0) * grazing

@@ -18,7 +18,7 @@ Position, direction, intensity and the coefficients are exposed to ``mitsuba.tra
     {'type': 'heuristic_point', 'position': [-4.24, 0, 0], 'intensity': 1.0}
 
 Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance ``pi I_p f_att``
-(:mod:`heuristic.convention`). :meth:`light` hands the same parameters to the kernel.
+(:mod:`heuristic.convention`). ``light`` hands the same parameters to the kernel.
 
 ``heuristic_glow`` is emission and ambient light of a shape (8.1, 8.2):
 

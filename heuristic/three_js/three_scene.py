@@ -57,20 +57,22 @@ def said(scene: mi.Scene, kind: str) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 def _mesh(shape: mi.Shape, material: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
     found = scene_data.triangles_of(shape, 0, FINENESS)
-    normals = None if found.normals is None else _packed(found.normals, np.float32)
+    normals = None if found.normals is None else packed(found.normals, np.float32)
     return {
-        "positions": _packed(found.positions, np.float32),
+        "positions": packed(found.positions, np.float32),
         "normals": normals,
-        "faces": _packed(found.faces, np.uint32),
-        "material": _material(material, ambient, kind) | {"flat": normals is None},
+        "faces": packed(found.faces, np.uint32),
+        "material": material_of(material, ambient, kind) | {"flat": normals is None},
     }
 
 
-def _packed(array: np.ndarray, kind: type) -> str:
+def packed(array: np.ndarray, kind: type) -> str:
+    """Return an array's numbers in base64."""
     return base64.b64encode(np.ascontiguousarray(array, kind).tobytes()).decode()
 
 
-def _material(given: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
+def material_of(given: dict, ambient: np.ndarray, kind: str) -> dict[str, Any]:
+    """Return a material in three.js' form; emission includes the ambient light."""
     k_i, k_a, k_s = (np.array(given[name]) for name in ("k_i", "k_a", "k_s"))
     found = {
         "type": {"phong": "MeshPhongMaterial", "lambert": "MeshLambertMaterial"}[kind],

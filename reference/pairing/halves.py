@@ -88,15 +88,15 @@ def pair(
 
     Parameters
     ----------
-    source : reference.scene.source.Source
+    source
         The scene.
-    convention : Convention
+    convention
         How roughplastic and phong are paired.
-    resolution : (width, height), optional
-        Replaces the film's.
-    interpolation : Interpolation
+    resolution
+        Width and height in place of the film's.
+    interpolation
         Interpolation of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
-    tessellation : int, optional
+    tessellation
         How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 if omitted. If given, PHONG
         gets meshes too.
     prune

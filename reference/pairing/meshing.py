@@ -24,14 +24,14 @@ def replace_shapes(
 
     Parameters
     ----------
-    graph : reference.scene.graph.Graph
+    graph
         The graph to change. It keeps the folder that the meshes are written to until it is deleted.
-    scene : mitsuba.Scene
+    scene
         The same shapes, instantiated; ids identify them.
     resolution
         Resolution for other shapes than meshes, as in :func:`heuristic.meshes.to_mesh`; None for
         its default.
-    interpolation : Interpolation
+    interpolation
         Gouraud shading needs one normal per vertex, hence separate faces if the mesh has
         ``face_normals``.
 

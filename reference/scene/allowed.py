@@ -2,7 +2,7 @@
 
 Mitsuba rejects some values that make no sense, and silently renders others: a sphere of radius NaN
 is missing, an infinite index of refraction is black. Numbers are checked by :data:`RULES`,
-transforms by :func:`_transform`, and every number must exist in single precision.
+transforms by ``_transform``, and every number must exist in single precision.
 """
 
 from collections.abc import Callable, Iterator

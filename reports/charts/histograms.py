@@ -112,7 +112,7 @@ def _shares(histogram: Histogram, counted: int) -> list[dict[str, float]]:
     low, counts = histogram.low, histogram.counts
     decades = math.log10(histogram.high / low) / len(counts)
     return [
-        {"value": low * 10.0 ** (place * decades), "share": count / max(counted, 1)}
+        {"value": _short(low * 10.0 ** (place * decades)), "share": _short(count / max(counted, 1))}
         for place, count in enumerate([*counts, 0])
     ]
 
@@ -128,3 +128,8 @@ def _marks(summary: Summary, low: float, top: float) -> list[dict[str, Any]]:
         | {"share": (1.45 - 0.14 * row) * top}
         for row, (value, word, dash) in enumerate(mark for mark in marks if mark[0] >= low)
     ]
+
+
+def _short(value: float) -> float:
+    """A number with more digits than a chart shows, and no more."""
+    return float(f"{value:.5g}")

@@ -43,7 +43,8 @@ def audit(
     """Check a heuristic or BSDF: energy, reciprocity, continuity, gradients.
 
     Evaluates it on white materials for all directions, and prints a table of checks with the worst
-    case of each. Writes audit.json and audit.svg, the albedo over angles, to OUTPUT/audit/NAME.
+    case of each. Writes a page (index.html) with charts and hard cases, audit.json, and audit.svg,
+    the albedos, to OUTPUT/audit/NAME.
     Textbook shading fails most of the checks: the exit code is 1 only if a value is NaN, infinite
     or negative.
 
@@ -61,7 +62,7 @@ def audit(
         pool.start()
         from comparisons.records import to_json
         from reports.run.output import below, held, require_free_folders
-        from reports.run.places import assigned
+        from reports.run.places import PAGE, assigned
         from reports.terminal import audit_lines
 
         command = jobs.command_line()
@@ -75,7 +76,7 @@ def audit(
         click.echo(to_json(record), nl=False)
     else:
         verbosity.tell(audit_lines.lines(record))
-        verbosity.tell_where(folder / place / "audit.svg")
+        verbosity.tell_where(folder / place / PAGE)
     if not record.is_defined:
         click.get_current_context().exit(1)
 

@@ -46,8 +46,9 @@ from reports.terminal import verbosity
 @click.option(
     "--why/--no-why",
     "with_cost",
-    default=None,
-    help="Find causes and remedies, at a small size; not for a picture. [default: why]",
+    default=True,
+    help="Find causes and remedies, at a small size; of a picture, only what it is nearest to."
+    " [default: why]",
 )
 @opening.option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
@@ -59,7 +60,7 @@ def compare(
     output: Path,
     figures: bool,
     fresh: bool,
-    with_cost: bool | None,
+    with_cost: bool,
     cost: bool,
     scripts: bool,
     timeout: float,
@@ -97,11 +98,10 @@ def compare(
       fotismos compare my_scenes/ --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
-    has_image, is_asked = bool(rendering["image"]), with_cost or cost
-    if has_image and (len(scenes) > 1 or is_asked):
-        raise click.UsageError("--image goes with one scene, and without --why.")
-    with_cost = is_asked or (with_cost is None and not has_image)
+    if rendering["image"] and len(scenes) > 1:
+        raise click.UsageError("--image goes with one scene.")
     request = jobs.request(rendering)
+    with_cost |= cost
     wanted = batch.Wanted(request, figures, with_cost=with_cost, fresh=fresh, with_scripts=scripts)
     words = {"max_mean": max_mean, "max_visible": max_visible, "junit": junit}
     judge = asked.Judge(words | {"summary": summary, "link": link})

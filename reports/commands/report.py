@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Pool
 from comparisons.processes.worker import Task
 from reports import jobs, opening
 from reports.run import batch, tasks
@@ -18,10 +17,6 @@ from reports.terminal import verbosity
 
 if TYPE_CHECKING:
     from comparisons.case import Request
-    from comparisons.hard.collection import HardCases
-    from comparisons.verification import Verification
-    from reports.run.stages import Run
-    from reports.terminal.progress import Bar
 
 VERIFIED_AT = (64, 64)
 """Resolution at which a report verifies its plans."""
@@ -30,6 +25,11 @@ QUICK = {"resolution": (64, 64), "spp": 16}
 """The defaults of ``--quick``."""
 
 QUICKLY_VERIFIED_AT = (32, 32)
+
+HARD = "hard cases"
+
+VERIFIED_QUICKLY = slice(3, None, 4)
+"""``--quick`` verifies one scene in four, from each group."""
 
 
 @click.command()
@@ -42,7 +42,7 @@ QUICKLY_VERIFIED_AT = (32, 32)
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
-@click.option("--quick", is_flag=True, help="Everything at a small size, in a minute or two.")
+@click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @opening.option
 def report(
     output: Path,
@@ -72,40 +72,35 @@ def report(
     if quick:
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
-
-    def more(pool: Pool, run: Run, bar: Bar) -> dict[str, Any]:
-        from heuristic import equations
-
-        names = [] if request.everything else list(SCENES)
-        with run.timing("verification and hard cases"):
-            cases, verifications = _verified(pool, bar, names, request, quick)
-        return {
-            "verifications": verifications,
-            "hard_cases": cases,
-            "equations": equations.index(),
-        }
-
-    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh)
+    names = [] if request.everything else list(SCENES)
+    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh, coarse=quick)
     rendered = jobs.pool(timeout, workers, scheduler)
+    more = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, wanted, rendered, more, opening.seen(is_opened))
 
 
-def _verified(
-    pool: Pool, bar: Bar, names: Sequence[str], request: Request, quick: bool
-) -> tuple[HardCases, list[Verification]]:
-    """Evaluate the hard cases, and compare the plan of each scene with everything simulated."""
+def _verified(names: Sequence[str], request: Request, quick: bool) -> batch.More:
+    """Evaluate the hard cases, and compare the plans of scenes with everything simulated."""
     from comparisons.check.moved import level_of_each
     from comparisons.verification import LEVEL
 
     size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
     small = replace(request, resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
-    verified = (
-        Task(name, tasks.verified, (name, small, level, not quick), bar.of(name)) for name in names
-    )
-    found = {}
-    bar.begin("verification and hard cases", 1 + len(names), batch.MORE)
-    for task, outcome in pool.each(chain([Task("hard cases", tasks.hard_cases, ())], verified)):
-        found[task.name] = outcome.result()
-        bar.over(task.progress)
-    return found["hard cases"], [found[name] for name in names]
+    verified = [
+        Task(name, tasks.timed, (tasks.verified, name, small, level, not quick)) for name in names
+    ]
+    cases = Task(HARD, tasks.timed, (tasks.hard_cases,))
+    shown = partial(_shown, names)
+    return batch.More("verification and hard cases", [cases, *verified], shown)
+
+
+def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the page's content of the results of tasks."""
+    from heuristic import equations
+
+    return {
+        "verifications": [found[name] for name in names],
+        "hard_cases": found[HARD],
+        "equations": equations.index(),
+    }

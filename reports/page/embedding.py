@@ -1,9 +1,9 @@
 """A comparison's images inside the page, as numbers: exact to the digits that the page prints.
 
-Every value is rounded to three significant decimal digits, the standard error to two, and stored as
-a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would take more
-bits and sometimes print another last digit. Steps between codes are at most 1 %, near white one
-8-bit level.
+Every value is rounded to three significant decimal digits, the standard error to one, as is usual,
+and stored as a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would
+take more bits and sometimes print another last digit. Steps between codes are at most 1 %, near
+white one 8-bit level.
 
 A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
 to the left neighbour, and split into low and high bytes; all planes are deflated together.
@@ -26,13 +26,16 @@ from comparisons.departure.metrics import drawn
 from comparisons.records import Record, plain
 
 #: Significant digits of values, and of the standard error.
-DIGITS, ERROR_DIGITS = 3, 2
+DIGITS, ERROR_DIGITS = 3, 1
 
 #: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
 EXPONENTS = (-18, 16)
 
 #: Added to the code of a magnitude if the value is negative.
 NEGATIVE = 0x8000
+
+#: Smaller differences are printed as "< 0.01", and stored as half of it, if maps reach 1.
+LEAST = 0.01
 
 #: Pixels; longer images are averaged over square blocks inside the page, never in the files.
 LONGEST = 1024
@@ -99,8 +102,11 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
         for colour in "GRB":
             name, base = f"{layer}.{colour}", None if colour == "G" else f"{layer}.G"
             add(name, _means(channels[name], block), DIGITS, base)
-    for name in drawn():
-        add(name, _means(channels[f"{name}.Y"], block), DIGITS)
+    for name, metric in drawn().items():
+        values = _means(channels[f"{name}.Y"], block)
+        if metric.map_range[1] >= 1.0:  # the rounding of exact pairs would fill most of a page
+            values = np.where((values > 0.0) & (values < LEAST), LEAST / 2, values)
+        add(name, values, DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
     add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)
     marked = np.asarray(channels["significant.Y"], np.float64)
@@ -125,8 +131,12 @@ def embed_colours(image: NDArray, digits: int) -> Embedded:
 def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
     """The named codes of planes as in `Embedded.data`."""
     raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base or "")) for plane in planes)
-    # Level 4: a third of the time of 6, for 1 % more.
-    return base64.b64encode(zlib.compress(raw, 4)).decode("ascii")
+    return deflated(raw)
+
+
+def deflated(raw: bytes, level: int = 6) -> str:
+    """Return bytes, deflated (RFC 1950), in base64."""
+    return base64.b64encode(zlib.compress(raw, level)).decode("ascii")
 
 
 def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:

@@ -69,7 +69,7 @@ class SceneView(Record):
     record
         The content of ``comparison.json``.
     thumbnails
-        Small named PNG files, of both halves and of the leading metric's map.
+        Small named WebP files, of both halves and of the leading metric's map.
     embedded
         The images as numbers; without them the scene has only the thumbnails.
     files

@@ -15,7 +15,8 @@ from markupsafe import Markup
 from comparisons.records import plain
 from reports.charts import theme, vega
 from reports.files import images
-from reports.page import viewer_data
+from reports.page import embedding, switchboard, viewer_data
+from reports.terminal.nearest_lines import caution, lacking
 from reports.terminal.printing import (
     NOTICEABLE,
     about_noise,
@@ -92,7 +93,11 @@ def environment() -> Environment:
         code_spans=code_spans,
         region_view=viewer_data.region_view,
         plain=plain,
+        lacking=lacking,
+        caution=caution,
         uri=_data_uri,
+        webp_uri=switchboard.webp_uri,
+        deflated=lambda code: embedding.deflated(code.encode(), 9),
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
     environment.globals.update(

@@ -83,8 +83,9 @@ class TermsView(Record):
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        found = plain(structs.replace(self, picked=None))
-        return found | {
+        shown = plain(structs.replace(self, picked=None))
+        del shown["picked"]
+        return shown | {
             "grid": self.grid.manifest() if self.grid else None,
             "incidences": polar.INCIDENCES.tolist(),
             "views": polar.VIEWS.tolist(),
@@ -132,15 +133,16 @@ def view(
 def picked(
     grid: TermGrid | None, regions: Sequence[Region], reference: NDArray
 ) -> PickedTerms | None:
-    """Return the terms in the middle of the largest region, or else of the image (H, W, 3)."""
+    """Return the terms in the middle of the largest region, of the image (H, W, 3) on lamps."""
     if grid is None:
         return None
     middles = [(each.x + each.width // 2, each.y + each.height // 2) for each in regions[:1]]
     height, width, _ = reference.shape
     found = [grid.at(*pixel) for pixel in (*middles, (width // 2, height // 2))]
-    terms = next(filter(None, found), None)
-    if terms is None:
+    seen = [terms for terms in found if terms]
+    if not seen:
         return None
+    terms = next((terms for terms in seen if not any(terms.emission)), seen[0])
     lit = (
         (f"{light.name}, {name}", getattr(light, name))
         for light in terms.lights

@@ -28,4 +28,5 @@ def context(scenes: Sequence[Any]) -> dict[str, Any]:
         "effects": {name: EFFECT_COLOURS[name] for name in names},
         "with_causes": verdict.WITH_CAUSES,
         "has_remedies": any(f.remedies for f in found),
+        "has_causes": any(f.remedies or f.nearest for f in found),
     }

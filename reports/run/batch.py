@@ -8,7 +8,9 @@ them may kill. The page is written with the first picture, and again as the run 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,13 +28,24 @@ if TYPE_CHECKING:
     from reports.run.stages import Run
     from reports.terminal.progress import Bar
 
-More = Callable[[Pool, "Run", "Bar"], dict[str, Any]]
-Judge = Callable[[Path, Sequence["SceneView"]], None]
 Calls = Mapping[str, tuple[str, Path, str, Wanted]]
 """The arguments of :func:`reports.run.single.compare` for each place."""
 
-SKETCH, WHOLE, MORE = 1.0, 8.0, 3.0
-"""Relative times that a scene takes in each part of a run, to estimate the time left."""
+SKETCH, WHOLE, MORE = 1.0, 8.0, 1.0
+"""Relative times of a sketch, a scene and a further task, to estimate the time left."""
+
+
+@dataclass(frozen=True)
+class More:
+    """Further content of a page: the tasks that make it, begun while the last scenes are rendered.
+
+    ``tasks`` return a result and the seconds that it took, which count towards ``stage``;
+    ``shown`` makes the page's content of the results by the tasks' names.
+    """
+
+    stage: str
+    tasks: Sequence[Task]
+    shown: Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
 def run(
@@ -42,7 +55,7 @@ def run(
     pool: Pool,
     more: More | None = None,
     seen: Callable[[Path], object] = lambda _: None,
-    judge: Judge | None = None,
+    judge: Callable[[Path, Sequence[SceneView]], None] | None = None,
 ) -> None:
     """Compare scenes, and write the results of each, then the page and tables of all.
 
@@ -57,7 +70,7 @@ def run(
     pool
         Processes that compare the scenes; it is ended.
     more
-        Makes further content of the page in the pool, counts its time, and returns the content.
+        Further content of the page.
     seen
         Called with the page's path once the page exists.
     judge
@@ -89,16 +102,16 @@ def run(
                 for place, name in found.items()
             }
             shown, error = {}, None
-            weight = SKETCH * wanted.sketched + WHOLE + MORE * bool(more)
+            total = (SKETCH * wanted.sketched + WHOLE) * len(found)
+            total += MORE * len(more.tasks) if more else 0.0
             try:
-                with progress.shown(total=weight * len(found)) as bar:
+                with progress.shown(total=total) as bar:
                     if wanted.sketched:
                         with record.timing("first pictures"):
                             _sketch(pool, growing, each, bar)
-                    _compare(pool, record, growing, each, bar)
+                    others = _compare(pool, record, growing, each, bar, more)
                     if more and growing.views:
-                        growing.offer(at_once=True)
-                        shown = more(pool, record, bar)
+                        shown = _further(more, record, others)
             except KeyboardInterrupt:
                 pool.end()  # before clearing away its half written files
                 ownership.recover(folder)
@@ -153,13 +166,26 @@ def _sketch(pool: Pool, growing: Growing, each: Calls, bar: Bar) -> None:
         growing.offer()
 
 
-def _compare(pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar) -> None:
-    """Collect the views of the scenes that are compared, and the errors of the others."""
+def _compare(
+    pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar, more: More | None
+) -> dict[str, Future[Any]]:
+    """Collect the views of the scenes that are compared, and the errors of the others.
+
+    Returns the outcomes of further tasks.
+    """
     from reports.terminal import carrier_lines, progress
 
+    further = {task.name: task for task in more.tasks} if more else {}
+    others: dict[str, Future[Any]] = {}
     left = {p: w for p, w in each.items() if p not in growing.views and p not in growing.failures}
     bar.begin("scenes", len(left), WHOLE, skipped=len(each) - len(left))
-    for task, outcome in pool.each(_tasks(single.compare, left, bar)):
+    if more and not left:
+        bar.begin(more.stage, len(further), MORE)
+    for task, outcome in pool.each(chain(_tasks(single.compare, left, bar), further.values())):
+        if further.get(task.name) is task:
+            others[task.name] = outcome
+            bar.over(None, None if growing.is_whole else MORE)
+            continue
         try:
             view, spent = outcome.result()
         except InstallationError:
@@ -176,7 +202,19 @@ def _compare(pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar) -
         for stage, seconds in spent.seconds.items():
             record.add(stage, seconds)
         verbosity.remark([*progress.details(view.record), *carrier_lines.lines(view.record)])
-        growing.offer()
+        growing.offer(at_once=bool(more) and growing.is_whole)
+        if more and growing.is_whole:
+            bar.begin(more.stage, len(further) - len(others), MORE)
+    return others
+
+
+def _further(more: More, record: Run, outcomes: Mapping[str, Future[Any]]) -> dict[str, Any]:
+    """Return the page's content of further tasks, and count their time."""
+    found = {}
+    for name, outcome in outcomes.items():
+        found[name], seconds = outcome.result()
+        record.add(more.stage, seconds)
+    return more.shown(found)
 
 
 def _write(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
+from PIL import Image
 
 from comparisons import atomic
 from comparisons.comparison import ComparisonRecord
@@ -16,7 +18,7 @@ from comparisons.record import Comparison, Images
 from comparisons.records import to_json
 from heuristic.errors import OutputError
 from reports.files import exr, holding, images, ownership
-from reports.page import embedding, page, terms_view
+from reports.page import embedding, page, switchboard, terms_view
 from reports.page.lit import lit
 from reports.page.scene_view import SceneView
 from reports.run import finished
@@ -158,7 +160,10 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     shown = comparison.images
     return SceneView(
         record=comparison.record,
-        thumbnails=images.thumbnails(shown, comparison.record.viewing.exposure),
+        thumbnails={
+            name: switchboard.webp(Image.open(BytesIO(png)).convert("RGB"))
+            for name, png in images.thumbnails(shown, comparison.record.viewing.exposure).items()
+        },
         embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
     )
 

@@ -27,7 +27,8 @@ class Wanted:
     """The work that a command requests for each of its scenes.
 
     ``request`` says how; ``sketched`` begins with all scenes at a small size; ``fresh`` renders
-    finished scenes again; ``with_scripts`` runs scripts found in folders.
+    finished scenes again; ``with_scripts`` runs scripts found in folders; ``coarse`` prices effects
+    with less effort.
     """
 
     request: Request
@@ -36,6 +37,7 @@ class Wanted:
     with_cost: bool = False
     fresh: bool = False
     with_scripts: bool = False
+    coarse: bool = False
 
 
 def compare(
@@ -71,7 +73,7 @@ def compare(
     study = None
     if wanted.with_cost:
         with spent.timing("cost"):
-            result, study = _explained(case, progress, result)
+            result, study = _explained(case, progress, result, wanted.coarse)
     with spent.timing("files"):
         if wanted.figures:  # first, since the folder marks the scene as finished
             from reports.charts import figures
@@ -95,7 +97,7 @@ def sketch(name: str, folder: Path, place: str, wanted: Wanted, progress: Progre
         return found
     size = reduced(case.source, case.options, SKETCH_WIDTH)
     small = replace(case.options, resolution=size, spp=SKETCH_SPP, noise=None)
-    made = compare(case.source, small, progress, case.command())
+    made = compare(case.source, small, progress, case.command(), with_terms=False)
     return structs.replace(output.view_of(made), is_coarse=True)
 
 
@@ -106,33 +108,46 @@ def _finished(
     from reports.run import finished, kept
 
     passes = kept.of_scene(folder, place, case)
-    key = finished.key_of(passes.key, case.options, wanted.with_cost, wanted.figures)
+    base = passes.key + " coarse" * wanted.coarse
+    key = finished.key_of(base, case.options, wanted.with_cost, wanted.figures)
     return passes, key, None if wanted.fresh else finished.load(folder / place, key)
 
 
 def _explained(
-    case: Case, progress: Progress, comparison: Comparison
+    case: Case, progress: Progress, comparison: Comparison, coarse: bool
 ) -> tuple[Comparison, Study | None]:
-    """Return a comparison with its study of cost, None if that fails."""
+    """Return a comparison with its causes, and its study of cost if there is one."""
     from heuristic.errors import FotismosError
 
     try:
-        return _priced(case, progress, comparison)
+        return _priced(case, progress, comparison, coarse)
     except FotismosError as error:
         warnings = (*comparison.record.warnings, f"The causes are unknown: {error}")
         record = structs.replace(comparison.record, warnings=warnings)
         return replace(comparison, record=record), None
 
 
-def _priced(case: Case, progress: Progress, comparison: Comparison) -> tuple[Comparison, Study]:
-    """Study what accuracy costs, name the dominating effects, and record the time."""
+def _priced(
+    case: Case, progress: Progress, comparison: Comparison, coarse: bool
+) -> tuple[Comparison, Study | None]:
+    """Study what accuracy costs, name the dominating effects, and record the time.
+
+    A picture cannot be studied; it names the renderings that it is nearest to.
+    """
     from comparisons.comparison import CAUSES
     from comparisons.cost.cost import quick
+    from comparisons.cost.effort import COARSE, QUICK
     from comparisons.effects.naming import named
+    from comparisons.pictures import likeness
 
     begin = perf_counter()
-    study = quick(case.source, case.options, progress, case.command() + " --why")
-    record = named(comparison, study.effects)
+    study = None
+    if case.options.image:
+        record = likeness.named(comparison, case.source, case.options, progress)
+    else:
+        effort = COARSE if coarse else QUICK
+        study = quick(case.source, case.options, progress, case.command() + " --why", effort)
+        record = named(comparison, study.effects)
     stages = record.time.stages | {CAUSES: perf_counter() - begin}
     time = structs.replace(record.time, stages=stages)
     return replace(comparison, record=structs.replace(record, time=time)), study

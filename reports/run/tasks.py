@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +20,12 @@ if TYPE_CHECKING:
     from reports.terminal.plan_lines import PlanReport
 
 
+def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+    """Return what a task returns, and the seconds that it took."""
+    begin = perf_counter()
+    return function(*arguments), perf_counter() - begin
+
+
 def planned(name: str, request: Request) -> PlanReport:
     """Return the plan of a scene."""
     from comparisons.case import open_case
@@ -29,7 +37,7 @@ def planned(name: str, request: Request) -> PlanReport:
 
 
 def verified(
-    name: str, request: Request, level: float | None, steps: bool, progress: Any
+    name: str, request: Request, level: float | None, steps: bool, progress: Any = None
 ) -> Verification:
     """Compare the plan of a scene with everything simulated.
 
@@ -57,9 +65,11 @@ def hard_cases() -> HardCases:
     """Evaluate the hard cases."""
     from comparisons.case import RGB
     from comparisons.hard import collection
+    from heuristic import plugins
     from reference.scene.graph import set_variant
 
     set_variant(RGB)
+    plugins.register()
     return collection.collect()
 
 

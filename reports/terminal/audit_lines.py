@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from comparisons.audit.audit_record import Audit
 from reports.terminal import tables
-from reports.terminal.printing import number
+from reports.terminal.audit_words import found
 
 
 def lines(record: Audit) -> Iterator[str]:
@@ -28,9 +28,4 @@ def verdict(record: Audit) -> str:
 def _rows(record: Audit) -> Iterator[Sequence[str]]:
     yield "check", "verdict", "found", "expected", "worst case"
     for check in record.checks:
-        yield check.name, check.verdict, _found(check.value), check.expected, check.worst
-
-
-def _found(value: float | None) -> str:
-    """Return the value found; a count has no decimals."""
-    return f"{value:g}" if value is not None and value == int(value) else number(value)
+        yield check.name, check.verdict, found(check.value), check.expected, check.worst

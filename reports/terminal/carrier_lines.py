@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.departure.objects import Carrier
 from reports.files import ownership
+from reports.terminal.nearest_lines import lacking
 from reports.terminal.printing import number, percent
 from reports.terminal.tables import comma_separated, printed
 
@@ -19,12 +21,18 @@ def lines(record: ComparisonRecord) -> Iterator[str]:
     """Yield the table of a scene's shapes; nothing if there is only one."""
     if len(record.objects) < 2:
         return
-    rows = [("shape", "mostly", "departure", "pixels", "mean ΔE2000")]
+    rows = [
+        ("shape", "lacks" if record.picture else "mostly", "departure", "pixels", "mean ΔE2000")
+    ]
     for carrier in record.objects:
         shares = percent(carrier.share), percent(carrier.pixels / record.pixels.counted)
-        rows.append((carrier.name, carrier.effect or "", *shares, number(carrier.mean_dE2000)))
+        rows.append((carrier.name, _cause(carrier), *shares, number(carrier.mean_dE2000)))
     yield from ("", *printed(rows, right=2))
     yield f"  causes took {percent(record.time.share_of_causes)} of the time"
+
+
+def _cause(carrier: Carrier) -> str:
+    return lacking(carrier.nearest) if carrier.nearest else carrier.effect or ""
 
 
 def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:

@@ -19,7 +19,7 @@ from rich.text import Text
 from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
 from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
-from reports.terminal import verbosity
+from reports.terminal import nearest_lines, verbosity
 from reports.terminal.printing import seconds
 from reports.terminal.tables import printed
 
@@ -60,13 +60,17 @@ class Bar:
             total = (self._progress.tasks[0].total or 0.0) - skipped * weight
             self._progress.update(self._whole, total=total, description=self._words())
 
-    def over(self, update: Callable[..., None] | None) -> None:
-        """End the task with this callback: remove its bar, and advance the run's."""
+    def over(self, update: Callable[..., None] | None, weight: float | None = None) -> None:
+        """End the task with this callback: remove its bar, and advance the run's.
+
+        A task with its own weight is not one of the stage's.
+        """
         if isinstance(update, partial):
             self._progress.remove_task(update.args[0])
-        self._done += 1
+        self._done += weight is None
         if self._whole is not None:
-            self._progress.update(self._whole, advance=self._weight, description=self._words())
+            advance = self._weight if weight is None else weight
+            self._progress.update(self._whole, advance=advance, description=self._words())
 
     def _words(self) -> str:
         return f"{self._stage}, {self._done} of {self._count}"
@@ -108,6 +112,7 @@ def summary(records: Iterable[ComparisonRecord]) -> Iterator[str]:
             yield from _picture(record, record.picture)
     yield from printed(_table(records), right=1)
     for record in records:
+        yield from nearest_lines.lines(record)
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
             yield from record.suspicions

@@ -48,7 +48,7 @@ def check_inspector(shown, channels, x, y):
             continue
         assert read(shown[name]) == float(f"{channels[f'{name}.Y'][y, x]:.2e}")
     error = max(rgb(channels, "reference_stderr", x, y))
-    assert read(shown["standard_error"]) == float(f"{error:.1e}")
+    assert read(shown["standard_error"]) == float(f"{error:.0e}")
     marked = {0.0: "no", 0.5: "undetermined", 1.0: "yes"}[channels["significant.Y"][y, x]]
     assert shown["significant"] == (marked if y else "not counted")
 

@@ -96,8 +96,8 @@ class ErrorLaw:
     def spread(self, width: float, spp: float, by_size: float, by_count: float) -> float:
         """Return the standard deviation of a predicted error.
 
-        ``by_size`` and ``by_count`` are the ratios of the sums of :attr:`missed_by_size` and
-        :attr:`missed_by_count`, over all methods.
+        ``by_size`` and ``by_count`` are the ratios of the sums of ``missed_by_size`` and
+        ``missed_by_count``, over all methods.
         """
         _, middle, last = self.widths
         reach = hypot((1 / last - 1 / width) / (1 / middle - 1 / last), OWN_CHANCE)

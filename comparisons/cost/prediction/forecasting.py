@@ -1,8 +1,9 @@
 """Predict the cost of methods at a size too large to try them all, from smaller sizes.
 
 Each method is rendered at three smaller sizes of the same shape, in turn, and curves are fitted to
-its times (:mod:`.time_curve`) and errors (:mod:`.error_curve`). On request, it is also rendered at
-the size itself, in the same turns, with counts that were not fitted.
+its times (:mod:`comparisons.cost.prediction.time_curve`) and errors
+(:mod:`comparisons.cost.prediction.error_curve`). On request, it is also rendered at the size
+itself, in the same turns, with counts that were not fitted.
 """
 
 from collections import defaultdict

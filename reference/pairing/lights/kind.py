@@ -43,7 +43,7 @@ class Given:
         The graph and the light's node.
     shape
         Node of the shape that shines, None for lights without a shape.
-    geometry, surface : callable
+    geometry, surface
         Return the Mitsuba scene without materials, for the size and place of shapes, and the
         `GBuffer` for mean irradiances.
     hide_emitters
@@ -77,7 +77,7 @@ class Given:
         return self.graph.props(self.index).get(key, default)
 
     def number(self, key: str, default: float) -> float:
-        """Return a parameter as a finite number, or raise :class:`InputError`."""
+        """Return a parameter as a finite number, or raise :class:`heuristic.errors.InputError`."""
         return values.number(self.graph, self.index, key, default)
 
     def column(self, number: int) -> list[float]:

@@ -2,17 +2,12 @@
 
 A rule is one function, declared by :func:`reference.pairing.nearest.material.rule`.
 
-==================================================  ================================================
-BSDF                                                Rule
-==================================================  ================================================
-``diffuse``, ``roughplastic``, ``plastic``,         :mod:`reference.pairing.nearest.simple`
-``conductor``, ``roughconductor``, ``principled``,
-``null``, ``dielectric``, ``roughdielectric``,
-``thindielectric``
-``twosided``, ``mask``, ``blendbsdf``, ``bumpmap``, :mod:`reference.pairing.nearest.wrapped`
-``normalmap``
-any other, including a user's                    :func:`reference.pairing.nearest.probe.nearest`
-==================================================  ================================================
+- :mod:`reference.pairing.nearest.simple`: ``diffuse``, ``roughplastic``, ``plastic``,
+  ``conductor``, ``roughconductor``, ``principled``, ``null``, ``dielectric``, ``roughdielectric``
+  and ``thindielectric``;
+- :mod:`reference.pairing.nearest.wrapped`: ``twosided``, ``mask``, ``blendbsdf``, ``bumpmap`` and
+  ``normalmap``;
+- :func:`reference.pairing.nearest.probe.nearest`: any other, including a user's.
 """
 
 from importlib import import_module

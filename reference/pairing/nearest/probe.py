@@ -4,11 +4,12 @@ It serves plugins that no other rule knows, including users', and parts of other
 
 At normal incidence, by a rank-1 lattice of samples that also covers the texture plane:
 
-* albedos of reflection and transmission, as weighted by ``sample`` (light as particles, so a
-refraction's change of solid angle does not count); * the diffuse part ``k_d = pi f``, with the BRDF
-``f`` 60 degrees off the normal, outside the lobe; * the lobe's width from the median slope of the
-rest, over half vectors: for Beckmann's lobe ``tan^2`` is distributed exponentially, with the median
-``alpha^2 ln 2``. A mean would depend on the tail, where the diffuse part is not quite even.
+- albedos of reflection and transmission, as weighted by ``sample`` (light as particles, so a
+  refraction's change of solid angle does not count);
+- the diffuse part ``k_d = pi f``, with the BRDF ``f`` 60 degrees off the normal, outside the lobe;
+- the lobe's width from the median slope of the rest, over half vectors: for Beckmann's lobe
+  ``tan^2`` is distributed exponentially, with the median ``alpha^2 ln 2``. A mean would depend on
+  the tail, where the diffuse part is not quite even.
 
 Textures are averaged.
 """

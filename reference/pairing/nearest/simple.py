@@ -43,7 +43,7 @@ def roughplastic(context: Context, index: int) -> Nearest:
     """``roughplastic``: by the convention (:class:`reference.pairing.factors.Convention`).
 
     A textured reflectance is matched at each point: the diffuse part's albedo is linear in ``rho``,
-    with ``nonlinear`` it is ``c rho / (1 - f rho)`` (:func:`_of_base`); the lobe's is linear in
+    with ``nonlinear`` it is ``c rho / (1 - f rho)`` (``_of_base``); the lobe's is linear in
     ``specular_reflectance``.
     """
     base, coat = (

@@ -10,7 +10,7 @@ from reports.page import templating
 from reports.page.scene_view import CostView
 
 STYLES = ("base", "scene", "points", "help", "print")
-SCRIPTS = ("page", "numbers", "help", "points", "charts")
+SCRIPTS = ("page", "numbers", "decoding", "help", "points", "charts")
 
 #: Makes the page live.
 BEGIN = """

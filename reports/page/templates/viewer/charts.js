@@ -1,15 +1,21 @@
 // Charts: Vega makes the page's pictures live once they are seen.
 
-/** Vega, which is text until a chart needs it. @type {Promise<any> | undefined} */
+/** Vega, which is packed text until a chart needs it. @type {Promise<any> | undefined} */
 let vega;
 
 /** @returns {Promise<any>} */
 function loadVega() {
-  return (vega ??= new Promise((done) => {
-    const textContent = document.getElementById("vega")?.textContent;
+  return (vega ??= startVega());
+}
+
+/** @returns {Promise<any>} */
+async function startVega() {
+  const packed = document.getElementById("vega")?.textContent ?? "";
+  const textContent = new TextDecoder().decode(await inflate(packed));
+  return new Promise((done) => {
     window.addEventListener("vega", () => done(/** @type {any} */ (window).vegaEmbed));
     document.body.append(Object.assign(document.createElement("script"), { type: "module", textContent }));
-  }));
+  });
 }
 
 const seen = new IntersectionObserver((entries) => {

@@ -125,7 +125,9 @@ function firstPixel(scene, data) {
   const [region] = scene.regions;
   const inside = region && [region.x + (region.width >> 1), region.y + (region.height >> 1)];
   const places = [...(inside ? [inside] : []), [scene.width >> 1, scene.height >> 1]];
-  return places.find((pixel) => termsAt(scene, data, pixel).material) ?? places[0];
+  const seen = places.filter((pixel) => termsAt(scene, data, pixel).material);
+  const shaded = seen.find((pixel) => !termsAt(scene, data, pixel).material?.k_i.some(Boolean)); // not a lamp
+  return shaded ?? seen[0] ?? places[0];
 }
 
 /**

@@ -1,0 +1,100 @@
+"""Gathers the sources of the site: our pages, those of the API, and those of linked files."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+from posixpath import dirname, normpath, relpath
+
+from guarantees import ROOT
+from website import api_pages, file_pages, notebook_page
+
+LINK = re.compile(r"\[(?P<text>[^][]*)\]\((?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
+"""A link in Markdown."""
+
+ORDER = "docs/README.md"
+"""The page that lists the others in reading order, under headings in bold."""
+
+PROJECT = ("CONTRIBUTING.md", "CHANGELOG.md")
+
+
+def gather(folder: Path) -> None:
+    """Write all sources into a folder: pages where they are, modules in api, others in files."""
+    linked: set[str] = set()
+    for path in (*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))):
+        page = path.relative_to(ROOT).as_posix()
+        text = with_links(path.read_text(encoding="utf-8"), page, linked)
+        if page == "README.md":
+            text += "\n".join(contents())
+        write(folder / place(page), text)
+    for path in (ROOT / "docs").rglob("*"):
+        if path.suffix in (".png", ".svg"):
+            write(folder / path.relative_to(ROOT), path.read_bytes())
+    text, pictures = notebook_page.page(ROOT / "docs/tutorial.ipynb")
+    write(folder / "docs/tutorial.md", with_links(text, "docs/tutorial.ipynb", linked))
+    for name, picture in pictures.items():
+        write(folder / "docs" / name, picture)
+    for name, text in api_pages.pages():
+        write(folder / "api" / f"{name}.rst", text)
+    for path in sorted(linked):
+        write(folder / "files" / f"{path}.rst", file_pages.page(path))
+
+
+def write(path: Path, content: str | bytes) -> None:
+    """Write a file, and the folders that it is in."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def place(path: str) -> str:
+    """Return a page's place in the site: a folder's own page is its index."""
+    return path.replace("README.md", "index.md").replace(".ipynb", ".md")
+
+
+def with_links(text: str, page: str, linked: set[str]) -> str:
+    """Return a page with links that stay in the site.
+
+    Parameters
+    ----------
+    text
+        The page, in Markdown.
+    page
+        Its path from the root.
+    linked
+        Files that need a page of their own are added to it.
+    """
+
+    def replaced(match: re.Match[str]) -> str:
+        words, target, anchor = match["text"], match["target"], match["anchor"] or ""
+        path = normpath(f"{dirname(page)}/{target}".lstrip("/"))
+        if "://" in target or path.endswith((".png", ".svg")):
+            return match[0]
+        if path.endswith((".md", ".ipynb")):
+            return f"[{words}]({place(target)}{anchor})"
+        if path.partition("/")[0] in api_pages.ROOMS and (name := api_pages.name(path, words)):
+            return f"[{words}](#{name})"
+        if not (ROOT / path).is_file() or path.endswith(".parquet"):
+            return words  # the site has no page for a folder
+        linked.add(path)
+        if test := file_pages.label(path, words):
+            return f"[{words}](#{test})"
+        return f"[{words}]({relpath(f'files/{path}.rst', dirname(page) or '.')})"
+
+    return LINK.sub(replaced, text)
+
+
+def contents() -> Iterator[str]:
+    """Yield the table of contents, in the order of docs/README.md."""
+    yield from tree("", [place(ORDER)])
+    _, *parts = re.split(r"^\*\*(.*)\*\*$", (ROOT / ORDER).read_text("utf-8"), flags=re.MULTILINE)
+    for heading, text in zip(parts[::2], parts[1::2], strict=True):
+        yield from tree(heading, [f"docs/{place(m['target'])}" for m in LINK.finditer(text)])
+    yield from tree("Modules", [f"api/{room}.rst" for room in api_pages.ROOMS])
+    yield from tree("Project", PROJECT)
+
+
+def tree(caption: str, pages: list[str] | tuple[str, ...]) -> Iterator[str]:
+    """Yield a part of the table of contents, which only the sidebar shows."""
+    options = (":hidden:", *([f":caption: {caption}"] if caption else []))
+    yield from ("", "```{toctree}", *options, "")
+    yield from (str(PurePosixPath(page).with_suffix("")) for page in pages)
+    yield from ("```", "")

@@ -1,0 +1,114 @@
+"""Lobes of engines in docs/shaders: their audits against a quadrature in float64, by formulas.
+
+The quadrature shares neither code nor nodes with the audit, and evaluates f, not pi f cos.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from comparisons.audit import angles
+from comparisons.audit.shaded import opened
+
+SHADERS = Path(__file__).parents[1] / "docs/shaders"
+DIELECTRIC = 0.04
+GRID = (120, 90)
+
+
+def schlick(f0, cosine):
+    return f0 + (min(49.5 * f0, 1) - f0) * (1 - cosine) ** 5
+
+
+def ggx(alpha, f0, light, view, half):
+    """Walter et al. (2007), with height-correlated masking by Smith's Lambda (Heitz 2014)."""
+    top = half[2]
+    distribution = alpha**2 / (np.pi * (top**2 * (alpha**2 - 1) + 1) ** 2)
+    hidden = [(np.sqrt(1 + alpha**2 * (1 / z**2 - 1)) - 1) / 2 for z in (light[2], view[2])]
+    fresnel = schlick(f0, dot(light, half))
+    return distribution * fresnel / (1 + sum(hidden)) / (4 * light[2] * view[2])
+
+
+def dot(a, b):
+    return (a * b).sum(axis=0)
+
+
+def karis(roughness, cosine):
+    near = np.minimum((1 - roughness) ** 2, 2 ** (-9.28 * cosine)) * (1 - roughness)
+    near += 0.0425 - 0.0275 * roughness
+    return 1.04 - 0.572 * roughness - 1.04 * near, -0.04 + 0.022 * roughness + 1.04 * near
+
+
+def mesh_phong(alpha, f0, base, light, view, half):
+    n = 2 / alpha**2 - 2
+    x = dot(view, half)
+    fresnel = f0 + (1 - f0) * 2 ** ((-5.55473 * x - 6.98316) * x)
+    return base / np.pi + fresnel * (n + 2) / (2 * np.pi) * half[2] ** n / 4
+
+
+def filament(alpha, f0, base, light, view, half):
+    return base / np.pi + ggx(alpha, f0, light, view, half)
+
+
+def bevy(alpha, f0, base, light, view, half):
+    f90 = 0.5 + 2 * alpha * dot(light, half) ** 2
+    burley = np.prod([1 + (f90 - 1) * (1 - z) ** 5 for z in (light[2], view[2])], axis=0)
+    scale, _ = karis(np.sqrt(alpha), view[2])
+    return base * burley / np.pi + ggx(alpha, f0, light, view, half) * (1 + f0 * (1 / scale - 1))
+
+
+def gltf(alpha, f0, base, light, view, half):
+    left = 1 - schlick(f0, dot(light, half))
+    return left * base / np.pi + ggx(alpha, f0, light, view, half)
+
+
+def layered(alpha, f0, base, light, view, half):
+    scale, bias = karis(np.sqrt(alpha), view[2])
+    left = 1 - np.minimum(f0 * scale + bias, 1)
+    return left * base / np.pi + ggx(alpha, f0, light, view, half)
+
+
+FORMS = {
+    "mesh_phong.py": mesh_phong,
+    "standard_material.py:filament": filament,
+    "standard_material.py:bevy": bevy,
+    "standard_material.py:gltf": gltf,
+    "standard_material.py:layered": layered,
+}
+
+
+def integral(f, degrees):
+    """``int f(fixed, o) cos o do`` over the hemisphere: Gauss and Legendre, and trapezoids."""
+    nodes, weights = np.polynomial.legendre.leggauss(256)
+    z, weights = (nodes + 1) / 2, weights / 2
+    azimuth = np.linspace(0, 2 * np.pi, 512, endpoint=False)
+    z, azimuth = np.meshgrid(z, azimuth, indexing="ij")
+    sine = np.sqrt(1 - z**2)
+    over = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z])
+    theta = np.deg2rad(degrees)
+    fixed = np.broadcast_to(np.reshape([np.sin(theta), 0, np.cos(theta)], (3, 1, 1)), over.shape)
+    half = fixed + over
+    half = half / np.linalg.norm(half, axis=0)
+    return (f(fixed, over, half) * z).mean(axis=1) @ weights * 2 * np.pi
+
+
+@pytest.mark.parametrize("kind", ["glossy", "metal"])
+@pytest.mark.parametrize("name", FORMS)
+def test_albedos_are_those_of_an_independent_quadrature(rgb, name, kind):
+    subject = opened(str(SHADERS / name), {})
+    subject.grid = GRID
+    f0, base = (1.0, 0.0) if kind == "metal" else (DIELECTRIC, 1.0)
+    for alpha in (0.3, 1.0):
+        curve = angles.curve(subject, f"{kind}, alpha {alpha:g}")
+        for degrees in (0.0, 60.0, 85.0):
+
+            def returned(light, view, half, alpha=alpha):
+                return FORMS[name](alpha, f0, base, light, view, half)
+
+            def seen(view, light, half, alpha=alpha):
+                return FORMS[name](alpha, f0, base, light, view, half)
+
+            place = angles.ANGLES.index(degrees)
+            found = curve.returned[place], curve.seen[place]
+            expected = integral(returned, degrees), integral(seen, degrees)
+            np.testing.assert_allclose(found, expected, rtol=5e-3)

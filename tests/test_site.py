@@ -1,0 +1,95 @@
+"""The documentation as a site: in reading order, each guarantee with its test, links that hold."""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pydoc import locate
+
+import pytest
+
+from tests.programs import ROOT
+
+
+@pytest.fixture(scope="module")
+def docs():
+    """The scripts of the documentation, which import each other from their folder."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.syspath_prepend(ROOT / "docs")
+        yield
+
+
+@pytest.fixture(scope="module")
+def sources(docs, tmp_path_factory):
+    from website import sources
+
+    folder = tmp_path_factory.mktemp("sources")
+    sources.gather(folder)
+    return folder
+
+
+def test_the_contents_have_the_order_of_the_list(sources):
+    listed = re.findall(r"\]\(([\w-]+)\.\w+\)", (ROOT / "docs/README.md").read_text("utf-8"))
+    contents = (sources / "index.md").read_text("utf-8").partition("```{toctree}")[2]
+    assert len(listed) > 20
+    assert re.findall(r"^docs/([\w-]+)$", contents, re.MULTILINE) == ["index", *listed]
+
+
+def test_each_guarantee_leads_to_the_source_of_its_test(sources):
+    import guarantees
+
+    page = (sources / "docs/guarantees.md").read_text("utf-8")
+    for each in guarantees.guarantees():
+        label = re.search(rf"\[{each.test}\]\(#([^)]+)\)", page)[1]
+        text = (sources / f"files/{each.path}.rst").read_text("utf-8")
+        section = text.partition(f".. _{label}:\n")[2].partition("\n.. _")[0]
+        assert re.search(rf"(def|class) {each.test}\b", section), each
+        assert each.text.replace("`", "``") in section
+
+
+def test_links_to_modules_name_what_exists(sources):
+    pages = [path.read_text("utf-8") for path in sources.rglob("*.md")]
+    names = re.findall(r"\]\(#((?:heuristic|reference|comparisons|reports)\b[\w.]*)\)", str(pages))
+    assert len(names) > 100
+    assert [name for name in names if locate(name) is None] == []
+    assert "heuristic.terms.specular" in names  # by the index of equations
+    assert "heuristic.shading.shade" in names  # by its other name, heuristic.shade
+
+
+class Loaded(HTMLParser):
+    """What a page loads."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.addresses = []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attributes):
+        if tag in ("img", "script", "link"):
+            found = dict(attributes)
+            self.addresses.append(found.get("src") or found.get("href") or "")
+
+
+BUILD = """
+import sys
+from pathlib import Path
+from website import build
+sys.exit(build.build(Path(sys.argv[1])))
+"""
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
+    """A link to nothing, a name that is not documented or markup that cannot be read is one."""
+    paths = os.pathsep.join(map(str, (ROOT, ROOT / "docs")))
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", BUILD, tmp_path],
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    pages = list(tmp_path.rglob("*.html"))
+    assert len(pages) > 100
+    assert [name for path in pages for name in Loaded(path).addresses if "//" in name] == []
