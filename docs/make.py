@@ -15,7 +15,6 @@ from pathlib import Path
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import nbformat
-from matplotlib.figure import Figure
 from nbclient import NotebookClient
 
 from comparisons import atomic
@@ -43,7 +42,7 @@ SHEETS = {
     "sum": ("fig-8-8a", "fig-8-8c", "fig-8-9", "fig-8-11-n9"),
     "spots": ("fig-6-5-m1", "fig-6-5-m40"),
 }
-"""Pictures of docs/models.md: heuristic above, reference below."""
+"""Pictures of docs/models.md: heuristic, reference and difference below each other."""
 
 LOBES = {"sharp": (31, 88), "dull": (157, 94)}
 """Pixels in the highlights of the first and the last of the plastic spheres."""
@@ -70,12 +69,8 @@ def main(words):
     replace("models.md", "equations", equation_table())
     _guarantees()
     replace("plans.md", "rules", rules())
-    for name, scenes in SHEETS.items():
-        pairs = [_images(scene) for scene in scenes]
-        _sheet(f"models-{name}.png", scenes, [[p.heuristic for p in pairs],
-                                              [p.reference for p in pairs]])  # fmt: skip
-    shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
-    _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
+    _hero()
+    _models()
     _lobes()
     _architecture()
     _example()
@@ -143,20 +138,35 @@ def _images(name, interpolation=None):
     return compare(scene.source(), options).images
 
 
+def _models():
+    """Draw the pictures of docs/models.md."""
+    import model_figures  # next to this script
+
+    for name in ("vectors", "lobes"):
+        drawn = figures.drawn(getattr(model_figures, name)(), "svg")
+        atomic.write(DOCS / f"models-{name}.svg", drawn)
+    for name, scenes in SHEETS.items():
+        found = model_figures.compared(scenes, [_images(scene) for scene in scenes])
+        atomic.write(DOCS / f"models-{name}.png", figures.drawn(found, "png", 100))
+    shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
+    _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
+
+
 def _sheet(name, titles, rows):
     """Write rows of pictures, with a title above each column."""
-    columns, inch = len(titles), SIDE / 100
-    figure = Figure(figsize=(columns * inch, len(rows) * inch + 0.25))
-    axes = figure.subplots(len(rows), columns, squeeze=False)
-    top = 1 - 0.25 / figure.get_figheight()
-    figure.subplots_adjust(0, 0, 1, top, wspace=0.03, hspace=0.03)
-    for line, pictures in zip(axes, rows, strict=True):
-        for place, picture in zip(line, pictures, strict=True):
-            place.imshow(images.tonemap(picture), interpolation="none")
-            place.axis("off")
-    for place, title in zip(axes[0], titles, strict=True):
-        place.set_title(title, fontsize=8, pad=3)
-    atomic.write(DOCS / name, figures.drawn(figure, "png", 100))
+    import model_figures  # next to this script
+
+    shown = [[images.tonemap(picture) for picture in row] for row in rows]
+    atomic.write(DOCS / name, figures.drawn(model_figures.sheet(titles, shown), "png", 100))
+
+
+def _hero():
+    """Draw the README's first picture, and write its caption."""
+    import hero  # next to this script
+
+    found = hero.made()
+    atomic.write(DOCS / "hero.webp", hero.encoded(hero.picture(found)))
+    replace("../README.md", "hero", hero.caption(found))
 
 
 def _lobes():
@@ -181,7 +191,7 @@ def _measurements():
     """Measure all errors and times in the documents again, for a quarter of an hour."""
     import measured  # next to this script
 
-    for measure in (measured.baselines, measured.fits, measured.findings, measured.picture):
+    for measure in (measured.baselines, measured.fits, measured.findings):
         measure()
     replace("../README.md", "cost", measured.prices())
     replace("plans.md", "gains", measured.gains())
@@ -267,12 +277,18 @@ def _renderers():
 
 
 def _notebook():
-    """Execute the tutorial; keep the output of its cells, but not their times."""
+    """Execute the tutorial; keep the output of its cells, but not their times.
+
+    Of a comparison only the picture is kept: hosts of code do not show frames.
+    """
     path = DOCS / "tutorial.ipynb"
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
+        for output in cell.get("outputs", ()):
+            if "image/png" in output.get("data", ()):
+                output.data.pop("text/html", None)
     atomic.write(path, nbformat.writes(notebook) + "\n")
 
 

@@ -12,26 +12,20 @@ from pathlib import Path
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
-from PIL import Image
 
 from comparisons import atomic
 from comparisons.case import Request, open_case
-from comparisons.compare import compare
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Measured
-from comparisons.departure.metrics import LEADING
 from comparisons.verification import Factor, verify
 from reports.charts import vega
 from reports.charts.error_over_time import error_over_time
-from reports.files import images
 from reports.terminal.tables import markdown
 from tests.benchmarks import kernel, lights
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-COST_SCENE, PICTURED = "cornell-box", "plastic-spheres"
-GAP = 8
-"""White pixels between the panels of the picture."""
+COST_SCENE = "cornell-box"
 ROUNDS = 30
 VERIFIED = ("fig-8-9", "fig-6-10", "cornell-box", "plastic-spheres", "narrow-band-lamp")
 CHAPTER_8 = (
@@ -143,18 +137,6 @@ def speed() -> Iterator[str]:
         f" point; eight unrolled lights take {unrolled:.2f} ns. Compile time stays under"
         f" {max(row['compile_s'] for row in many):.1g} s."
     )
-
-
-def picture() -> None:
-    """Draw both halves of a scene and ΔE2000, for the top of the README."""
-    case = open_case(PICTURED, Request(resolution=(512, 300), spp=1024))
-    found = compare(case.source, case.options).images
-    error = images.error_map(found.maps[LEADING.name], LEADING.map_range[1])
-    panels = (images.tonemap(found.heuristic), images.tonemap(found.reference), error)
-    panels = [np.array(panel.convert("RGB")) for panel in panels]
-    gap = np.full((len(panels[0]), GAP, 3), 255, np.uint8)
-    joined = np.hstack([panels[0], gap, panels[1], gap, panels[2]])
-    atomic.write(DOCS / "plastic-spheres.png", images.png(Image.fromarray(joined)))
 
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:

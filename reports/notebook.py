@@ -9,7 +9,7 @@
 
 import heuristic  # noqa: F401  isort: skip  finds LLVM before Mitsuba is imported
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,12 +22,15 @@ from comparisons.case import Request, Scene, open_case
 from comparisons.record import Comparison
 from comparisons.terms.term_grid import PixelTerms
 from heuristic.errors import InputError
-from reports.charts import term_figure
+from reports.charts import figures, term_figure
 from reports.page import page
 from reports.run import output
 
-HEIGHT = 720
-"""Height of the frame in pixels; longer pages scroll."""
+HEIGHT = 900
+"""Height of the frame in pixels: the viewer with its controls fits a wide notebook."""
+
+DENSITY = 130
+"""Dots per inch of the picture for notebooks that cannot show the frame."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class Shown:
     `comparison` has the record, ``comparison.record``, and the images, ``comparison.images``.
     """
 
-    comparison: Comparison
-    page: str
+    comparison: Comparison = field(repr=False)
+    page: str = field(repr=False)
 
     def _repr_html_(self) -> str:
         """Show the page in a frame, which isolates its styles and scripts."""
@@ -46,6 +49,10 @@ class Shown:
             f'<iframe sandbox="allow-scripts" style="width: 100%; height: {HEIGHT}px; border: 0"'
             f' title="Comparison" srcdoc="{escape(self.page)}"></iframe>'
         )
+
+    def _repr_png_(self) -> bytes:
+        """Show both halves and the map of the error where scripts do not run."""
+        return figures.drawn(figures.strip(self.comparison), "png", DENSITY)
 
     def at(self, x: int, y: int) -> "ShownTerms":
         """Return the terms of equation 8.10 at a pixel, or at the nearest one that has them.

@@ -116,7 +116,9 @@ def test_the_notebook_runs():
 
 def test_the_notebook_is_kept_with_its_pictures_and_small():
     path = ROOT / "docs/tutorial.ipynb"
-    assert path.read_text(encoding="utf-8").count('"image/png"') == 2
+    text = path.read_text(encoding="utf-8")
+    assert text.count('"image/png"') == 2
+    assert '"text/html"' not in text
     assert path.stat().st_size < 400_000
 
 

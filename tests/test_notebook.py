@@ -1,9 +1,12 @@
 """A comparison in a notebook."""
 
+from base64 import b64decode
 from html.parser import HTMLParser
+from io import BytesIO
 
 import nbformat
 from nbclient import NotebookClient
+from PIL import Image
 
 from tests.programs import ROOT
 
@@ -23,6 +26,9 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     NotebookClient(notebook, timeout=120, resources={"metadata": {"path": tmp_path}}).execute()
     printed, shown = notebook.cells[0].outputs
     assert printed["text"] == "(16, 16)\n"
+    picture = Image.open(BytesIO(b64decode(shown["data"]["image/png"])))
+    assert picture.width > 2 * picture.height
+    assert shown["data"]["text/plain"] == "Shown()"
     tags = []
     parser = HTMLParser()
     parser.handle_starttag = lambda tag, attributes: tags.append((tag, dict(attributes)))

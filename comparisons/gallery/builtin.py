@@ -125,6 +125,8 @@ def _figures() -> Iterator[Scene]:
     whole = {"k_a": 0.3, "k_d": 0.5, "k_s": 0.7}
     for letter, viewer in {"a": VIEWER_A, "b": VIEWER_C, "c": VIEWER_C}.items():
         title = f"Figure 8.8{letter}: ambient, diffuse and specular, n = 3, viewer {viewer}"
+        if viewer == VIEWER_C:
+            title += "; the chapter gives 8.8b and 8.8c the same viewer"
         yield _figure(f"fig-8-8{letter}", title, WHITE_LIGHT, viewer, **whole, n=3)
     title = "Figure 8.9: as 8.8c with a sharper highlight, n = 9"
     yield _figure("fig-8-9", title, WHITE_LIGHT, VIEWER_C, **whole, n=9)

@@ -28,11 +28,14 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "website.references",
+    "website.typeset",
 ]
 nitpicky = True
 default_role = "code"
 highlight_language = "text"  # of blocks that name none: commands
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+html_math_renderer = "svg"
 
 add_module_names = False
 python_maximum_signature_line_length = 88

@@ -11,6 +11,8 @@ from website import api_pages, file_pages, notebook_page
 LINK = re.compile(r"\[(?P<text>[^][]*)\]\((?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
 """A link in Markdown."""
 
+PICTURES = (".png", ".svg", ".webp")
+
 ORDER = "docs/README.md"
 """The page that lists the others in reading order, under headings in bold."""
 
@@ -27,7 +29,7 @@ def gather(folder: Path) -> None:
             text += "\n".join(contents())
         write(folder / place(page), text)
     for path in (ROOT / "docs").rglob("*"):
-        if path.suffix in (".png", ".svg"):
+        if path.suffix in PICTURES:
             write(folder / path.relative_to(ROOT), path.read_bytes())
     text, pictures = notebook_page.page(ROOT / "docs/tutorial.ipynb")
     write(folder / "docs/tutorial.md", with_links(text, "docs/tutorial.ipynb", linked))
@@ -66,7 +68,7 @@ def with_links(text: str, page: str, linked: set[str]) -> str:
     def replaced(match: re.Match[str]) -> str:
         words, target, anchor = match["text"], match["target"], match["anchor"] or ""
         path = normpath(f"{dirname(page)}/{target}".lstrip("/"))
-        if "://" in target or path.endswith((".png", ".svg")):
+        if "://" in target or path.endswith(PICTURES):
             return match[0]
         if path.endswith((".md", ".ipynb")):
             return f"[{words}]({place(target)}{anchor})"

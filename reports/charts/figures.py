@@ -107,12 +107,18 @@ def strip(comparison: Comparison) -> Figure:
             axes.imshow(picture.convert("RGB"), interpolation="none", aspect="auto")
             axes.set_title(title, pad=4)
             axes.axis("off")
-        scale = ScalarMappable(Normalize(*metric.map_range), images.ERROR_COLOURS)
-        bar = figure.colorbar(scale, cax=place(TEXT_WIDTH - BAR + GAP, 0.1))
-        bar.set_ticks((0, high / 2, high), labels=("0", f"{high / 2:g}", f"≥ {high:g}"))
-        bar.outline.set_linewidth(0.5)
-        bar.ax.tick_params(width=0.5, length=2)
+        legend(figure, place(TEXT_WIDTH - BAR + GAP, 0.1))
     return figure
+
+
+def legend(figure: Figure, axes: Axes) -> None:
+    """Draw the colour bar of the leading metric's map, with its range, into axes."""
+    low, high = LEADING.map_range
+    scale = ScalarMappable(Normalize(low, high), images.ERROR_COLOURS)
+    bar = figure.colorbar(scale, cax=axes)
+    bar.set_ticks((low, high / 2, high), labels=(f"{low:g}", f"{high / 2:g}", f"≥ {high:g}"))
+    bar.outline.set_linewidth(0.5)
+    bar.ax.tick_params(width=0.5, length=2)
 
 
 def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:

@@ -38,7 +38,9 @@ FORMS = {form.__name__: form for form in (number, difference, parameter, seconds
 TEMPLATES = Path(__file__).parent / "templates"
 
 #: Runs before anything is drawn: content that needs scripts is shown only if they run.
-EARLY = 'document.documentElement.className = "js";'
+#: A page in a notebook's frame begins with the viewer.
+EARLY = """const framed = location.protocol === "about:" ? " framed" : "";
+document.documentElement.className = `js${framed}`;"""
 
 #: Tells the page that the module before it has run; inline modules have no such event.
 LOADED = '\nwindow.dispatchEvent(new Event("vega"));'

@@ -3,7 +3,7 @@
 import pytest
 from msgspec import structs
 
-from reports.notebook import Shown
+from reports.notebook import HEIGHT, Shown
 from reports.page import page
 from reports.run import output
 from tests.browser.conftest import EXACT, exact
@@ -58,3 +58,15 @@ def test_in_a_frame_all_works_and_the_address_of_the_notebook_stays(tab, alone, 
     frame.get_by_role("link", name=EXACT).first.click()
     assert frame.evaluate(SEEN) == "scene"
     assert tab.url == notebook.as_uri()
+
+
+def test_the_viewer_with_its_controls_fits_a_frame(tab, alone, tmp_path):
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(Shown(None, alone)._repr_html_(), encoding="utf-8")
+    tab.set_viewport_size({"width": 960, "height": HEIGHT})
+    tab.goto(notebook.as_uri())
+    frame = tab.frames[1]
+    frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
+    place = "(name) => document.querySelector(name).getBoundingClientRect()"
+    assert frame.evaluate(f"() => ({place})('#viewer canvas').width") > 800
+    assert frame.evaluate(f"() => ({place})('#viewer .more').bottom") <= HEIGHT

@@ -1,0 +1,115 @@
+"""The README's first picture: both halves of a scene, the map of the error, and its causes.
+
+It is drawn from the files and the record of `./run compare SCENE`, so its numbers are the page's.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from PIL import Image
+
+from comparisons.case import Request
+from comparisons.departure.metrics import LEADING
+from reports import verdict
+from reports.charts import figures
+from reports.page.switchboard import webp
+from reports.run import single
+from reports.terminal.printing import number
+
+SCENE = "cornell-box"
+GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"
+"""Colours of the page in light."""
+
+PANELS = {"heuristic": "Textbook shading", "reference": "Path traced", LEADING.name: ""}
+"""Files of a comparison, and their titles; the map's title holds its mean."""
+
+WIDTH, HEIGHT = 9.1, 4.3
+"""Inches; at 100 dots per inch the picture has the size at which the README shows it."""
+
+BAR = 8.21
+"""Inches: the bar of effects is as wide as the panels."""
+
+DENSITY = 160
+"""Dots per inch, for screens of high density."""
+
+
+@dataclass(frozen=True)
+class Hero:
+    """A scene's pictures by file name, and its finding."""
+
+    pictures: dict[str, Image.Image]
+    finding: verdict.Finding
+    command: str
+
+
+def made(request: Request | None = None) -> Hero:
+    """Compare the scene as the command does."""
+    wanted = single.Wanted(request or Request(), with_cost=True)
+    with TemporaryDirectory() as folder:
+        view, _ = single.compare(SCENE, Path(folder), SCENE, wanted, lambda *_: None)
+        files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
+        pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
+    study = view.cost.record if view.cost else None
+    return Hero(pictures, verdict.finding(view.record, study), f"./run compare {SCENE}")
+
+
+def caption(hero: Hero) -> Iterator[str]:
+    """Yield the sentences below the picture, which hold its numbers."""
+    found = hero.finding
+    parts = ", ".join(f"{part.effect} {number(part.size)}" for part in found.parts)
+    share = 100 * found.beyond[verdict.USUAL]
+    yield (
+        f"*`{hero.command}`: the mean departure is {LEADING.label} {number(found.mean)}, and"
+        f" {share:.0f} % of the pixels depart by more than {verdict.USUAL:g}, which shows side by"
+        f" side. The bar splits the mean by the effects that would remove it: {parts}.*"
+    )
+
+
+def picture(hero: Hero) -> Figure:
+    """Return the labelled panels, the legend of the map, and the bar of effects."""
+    titles = {**PANELS, LEADING.name: f"{LEADING.label}, mean {number(hero.finding.mean)}"}
+    with rc_context({"font.size": 12, "text.color": INK, "font.family": "sans-serif"}):
+        figure = Figure(figsize=(WIDTH, HEIGHT), facecolor=GROUND)
+        for column, (name, title) in enumerate(titles.items()):
+            axes = figure.add_axes(_box(0.1 + 2.77 * column, 1.2, 2.67, 2.67))
+            axes.imshow(hero.pictures[name], interpolation="none", aspect="auto")
+            axes.set_title(title, loc="left", pad=6, fontsize=14)
+            axes.axis("off")
+        figures.legend(figure, figure.add_axes(_box(8.39, 1.2, 0.12, 2.67)))
+        _effects(figure, hero.finding)
+    return figure
+
+
+def encoded(figure: Figure) -> bytes:
+    """Return the WebP file of the picture, a sixth of its PNG."""
+    drawn = figures.drawn(figure, "png", DENSITY)
+    return webp(Image.open(BytesIO(drawn)).convert("RGB"))
+
+
+def _effects(figure: Figure, found: verdict.Finding) -> None:
+    """Draw the bar on the scale of the mean, and a label for each effect below it."""
+    axes = figure.add_axes(_box(0.1, 0.16, BAR, 0.92), xlim=(0, BAR), ylim=(0, 0.92))
+    axes.axis("off")
+    axes.text(0, 0.74, "What it lacks", fontsize=14)
+    left = 0.0
+    for part in found.parts:
+        wide = BAR * part.size / found.mean
+        axes.barh(0.47, wide, 0.24, left, color=part.colour, edgecolor=GROUND, linewidth=0.6)
+        left += wide
+    place = 0.0
+    for part in found.parts:
+        axes.barh(0.12, 0.15, 0.15, place, color=part.colour)
+        words = axes.text(place + 0.23, 0.12, f"{part.effect} {number(part.size)}", va="center")
+        box = words.get_window_extent()
+        place = axes.transData.inverted().transform((box.x1, 0))[0] + 0.35
+
+
+def _box(left: float, bottom: float, width: float, height: float) -> tuple[float, ...]:
+    return left / WIDTH, bottom / HEIGHT, width / WIDTH, height / HEIGHT

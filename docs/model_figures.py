@@ -1,0 +1,166 @@
+"""The figures of docs/models.md: its vectors, its lobes as the kernel computes them, and sheets."""
+
+from collections.abc import Sequence
+
+import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+from drjit.auto import Array3f
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Arc
+from numpy.typing import NDArray
+from PIL import Image
+
+from comparisons.departure.metrics import LEADING
+from comparisons.record import Images
+from reports.charts import figures, term_figure
+from reports.charts.term_figure import COLOURS
+from reports.files import images
+
+GROUND, FAINT = "#fcfcfb", "#8a8a8a"
+EXPONENTS = {3: "#b97b00", 9: "#0067a8", 81: "#00795a"}
+"""Colours of lobes by exponent; the figures of chapter 8 have 3 and 9."""
+
+INCIDENCE = 50.0
+"""Degrees between `N` and `L` in the figures."""
+
+ROWS = ("textbook", "physical", LEADING.label)
+STYLE = {"font.size": 11, "axes.titlesize": 11, "mathtext.fontset": "dejavuserif"}
+INCH = 1.92
+
+
+def vectors() -> Figure:
+    """Draw the unit vectors of the model at a point, with the angles between them."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(6, 3.5), facecolor=GROUND)
+        axes = figure.add_axes((0, 0, 1, 1), xlim=(-1.5, 1.5), ylim=(-0.35, 1.4), aspect="equal")
+        axes.axis("off")
+        _surface(axes)
+        angles = {"L": -INCIDENCE, "H": -12.5, "N": 0.0, "V": 25.0, "R": INCIDENCE}
+        for letter, angle in angles.items():
+            _arrow(axes, letter, angle)
+        for low, high, radius, words in (
+            (-INCIDENCE, 0.0, 0.5, "θ"), (0.0, INCIDENCE, 0.5, "θ"), (25.0, INCIDENCE, 0.72, "α"),
+        ):  # fmt: skip
+            axes.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=90 - high, theta2=90 - low,
+                               color=FAINT))  # fmt: skip
+            x, y = _at(low + 0.3 * (high - low), radius + 0.08)  # clear of V
+            axes.text(x, y, words, ha="center", va="center", style="italic", family="serif")
+        axes.text(-1.3, -0.3, "cos θ = N·L     cos α = R·V     H halves the angle of L and V")
+    return figure
+
+
+def lobes() -> Figure:
+    """Draw the value seen from each direction: Lambert's, Phong's, and Blinn's lobes."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(9, 2.4), facecolor=GROUND)
+        figure.subplots_adjust(0, 0, 1, 0.9, wspace=0.02)
+        diffuse, phong, blinn = figure.subplots(1, 3)
+        _panel(diffuse, "diffuse, $k_d\\,(N·L)$")
+        for incidence, colour in ((0.0, "#b0426f"), (INCIDENCE, COLOURS["R"])):
+            label = f"N·L = {np.cos(np.radians(incidence)):.2f}"
+            _lobe(diffuse, seen(incidence, k_d=1.0), colour, label)
+            _arrow(diffuse, "L", -incidence)
+        for axes, form, title in (
+            (phong, "phong", "Phong, $k_s\\,(R·V)^n$"), (blinn, "blinn", "Blinn, $k_s\\,(N·H)^n$"),
+        ):  # fmt: skip
+            _panel(axes, title)
+            _arrow(axes, "L", -INCIDENCE)
+            _arrow(axes, "R", INCIDENCE)
+            for n, colour in EXPONENTS.items():
+                _lobe(axes, seen(INCIDENCE, k_s=1.0, n=n, form=form), colour, f"n = {n}")
+        for axes in (diffuse, phong, blinn):
+            axes.legend(loc="lower center", ncols=3, frameon=False, fontsize=9,
+                        handlelength=1.2, columnspacing=1)  # fmt: skip
+    return figure
+
+
+def seen(incidence: float, **material: float | str) -> NDArray[np.float64]:
+    """Return the kernel's value at each of :data:`reports.charts.term_figure.VIEWS`.
+
+    ``incidence`` is in degrees; the light has intensity 1.
+    """
+    view = Array3f(*(np.float32(part) for part in _at(term_figure.VIEWS)), 0)
+    toward = _at(-incidence)
+    light = heuristic.DirectionalLight(direction=(-toward[0], -toward[1], 0), intensity=1.0)
+    made = heuristic.Material(**material)
+    value = heuristic.shade(Array3f(0), Array3f(0, 1, 0), view, made, [light])
+    return np.broadcast_to(np.array(value, np.float64), term_figure.VIEWS.shape)
+
+
+def compared(titles: Sequence[str], found: Sequence[Images]) -> Figure:
+    """Draw three rows of pictures: heuristic, reference, and their difference with its legend."""
+    top = LEADING.map_range[1]
+    rows = [
+        [images.tonemap(one.heuristic) for one in found],
+        [images.tonemap(one.reference) for one in found],
+        [images.error_map(one.maps[LEADING.name], top).convert("RGB") for one in found],
+    ]
+    return sheet(titles, rows, ROWS)
+
+
+def sheet(
+    titles: Sequence[str], rows: Sequence[Sequence[Image.Image]], labels: Sequence[str] = ()
+) -> Figure:
+    """Draw rows of pictures, a title above each column and a label before each row.
+
+    With labels, the last row is a map of errors, and has its legend.
+    """
+    left, right = (0.3, 0.62) if labels else (0.0, 0.0)
+    width, height = len(titles) * INCH + left + right, len(rows) * INCH + 0.3
+    with rc_context(STYLE):
+        figure = Figure(figsize=(width, height), facecolor=GROUND)
+        grid = figure.subplots(len(rows), len(titles), squeeze=False)
+        figure.subplots_adjust(
+            left / width, 0, 1 - right / width, 1 - 0.3 / height, wspace=0.03, hspace=0.03
+        )
+        for line, pictures in zip(grid, rows, strict=True):
+            for axes, picture in zip(line, pictures, strict=True):
+                axes.imshow(picture, interpolation="none")
+                axes.axis("off")
+        for axes, title in zip(grid[0], titles, strict=True):
+            axes.set_title(title, pad=4)
+        for axes, label in zip(grid[:, 0], labels, strict=bool(labels)):
+            axes.text(-0.03, 0.5, label, rotation=90, ha="right", va="center",
+                      transform=axes.transAxes)  # fmt: skip
+        if labels:
+            _legend(figure, width, height)
+    return figure
+
+
+def _legend(figure: Figure, width: float, height: float) -> None:
+    axes = figure.add_axes(((width - 0.56) / width, 0.02, 0.1 / width, INCH / height - 0.04))
+    figures.legend(figure, axes)
+
+
+def _panel(axes: Axes, title: str) -> None:
+    axes.set(xlim=(-1.25, 1.25), ylim=(-0.4, 1.2), aspect="equal", title=title)
+    axes.axis("off")
+    axes.plot((-1.1, 1.1), (0, 0), color=FAINT, linewidth=1)
+
+
+def _surface(axes: Axes) -> None:
+    across = np.linspace(-1.3, 1.3, 60)
+    down = -0.09 * across**2
+    axes.fill_between(across, down, -0.16, color="#f3f4f5")
+    axes.plot(across, down, color="#585f67", linewidth=1)
+
+
+def _lobe(axes: Axes, radius: NDArray[np.float64], colour: str, label: str) -> None:
+    x, y = _at(term_figure.VIEWS, radius)
+    axes.fill(x, y, facecolor=colour + "22", edgecolor=colour, linewidth=1.4, label=label)
+
+
+def _arrow(axes: Axes, letter: str, angle: float) -> None:
+    colour = COLOURS.get(letter, "#6b4ea0")
+    style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", _at(angle), (0, 0), arrowprops=style)
+    axes.text(*_at(angle, 1.1), letter, color=colour, ha="center", va="center", size=15,
+              style="italic", family="serif")  # fmt: skip
+
+
+def _at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):
+    """Return x and y of an angle from the normal, in degrees to the right."""
+    return radius * np.sin(np.radians(angle)), radius * np.cos(np.radians(angle))
