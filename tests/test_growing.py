@@ -114,7 +114,7 @@ def test_a_page_in_the_making_says_so(tmp_path):
     page.write(making=page.making(is_interrupted=True))
     text = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Interrupted: 1 of 2 scenes are refined" in text
-    assert "reload" not in text[: text.index("<main>")]
+    assert "reload" not in text[: text.index("<main")]
 
 
 def test_the_page_is_written_at_intervals_and_a_full_disk_ends_no_run(monkeypatch, tmp_path):
