@@ -16,7 +16,7 @@ from reports.charts import theme, vega
 from reports.files import images, ownership
 from reports.page import switchboard
 from reports.page.costs import point_pictures
-from reports.page.embedding import ERROR_DIGITS, embed_colours
+from reports.page.embedding import embed_colours
 from reports.page.scene_view import CostView, EffectMap, picture_name
 from reports.run.places import PAGE
 from reports.terminal.cost_tables import closure, noise
@@ -31,6 +31,9 @@ DIGITS = "0123456789"
 NO_EFFECT, UNCOUNTED = ".", "-"
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
+
+SHARE_DIGITS = 2
+"""Significant digits of the share of light from between surfaces."""
 
 
 def documents(study: Study) -> dict[str, bytes]:
@@ -110,7 +113,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             ]
         ),
         points=point_pictures.sheet(study),
-        between=embed_colours(_between_surfaces(study), ERROR_DIGITS),
+        between=embed_colours(_between_surfaces(study), SHARE_DIGITS),
     )
 
 
