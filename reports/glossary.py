@@ -37,7 +37,8 @@ RESULTS: Terms = {
         "The range that holds the true value in 95 of 100 such measurements."
     ),
     ("standard error",): (
-        "How far the mean of the samples is likely to be from the true value, because of noise."
+        "How far the mean of the samples is likely to be from the true value, because of noise. At"
+        " a pixel it is the mean over a square of 2 by 2."
     ),
     ("RMS", "root mean square"): "The square root of the mean of the squares.",
     ("of the departure",): "Its part of the sum of ΔE2000 over all pixels.",

@@ -1,9 +1,9 @@
 """A comparison's images inside the page, as numbers: exact to the digits that the page prints.
 
-Every value is rounded to three significant decimal digits, the standard error to one, as is usual,
-and stored as a 16-bit code. So the page prints the EXR's own value, rounded once; half floats would
-take more bits and sometimes print another last digit. Steps between codes are at most 1 %, near
-white one 8-bit level.
+Every value is rounded to three significant decimal digits, metrics other than the leading one to
+two and the standard error to one, and stored as a 16-bit code. So the page prints the EXR's own
+value, rounded once; half floats would take more bits and sometimes print another last digit. With
+three digits, steps between codes are at most 1 %, near white one 8-bit level.
 
 A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
 to the left neighbour, and split into low and high bytes; all planes are deflated together.
@@ -22,11 +22,12 @@ from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import marks
-from comparisons.departure.metrics import drawn
+from comparisons.departure.metrics import LEADING, drawn
 from comparisons.records import Record, plain
 
-#: Significant digits of values, and of the standard error.
-DIGITS, ERROR_DIGITS = 3, 1
+#: Significant digits of values and of the leading metric, of the other metrics, and of the standard
+#: error, which is averaged over squares of `POOLED` by `POOLED` pixels.
+DIGITS, OTHER_DIGITS, ERROR_DIGITS, POOLED = 3, 2, 1, 2
 
 #: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
 EXPONENTS = (-18, 16)
@@ -106,9 +107,9 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
         values = _means(channels[f"{name}.Y"], block)
         if metric.map_range[1] >= 1.0:  # the rounding of exact pairs would fill most of a page
             values = np.where((values > 0.0) & (values < LEAST), LEAST / 2, values)
-        add(name, values, DIGITS)
+        add(name, values, DIGITS if name == LEADING.name else OTHER_DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
-    add("standard_error", np.max(deviations, axis=0), ERROR_DIGITS)
+    add("standard_error", _pooled(np.max(deviations, axis=0)), ERROR_DIGITS)
     marked = np.asarray(channels["significant.Y"], np.float64)
     significant = _means(marked == marks.MARKED, block) > 0.0
     undetermined = (_means(marked == marks.UNDETERMINED, block) > 0.0) & ~significant
@@ -118,6 +119,13 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
 
     height, width = flags.shape
     return Embedded(width, height, block, tuple(planes), packed(planes, codes))
+
+
+def _pooled(values: NDArray) -> NDArray:
+    """Return the means over squares, at all their pixels, (H, W)."""
+    height, width = values.shape
+    means = _means(values, POOLED)
+    return means.repeat(POOLED, axis=0).repeat(POOLED, axis=1)[:height, :width]
 
 
 def embed_colours(image: NDArray, digits: int) -> Embedded:

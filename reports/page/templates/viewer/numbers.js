@@ -18,8 +18,18 @@ function decimal(code, digits) {
   return Number(`${code & NEGATIVE ? "-" : ""}${mantissa}e${exponent}`);
 }
 
-/** The values of all codes of three digits, looked up in painting images. */
-const VALUES = Float64Array.from({ length: 65536 }, (_, code) => decimal(code, 3));
+/** Tables of values by digits, made when first needed. @type {Map<number, Float64Array>} */
+const TABLES = new Map();
+
+/** The values of all codes of some digits, looked up in painting images. @param {number} digits */
+function valuesOf(digits) {
+  const table = TABLES.get(digits) ?? Float64Array.from({ length: 65536 }, (_, code) => decimal(code, digits));
+  TABLES.set(digits, table);
+  return table;
+}
+
+/** The values of an image's codes. */
+const VALUES = valuesOf(3);
 
 /**
  * A value with `digits` significant digits, in human form.

@@ -3,7 +3,7 @@
 /**
  * @typedef {{name: string, title: string, kind: string, top: number}} Legend of a map
  * @typedef {{factor: number, mean: number, after: number}} Exposure
- * @typedef {{x: number, y: number, width: number, height: number, share: number, mean_dE2000: number, effect: string | null}} Region
+ * @typedef {{x: number, y: number, width: number, height: number, share: number, mean_dE2000: number, effect: string | null, nearest: object | null}} Region
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number, form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[]}} Lamp
  */

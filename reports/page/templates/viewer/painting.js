@@ -59,8 +59,9 @@ class Painter {
   values(name) {
     let values = this.numbers.get(name);
     if (!values) {
-      const codes = this.images.codes[name];
-      values = codes ? Float64Array.from(codes, (code) => VALUES[code]) : Float64Array.from(this.images.codes.flags, (_, place) => this.ratio(place));
+      const plane = this.images.planes.find((one) => one.name === name);
+      const table = valuesOf(plane?.digits ?? 3);
+      values = plane ? Float64Array.from(this.images.codes[name], (code) => table[code]) : Float64Array.from(this.images.codes.flags, (_, place) => this.ratio(place));
       this.numbers.set(name, values);
     }
     return values;
@@ -118,9 +119,8 @@ class Painter {
 
   /** @param {Uint32Array} pixels @param {string} metric @param {number} top the end of its range */
   paintError(pixels, metric, top) {
-    const colour = Uint32Array.from(VALUES, (value) => this.tables.error[clamp(Math.floor((256 * value) / top), 0, 255)]);
-    const codes = this.images.codes[metric];
-    for (let i = 0; i < pixels.length; i++) pixels[i] = colour[codes[i]];
+    const values = this.values(metric);
+    for (let i = 0; i < pixels.length; i++) pixels[i] = this.tables.error[clamp(Math.floor((256 * values[i]) / top), 0, 255)];
   }
 
   /** @param {Uint32Array} pixels @param {string} name @param {number} range half of it, in stops */
