@@ -85,7 +85,7 @@ QUICK = Effort(
 renderings are few, with many samples each."""
 
 COARSE = replace(QUICK, depths=(), orders=4, stand_ins=False)
-"""For a report within a minute: fewer methods, since each is traced anew."""
+"""For a report within a minute: fewer methods, since each is traced again."""
 
 QUICK_WIDTH = 48
 

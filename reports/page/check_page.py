@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from comparisons.check.measurement import HALVES
 from comparisons.check.moved import Move
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
@@ -17,10 +15,9 @@ from reports.ci import lines
 from reports.ci.check_pictures import LARGEST_ERROR
 from reports.ci.checks import Result
 from reports.files import ownership
+from reports.page import templates
 from reports.run.places import PAGE
 from reports.terminal.printing import percent
-
-TEMPLATES = Path(__file__).parent / "templates"
 
 SHOWN = 12
 """Greatest number of rows in a scene's tables of quantities and of objects."""
@@ -47,13 +44,7 @@ def render(results: Sequence[Result], level: float) -> str:
     level
         Significance of the whole command.
     """
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
+    environment = templates()
     environment.filters["percent"] = percent
     failed = [result for result in results if result.status == "failed"]
     return environment.get_template("check.html.j2").render(

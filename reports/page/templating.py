@@ -7,15 +7,14 @@ import hashlib
 import math
 from collections.abc import Iterable
 from functools import lru_cache
-from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from comparisons.records import plain
 from reports.charts import theme, vega
 from reports.files import images
-from reports.page import embedding, switchboard, viewer_data
+from reports.page import TEMPLATES, embedding, switchboard, templates, viewer_data
 from reports.terminal.nearest_lines import caution, lacking
 from reports.terminal.printing import (
     NOTICEABLE,
@@ -34,8 +33,6 @@ PIXELATED_BELOW = 400
 
 #: How values are printed, by the names of forms.
 FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
-
-TEMPLATES = Path(__file__).parent / "templates"
 
 #: Runs before anything is drawn: content that needs scripts is shown only if they run.
 #: A page in a notebook's frame begins with the viewer.
@@ -81,13 +78,7 @@ def _source(name: str) -> str:
 @lru_cache(maxsize=1)
 def environment() -> Environment:
     """Return the environment of the report's templates, which escapes everything."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
+    environment = templates()
     environment.filters.update(
         FORMS,
         code_spans=code_spans,

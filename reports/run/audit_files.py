@@ -3,14 +3,12 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from comparisons import records
 from comparisons.audit.audit_record import Audit
 from reports.charts import audit_charts, vega
 from reports.charts.theme import Spec
 from reports.files import ownership
-from reports.page.check_page import TEMPLATES
+from reports.page import templates
 from reports.run.places import PAGE
 from reports.terminal import audit_words
 from reports.terminal.printing import number
@@ -29,13 +27,7 @@ def write(place: Path, record: Audit) -> None:
 
 def render(record: Audit) -> str:
     """Return the page of an audit: one file, without scripts."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
+    environment = templates()
     environment.filters.update(number=number, found=audit_words.found)
     return environment.get_template("audit.html.j2").render(
         record=record,
