@@ -45,7 +45,7 @@ def audits() -> dict[str, Audit]:
 
 
 def engines() -> dict[str, Audit]:
-    """Return the audits of :data:`ENGINES`, by name."""
+    """Return the audits of :data:`ENGINES` by their names."""
     return {name: audit("heuristic", str(SHADERS / file), {}) for name, file in ENGINES.items()}
 
 

@@ -110,7 +110,7 @@ def made(
 
 
 def store(mesh: Mesh, attributes: Mapping[str, Vector]) -> None:
-    """Write attributes of three components per vertex or face, by name; new ones are added."""
+    """Write attributes of three components per vertex or face; new names are added."""
     for name, values in attributes.items():
         if not mesh.has_attribute(name):
             # Zeros, because this copies one by one; all, because Mitsuba does not check the length.

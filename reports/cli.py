@@ -25,7 +25,7 @@ from reports.commands.completion import VARIABLE
 
 
 class Commands(Mapping[str, click.Command]):
-    """The commands by name: one per module of `reports.commands`, imported on demand."""
+    """The commands by their names: one per module of `reports.commands`, imported on demand."""
 
     def __getitem__(self, name: str) -> click.Command:
         if name not in set(self):

@@ -43,7 +43,7 @@ DISTANCES = (0.0, 1e-30, 1e-6, 1e6, 1e15, 1e30)
 
 
 def white(form: str) -> dict[str, dict[str, float]]:
-    """Return the white materials matte, glossy and metal, by name, as pairing makes them.
+    """Return the white materials matte, glossy and metal by their names, as pairing makes them.
 
     Glossy ones are the counterparts of white rough plastic. A metal's lobe returns all light at
     normal incidence.

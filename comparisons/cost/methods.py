@@ -123,8 +123,9 @@ class Methods:
         with variant(self.heuristic_variant):
             for rung in rungs():
                 name = getattr(rung.method, "heuristic", "")
-                refuse = named(name).refuse if name else None
-                refused[name] = refuse(self.ready.heuristic.scene) if refuse else ""
                 if name and not self._stand_ins:
                     refused[name] = "A quick report does not measure it."
+                    continue
+                refuse = named(name).refuse if name else None
+                refused[name] = refuse(self.ready.heuristic.scene) if refuse else ""
         return refused

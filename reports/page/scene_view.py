@@ -31,7 +31,7 @@ class EffectMap(Record):
 class CostView(Record):
     """A page's data of a study.
 
-    ``images`` are PNG files by name without suffix; ``sheet`` has the corners of the lattice,
+    ``images`` are PNG files by their bare names; ``sheet`` has the corners of the lattice,
     ``points`` the measured points and then the reference. ``between`` is the part of the
     reference's light that comes from between surfaces, from 0 to 1.
     """
