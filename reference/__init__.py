@@ -3,7 +3,9 @@
 import mitsuba as mi
 
 import heuristic  # noqa: F401  it finds LLVM, before anything compiles
+from reference import switching
 
+switching.keep_transformations()
 if mi.variant() is None:
     mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen
 

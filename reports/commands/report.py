@@ -87,8 +87,9 @@ def _verified(names: Sequence[str], request: Request, quick: bool) -> batch.More
     size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
     small = replace(request, resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
-    verified = [
-        Task(name, tasks.timed, (tasks.verified, name, small, level, not quick)) for name in names
+    verified = [  # the last scenes trace paths, which take longest
+        Task(name, tasks.timed, (tasks.verified, name, small, level, False))
+        for name in reversed(names)
     ]
     cases = Task(HARD, tasks.timed, (tasks.hard_cases,))
     shown = partial(_shown, names)
