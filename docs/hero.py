@@ -19,7 +19,7 @@ from comparisons.case import Request
 from comparisons.departure.metrics import LEADING
 from reports import verdict
 from reports.charts import figures
-from reports.page.switchboard import webp
+from reports.files.sheets import webp
 from reports.run import single
 from reports.terminal.printing import number
 

@@ -3,9 +3,8 @@
 import mitsuba as mi
 
 import heuristic  # noqa: F401  it finds LLVM, before anything compiles
-from reference import switching
+from reference import switching  # noqa: F401  before a variant is chosen
 
-switching.keep_transformations()
 if mi.variant() is None:
     mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen
 

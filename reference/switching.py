@@ -1,8 +1,7 @@
 """Faster switching of Mitsuba's variants.
 
 With each switch, Mitsuba loads its Python integrators again, and Dr.Jit transforms the syntax of
-the same functions again: 0.1 s, where two passes of a mixed comparison take as long. The same code
-has the same transformation.
+the same functions again: 0.1 s, as long as a pass. The same code has the same transformation.
 """
 
 from collections.abc import Callable
@@ -29,6 +28,4 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
     return made
 
 
-def keep_transformations() -> None:
-    """Let modules that are loaded from now on use :func:`syntax`."""
-    drjit.syntax = syntax
+drjit.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded

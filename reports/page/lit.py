@@ -14,7 +14,7 @@ from PIL import Image
 from comparisons.record import Images
 from comparisons.records import Record, plain
 from reports.files.images import THUMBNAIL, tonemap
-from reports.page.switchboard import webp, webp_uri
+from reports.files.sheets import webp, webp_uri
 
 #: The place of pixels without a shape.
 NOTHING = 255

@@ -11,10 +11,10 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
+from reports.files.sheets import Sheet
 from reports.page import switchboard
 from reports.page.embedding import Embedded
 from reports.page.lit import Lit
-from reports.page.switchboard import Sheet
 from reports.page.terms_view import TermsView
 
 

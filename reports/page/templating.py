@@ -13,8 +13,8 @@ from markupsafe import Markup
 
 from comparisons.records import plain
 from reports.charts import theme, vega
-from reports.files import images
-from reports.page import TEMPLATES, embedding, switchboard, templates, viewer_data
+from reports.files import images, sheets
+from reports.page import TEMPLATES, embedding, templates, viewer_data
 from reports.terminal.nearest_lines import caution, lacking
 from reports.terminal.printing import (
     NOTICEABLE,
@@ -87,8 +87,8 @@ def environment() -> Environment:
         lacking=lacking,
         caution=caution,
         uri=_data_uri,
-        webp_uri=switchboard.webp_uri,
-        webp_of=switchboard.webp_of,
+        webp_uri=sheets.webp_uri,
+        webp_of=sheets.webp_of,
         deflated=lambda code: embedding.deflated(code.encode(), 9),
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from comparisons import records
 from comparisons.effects.dominance import dominating
 from reports.charts import theme, vega
-from reports.files import images, ownership
-from reports.page import switchboard
+from reports.files import images, ownership, sheets
 from reports.page.costs import point_pictures
 from reports.page.embedding import embed_colours
 from reports.page.scene_view import CostView, EffectMap, picture_name
@@ -106,7 +105,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
         },
         noise=" ".join(_typeset(each(study.record)) for each in (noise, closure) if study.effects),
         effects=_effect_map(study),
-        sheet=switchboard.sheet(
+        sheet=sheets.sheet(
             [
                 images.tonemap(study.previews[corner.effects], study.record.viewing.exposure)
                 for corner in study.record.prices.corners

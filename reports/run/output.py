@@ -15,8 +15,8 @@ from comparisons.departure.metrics import drawn
 from comparisons.record import Comparison, Images
 from comparisons.records import to_json
 from heuristic.errors import OutputError
-from reports.files import exr, holding, images, ownership
-from reports.page import embedding, page, switchboard, terms_view
+from reports.files import exr, holding, images, ownership, sheets
+from reports.page import embedding, page, terms_view
 from reports.page.lit import lit
 from reports.page.scene_view import SceneView
 from reports.run import finished
@@ -159,7 +159,7 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     return SceneView(
         record=comparison.record,
         thumbnails={
-            name: switchboard.webp_of(png)
+            name: sheets.webp_of(png)
             for name, png in images.thumbnails(shown, comparison.record.viewing.exposure).items()
         },
         embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
+from reports.files import sheets
 from reports.files.images import tonemap
-from reports.page import switchboard
-from reports.page.switchboard import Sheet
+from reports.files.sheets import Sheet
 from reports.terminal.printing import difference, parameter, seconds
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def sheet(study: Study) -> Sheet | None:
     exposure = study.record.viewing.exposure
     points = ((point.rung, point.spp) for point in study.record.points)
     images = [*(study.points[key] for key in points), study.reference]
-    return switchboard.sheet([_small(image, exposure) for image in images])
+    return sheets.sheet([_small(image, exposure) for image in images])
 
 
 def data(record: Cost, shown: Sheet) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def data(record: Cost, shown: Sheet) -> dict[str, Any]:
         }
         for point in record.points
     ]
-    return switchboard.placed(shown) | {"points": points}
+    return sheets.placed(shown) | {"points": points}
 
 
 def _small(image: np.ndarray, exposure: float) -> Image.Image:
