@@ -1,6 +1,6 @@
 """The content of docs/accuracy.md: studies of cost over many scenes, and their common findings.
 
-``./run docs --accuracy`` measures for twenty minutes on an idle machine, and writes the page.
+``./run docs --accuracy`` measures for 40 minutes on an idle machine, and writes the page.
 """
 
 from collections import Counter
@@ -25,16 +25,19 @@ LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
 WIDTH = 256
 TOLERANCES = ERRORS[:3]
 
+AT_FULL_SIZE = "cornell-box", "plastic-spheres", str(LARGER[0].with_stem("outdoors"))
+FULL_SIZE, FEW_ROUNDS = 512, 3
+
 
 def measured(
     names: Sequence[str] = (*SCENES, *map(str, LARGER)),
-    width: int = WIDTH,
+    size: tuple[int, int] = (WIDTH, 3 * WIDTH // 4),
     effort: Effort | None = None,
 ) -> list[Cost]:
     """Study what accuracy costs on each scene, in turn."""
     found = []
     for name in names:
-        case = open_case(name, Request(resolution=(width, 3 * width // 4)))
+        case = open_case(name, Request(resolution=size))
         found.append(cost(case.source, case.options, effort).record)
         print(name, flush=True)
     return found
@@ -48,6 +51,27 @@ def setting(records: Sequence[Cost]) -> Iterator[str]:
         f"{len(records)} scenes at {width} by {height} pixels, {first.rounds} rounds, on"
         f" {first.machine.cores} cores of {first.machine.processor}."
     )
+
+
+def at_full_size() -> list[Cost]:
+    """Study three scenes at the size at which people render."""
+    return measured(AT_FULL_SIZE, (FULL_SIZE, FULL_SIZE), Effort(rounds=FEW_ROUNDS))
+
+
+def fronts(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield the Pareto front of each study, from the fastest method to the most accurate."""
+    first = records[0]
+    width, height = first.resolution
+    yield f"At {width} by {height} pixels, {first.rounds} rounds."
+    yield ""
+    rows = [
+        (record.scene, point.rung, str(point.spp), _time(point), number(point.error))
+        for record in records
+        for point in sorted(record.points, key=lambda point: point.seconds.median)
+        if point.pareto
+    ]
+    head = "Scene", "Method", "Samples per pixel", "Time", "Mean ΔE2000"
+    yield from markdown([head, *rows], right=2)
 
 
 def predictions() -> Iterator[str]:
@@ -174,9 +198,12 @@ def _family(record, name):
 
 
 def _cell(point):
+    return f"{number(point.error)} in {_time(point)}"
+
+
+def _time(point):
     time = point.seconds
-    interval = f"{seconds(time.low)} to {seconds(time.high)}"
-    return f"{number(point.error)} in {seconds(time.median)} ({interval})"
+    return f"{seconds(time.median)} ({seconds(time.low)} to {seconds(time.high)})"
 
 
 def _named(point):

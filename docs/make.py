@@ -199,12 +199,13 @@ def _measurements():
 
 
 def _accuracy():
-    """Study what accuracy costs over many scenes, for twenty minutes on an idle machine."""
+    """Study what accuracy costs over many scenes, for 40 minutes on an idle machine."""
     import accuracy  # next to this script
 
     records = accuracy.measured()
     for part in ("setting", "findings", "methods", "prices", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))
+    replace("accuracy.md", "fronts", accuracy.fronts(accuracy.at_full_size()))
     replace("accuracy.md", "predictions", accuracy.predictions())
     for record, path in accuracy.charts(records):
         atomic.write(DOCS / path, vega.paper(error_over_time(record)))
