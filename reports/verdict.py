@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
@@ -36,6 +37,38 @@ WITH_CAUSES = "--why"
 
 NAMED = 3
 """Number of effects that the sentence names."""
+
+TEXTBOOK = ("phong", "blinn")
+"""The heuristics of the chapters."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The names of a first half.
+
+    Attributes
+    ----------
+    subject
+        The first words of a sentence, such as "Textbook shading".
+    title
+        Of a row or column, such as "Textbook".
+    name
+        Within a sentence, such as "textbook".
+    """
+
+    subject: str
+    title: str
+    name: str
+
+
+def judged(record: ComparisonRecord) -> Judged:
+    """Return the names of a comparison's first half; a shader in a file is called as its file."""
+    if record.picture:
+        return Judged("The picture", "Picture", "picture")
+    if record.heuristic in TEXTBOOK:
+        return Judged("Textbook shading", "Textbook", "textbook")
+    name = Path(record.heuristic).name
+    return Judged(name, name, name)
 
 
 @dataclass(frozen=True)
@@ -106,7 +139,7 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
         parts=_parts(metric.mean, cost) if cost else (),
         remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
         is_exact=metric.high <= EXACT,
-        subject="The picture" if picture else "Textbook shading",
+        subject=judged(record).subject,
         nearest=picture.nearest if picture else None,
     )
 
@@ -141,7 +174,9 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
             else f"{only.subject} is visibly wrong in {100 * share:.0f} % of {only.scene}."
         ]
     else:
-        said = [f"Textbook shading looks right in {right} of {len(findings)} scenes."]
+        subjects = {found.subject for found in findings}
+        subject = subjects.pop() if len(subjects) == 1 else "The first half"
+        said = [f"{subject} looks right in {right} of {len(findings)} scenes."]
     lacking = ranked([found for found in findings if not found.is_right(tolerance)])
     if lacking:
         first, *others = lacking[:NAMED]

@@ -4,6 +4,8 @@ import pytest
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING
+from heuristic.heuristics import HEURISTICS
+from heuristic.points import Point
 from reports import verdict
 from tests import cost_records, records
 
@@ -106,3 +108,23 @@ def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
         assert "Textbook shading " in printed
         assert ("--why" in printed) is not has_causes  # advice to find them
         assert (out / "my-scene/cost.json").exists() is has_causes
+
+
+def test_the_heuristics_called_textbook_are_those_of_the_package_that_shade_as_the_chapters_do():
+    own = [one for one in HEURISTICS.values() if one.is_own]
+    assert set(verdict.TEXTBOOK) == {one.name for one in own if one.shade is Point.textbook}
+
+
+@pytest.mark.parametrize(
+    ("heuristic", "names"),
+    [
+        ("blinn", ("Textbook shading", "Textbook", "textbook")),
+        ("mean-ambient", ("mean-ambient",) * 3),
+        ("shaders/toon.py:shade", ("toon.py:shade",) * 3),
+    ],
+)
+def test_a_shader_is_called_by_its_name_and_not_textbook(heuristic, names):
+    record = structs.replace(records.record(), heuristic=heuristic)
+    found = verdict.judged(record)
+    assert (found.subject, found.title, found.name) == names
+    assert verdict.sentences([verdict.finding(record)])[0].startswith(f"{names[0]} ")

@@ -12,22 +12,21 @@ text.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING, METRICS
 from comparisons.records import plain
-from reports import glossary
+from reports import glossary, verdict
 from reports.charts import histograms, vega
 from reports.page import overview, templating, verdict_view, viewer_data
 from reports.page.legends import legends
 from reports.page.scene_view import Making, SceneView
-from reports.ranking import rankings
 from reports.run.stages import Failure, Run
 
 if TYPE_CHECKING:  # few pages need these
-    from comparisons.cost.cost_record import Cost
     from comparisons.hard.collection import HardCases
     from comparisons.verification import Verification
     from heuristic.equations import Entry
@@ -101,18 +100,22 @@ def render(
             legends=legends(),
             glossary=glossary.GROUPS,
             equations=equations,
-            ranking=rankings([scene.record for scene in scenes]),
             verifications=verifications,
-            **_of_few_pages([scene.cost.record for scene in scenes if scene.cost], hard_cases),
+            **_of_few_pages(scenes, hard_cases),
             run=run,
             making=making,
         )
     )
 
 
-def _of_few_pages(costs: Sequence[Cost], hard_cases: HardCases | None) -> dict[str, Any]:
+def _of_few_pages(scenes: Sequence[Scene], hard_cases: HardCases | None) -> dict[str, Any]:
     """Content of few pages, made by modules that the others do not import."""
-    shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases}
+    costs = [scene.cost.record for scene in scenes if scene.cost]
+    shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases, "ranking": {}}
+    if len(scenes) > 1:
+        from reports.ranking import rankings
+
+        shown["ranking"] = rankings([scene.record for scene in scenes])
     if costs:
         from reports.page.costs import cost_overview
 
@@ -153,6 +156,7 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "width": record.resolution[0],
         "height": record.resolution[1],
         "exposure": record.viewing.exposure,
+        "judged": asdict(verdict.judged(record)),
         "regions": plain(record.regions),
         "best": viewer_data.best_exposures(record.metrics),
         "images": scene.embedded.manifest() if scene.embedded else None,

@@ -12,7 +12,6 @@ from comparisons.cost.cost_record import Cost
 from comparisons.records import Record
 from reports.charts.vega import Figure
 from reports.files.sheets import Sheet
-from reports.page import switchboard
 from reports.page.embedding import Embedded
 from reports.page.lit import Lit
 from reports.page.terms_view import TermsView
@@ -51,6 +50,8 @@ class CostView(Record):
     @property
     def switchboard(self) -> dict[str, Any]:
         """The data of the switchboard's script; empty without a sheet."""
+        from reports.page import switchboard
+
         return switchboard.data(self.record, self.sheet) if self.sheet else {}
 
     @property

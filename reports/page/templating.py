@@ -12,6 +12,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from comparisons.records import plain
+from reports import verdict
 from reports.charts import theme, vega
 from reports.files import images, sheets
 from reports.page import TEMPLATES, embedding, templates, viewer_data
@@ -81,6 +82,7 @@ def environment() -> Environment:
     environment = templates()
     environment.filters.update(
         FORMS,
+        judged=verdict.judged,
         code_spans=code_spans,
         region_view=viewer_data.region_view,
         plain=plain,

@@ -43,7 +43,7 @@ function captionText(viewer) {
   if (isMapped && hasRange(map)) parts.push(`${map.title} from ${low} to ${high}`);
   if (view.mode !== "error") {
     parts.push(`exposure × ${plainly((painter?.exposure ?? 1) * 2 ** view.ev)}`);
-    if (view.best) parts.push(`textbook ${gainText(gainOf(scene, view))}`);
+    if (view.best) parts.push(`${scene.judged.name} ${gainText(gainOf(scene, view))}`);
   }
   return parts.join(" · ");
 }

@@ -52,7 +52,7 @@ class Controls {
   showGain() {
     const { view, scene } = this.viewer;
     const { factor, mean, after } = bestOf(scene, view.map);
-    const text = `Textbook ${gainText(factor)}: mean ${this.viewer.measure().title} ${significant(mean)} → ${significant(after)}`;
+    const text = `${scene.judged.title} ${gainText(factor)}: mean ${this.viewer.measure().title} ${significant(mean)} → ${significant(after)}`;
     /** @type {HTMLElement} */ (this.element.querySelector(".gain")).textContent = view.best && view.mode !== "error" ? text : "";
   }
 

@@ -1,8 +1,5 @@
 // The viewer's canvas: pictures through the viewport, and their overlays.
 
-/** Titles of panes. @type {Record<string, string>} */
-const PANE_TITLES = { heuristic: "textbook", reference: "physical" };
-
 /** Colours of overlays, legible on any picture. */
 const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", selection: "#ffd84a", label: "#000b" };
 
@@ -10,8 +7,9 @@ const OVERLAY = { line: "#fff", edge: "#000a", box: "#5ef0ff", selection: "#ffd8
 const PRINTED_FROM = 40;
 
 /**
- * Besides the view: `map` with its `end` and the `measure` of bands, `gain` on the textbook's image.
- * @typedef {{swapped: boolean, regions: Region[], box: number[] | null, map: Legend & {end: number, measure: string}, gain: number}} Extra
+ * Besides the view: `map` with its `end` and the `measure` of bands, `gain` on the first half, and how
+ * that is `judged`, in a word.
+ * @typedef {{swapped: boolean, regions: Region[], box: number[] | null, map: Legend & {end: number, measure: string}, gain: number, judged: string}} Extra
  */
 
 /** @typedef {{picture: string, title: string}} Content of a pane */
@@ -55,9 +53,9 @@ class Drawing {
   }
 
   /** The pictures of each pane: one, or two divided. @param {Extra} extra */
-  contents({ swapped, map, gain }) {
+  contents({ swapped, map, gain, judged }) {
     const error = { picture: "map", title: gain === 1 ? map.title : `${map.title}, without that exposure` };
-    const halves = ["heuristic", "reference"].map((half) => ({ picture: half, title: PANE_TITLES[half] }));
+    const halves = [{ picture: "heuristic", title: judged }, { picture: "reference", title: "physical" }];
     if (gain !== 1) halves[0].title += ` ${gainText(gain)}`;
     switch (this.view.mode) {
       case "side": return [...halves, error].map((one) => [one]);

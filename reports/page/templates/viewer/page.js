@@ -28,8 +28,9 @@
  * @property {number} width
  * @property {number} height
  * @property {number} exposure
+ * @property {{subject: string, title: string, name: string}} judged   the names of the first half
  * @property {Region[]} regions
- * @property {Record<string, Exposure>} best by map: the textbook's exposure that lowers the mean most
+ * @property {Record<string, Exposure>} best by map: the first half's exposure that lowers the mean most
  * @property {Manifest} images
  * @property {Effects | null} effects
  * @property {Terms | null} terms

@@ -46,6 +46,7 @@ class Viewer {
     section.querySelector(".side")?.prepend(this.panel, this.distribution.panel);
     this.element.hidden = this.panel.hidden = this.distribution.panel.hidden = false;
     this.element.dataset.ready = "";
+    for (const one of this.panel.querySelectorAll("[data-judged]")) one.textContent = scene.judged.title;
     this.offerEffects();
     const images = await imagesOf(scene.id, scene.images);
     if (this.scene !== scene) return; // another one was opened meanwhile
@@ -110,7 +111,7 @@ class Viewer {
     const { swapped, scene } = this;
     const map = { ...mapOf(this.page, this.view.map), end: this.top(), measure: this.measure().name };
     const gain = gainOf(scene, this.view);
-    this.drawing.draw(this.view, this.viewport, this.painter, { swapped, regions: scene.regions, box: this.box(), map, gain });
+    this.drawing.draw(this.view, this.viewport, this.painter, { swapped, regions: scene.regions, box: this.box(), map, gain, judged: scene.judged.name });
     this.canvas.style.touchAction = this.view.zoom === null && !this.selecting ? "pan-y" : "none";
     this.controls.disable();
     this.distribution.show();
@@ -120,10 +121,11 @@ class Viewer {
 
   description() {
     const { title } = mapOf(this.page, this.view.map);
+    const { subject } = this.scene.judged;
     const modes = {
-      split: "textbook shading on the left, physical reference on the right",
-      flicker: this.swapped ? "physical reference" : "textbook shading",
-      side: `textbook shading, physical reference and ${title}`,
+      split: `${subject} on the left, physical reference on the right`,
+      flicker: this.swapped ? "physical reference" : subject,
+      side: `${subject}, physical reference and ${title}`,
       error: title,
     };
     return `${this.scene.name}: ${modes[/** @type {keyof modes} */ (this.view.mode)]}. Press ? for the keys.`;
