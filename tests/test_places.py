@@ -27,7 +27,7 @@ alpha = [0.2]
 
 
 def files(folder):
-    """Return the contents of all files below a folder, but for what every command writes anew."""
+    """Return the contents of all files below a folder, except what every command writes again."""
     passing = {"run.json", "index.html", ".fotismos-lock", ".fotismos"}
     return {p: p.read_bytes() for p in folder.rglob("*") if p.is_file() and p.name not in passing}
 

@@ -127,7 +127,7 @@ def test_the_library_is_made_once_for_all_runs(tmp_path, monkeypatch):
 
 
 class PanicException(BaseException):
-    """What a library in Rust raises when it cannot go on."""
+    """What a library in Rust raises when it cannot continue."""
 
 
 def test_a_panic_of_the_library_is_one_message(monkeypatch):

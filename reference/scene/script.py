@@ -4,6 +4,7 @@ import runpy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from heuristic.errors import InputError
 from heuristic.user_code import contained
@@ -23,7 +24,7 @@ class Script:
     path: Path
     files: set[Path] = field(default_factory=set, compare=False, repr=False)
 
-    def __call__(self):
+    def __call__(self) -> Any:
         """Run the file.
 
         Raises

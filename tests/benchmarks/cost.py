@@ -2,7 +2,7 @@
 
 Two rungs are out of order where one run says that the first is faster, the other that the second
 is, and each by more than its intervals: the upper end of one below the lower end of the other.
-Errors are held against each other in the same way, with five standard errors.
+Errors are compared in the same way, with five standard errors.
 """
 
 import json

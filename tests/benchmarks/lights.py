@@ -20,7 +20,7 @@ from drjit.llvm import Array3f
 POINTS = 1 << 20
 COUNTS = (1, 10, 16, 17, 100, 1_000, 10_000)
 UNROLLED = 8
-"""Lights of the row that the others are held against: a single kernel without blocks."""
+"""Lights of the row that the others are compared with: a single kernel without blocks."""
 
 
 def run(rounds):

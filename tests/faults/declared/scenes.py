@@ -145,13 +145,13 @@ def faults() -> Iterator[Fault]:
         yield Fault(f"a scene that is {name}", compare(), "a.xml", (2,), _in_place(make))
         beside = then(_in_place(make), written({"scenes/b.xml": SCENE}), lambda folder: (
             (folder / "a.xml").rename(folder / "scenes/a.xml")))  # fmt: skip
-        # In a folder, it is passed over, or a row of the page.
+        # In a folder, it is skipped, or a row of the page.
         yield Fault(f"a folder of scenes with {name}", compare("scenes"), "a.xml", (0, 2), beside,
                     leaves=("out/b/comparison.json",))  # fmt: skip
     hidden = then(with_scene, lambda folder: (folder / "a.xml").chmod(0))
     yield Fault("a scene without rights", compare(), "a.xml.*denied|denied", prepare=hidden,
                 shell=UNPRIVILEGED + '"$@"')  # fmt: skip
-    # Files without a scene element are passed over.
+    # Files without a scene element are skipped.
     batch = then(_surroundings, written({f"s/{i}.xml": text for i, text in enumerate(
         ("", "text", _more("<shpae/>"), SCENE))}))  # fmt: skip
     yield Fault("three of four no scenes", compare("s"), "2.*shpae", (2,), batch,
