@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from inspect import CO_OPTIMIZED
-from io import StringIO
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -50,7 +50,7 @@ def way() -> list[str]:
     from reports import cli
 
     words = ["fotismos", "compare", SCENE, "--resolution", "16x16", "-q", "--fresh", "-o"]
-    with TemporaryDirectory() as folder, redirect_stdout(StringIO()):
+    with TemporaryDirectory() as folder, redirect_stdout(TextIOWrapper(BytesIO())):
         sys.argv = [*words, folder]
         with suppress(SystemExit):
             cli.main()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING
 from comparisons.effects.nearness import Nearest
+from reference.effects import EFFECTS
 from reports.charts.theme import EFFECT_COLOURS
 from reports.terminal.nearest_lines import told
 from reports.terminal.printing import seconds
@@ -179,9 +180,7 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
         said = [f"{subject} looks right in {right} of {len(findings)} scenes."]
     lacking = ranked([found for found in findings if not found.is_right(tolerance)])
     if lacking:
-        first, *others = lacking[:NAMED]
-        then = f", then {' and '.join(others)}" if others else ""
-        said.append(f"What it lacks most is {first}{then}.")
+        said.append(f"What it lacks most is {', then '.join(map(_noun, lacking[:NAMED]))}.")
     return said
 
 
@@ -195,7 +194,7 @@ def about(found: Finding, tolerance: float = USUAL) -> str:
     if found.nearest:
         said.append(f"It {told(found.nearest)}.")
     if found.cause:
-        said.append(f"It lacks mostly {found.cause}.")
+        said.append(f"It lacks mostly {_noun(found.cause)}.")
     remedy = found.remedies.get(tolerance)
     if remedy and not found.is_right(tolerance):
         said.append(
@@ -214,10 +213,15 @@ def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
         if found.is_right(tolerance) or not found.remedies:
             continue
         remedy = found.remedies[tolerance]
-        cause = f"mostly {found.cause}" if found.cause else "no cause is known"
+        cause = f"mostly {_noun(found.cause)}" if found.cause else "no cause is known"
         way = f"{remedy.method} in {seconds(remedy.seconds)}" if remedy else "no method tried"
         lines.append(f"{found.scene}: {cause}; within {LEADING.label} {tolerance:g}: {way}")
     return lines
+
+
+def _noun(label: str) -> str:
+    """Return what an image without an effect lacks."""
+    return next(effect.noun or label for effect in EFFECTS if effect.label == label)
 
 
 def ranked(findings: Sequence[Finding]) -> list[str]:

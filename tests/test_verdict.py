@@ -60,7 +60,7 @@ def test_the_sentences_count_scenes_and_name_what_those_that_fail_lack():
     ]
     assert verdict.sentences(several) == [
         "Textbook shading looks right in 1 of 3 scenes.",
-        "What it lacks most is interreflection, then occlusion and spectral.",
+        "What it lacks most is interreflection, then occlusion, then spectral light.",
     ]
     assert verdict.sentences([found("a", beyond=0.42)]) == [
         "Textbook shading is visibly wrong in 42 % of a."

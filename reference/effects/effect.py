@@ -22,6 +22,8 @@ class Effect:
         Its position among all effects, ascending.
     label
         Its name in records and reports.
+    noun
+        What an image without it lacks; the label if omitted.
     heuristic, reference, cost
         Text: its form in each half, and its cost.
     rule
@@ -52,6 +54,7 @@ class Effect:
 
     order: int
     label: str
+    noun: str = ""
     heuristic: str
     reference: str
     cost: str

@@ -73,6 +73,7 @@ POLYGONS = Effect(
 SPECTRAL = Effect(
     order=140,
     label="spectral",
+    noun="spectral light",
     heuristic="as many values as given (8.11)",
     reference="wavelengths",
     cost="samples, 4 values each",

@@ -23,10 +23,11 @@ async function makeSwitchboard(section) {
 
   /** @param {string} name @returns {HTMLElement} */
   const part = (name) => /** @type {HTMLElement} */ (element.querySelector(`[data-board=${name}]`));
+  const subject = part("name").textContent;
   /** The effects after switching one of them. @param {number} effect */
   const switched = (effect) => [...on].filter((one) => one !== effect).concat(on.has(effect) ? [] : [effect]).sort((a, b) => a - b);
   /** @param {number[]} effects */
-  const inWords = (effects) => ["Textbook shading", ...effects.map((effect) => names[effect])].join(" + ");
+  const inWords = (effects) => [subject, ...effects.map((effect) => names[effect])].join(" + ");
 
   /** @param {string} name @param {number} place */
   function draw(name, place) {
