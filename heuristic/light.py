@@ -25,7 +25,10 @@ PLUGINS: dict[str, type["Light"]] = {}
 
 
 class Arrival(NamedTuple):
-    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays."""
+    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays.
+
+    ``d`` ends at the shell of a lamp that has one: shadow rays go no further.
+    """
 
     toward: Direction
     intensity: Colour
@@ -149,6 +152,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     ),
     "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
     "attenuation": _attenuation,
+    "shell": partial(_number, "shell", lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
     "clamped": partial(_flag, "clamped"),
 }
 

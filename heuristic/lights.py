@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
+import drjit as dr
+
 from heuristic import colours, numerics, terms, vectors
 from heuristic.arrays import Colour, Direction, Number, Position, Vector
 from heuristic.light import Arrival, Light
@@ -55,13 +57,15 @@ class _LightFromPoint(Light):
     position: Position
     attenuation: tuple[Number, Number, Number]
     clamped: bool
+    shell: Number
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return vectors.wide_light_vector(type(position)(self.position), position)
 
     def compiled(self) -> dict[str, Any]:
         even = {"attenuation": UNATTENUATED} if is_unattenuated(self.attenuation) else {}
-        return {"clamped": self.clamped} | even
+        bare = {"shell": 0} if is_number(self.shell, 0) else {}
+        return {"clamped": self.clamped} | even | bare
 
     def _attenuated(
         self, toward: Direction, intensity: Colour, distance: Number, position: Position
@@ -73,6 +77,8 @@ class _LightFromPoint(Light):
                 law = terms.tame_attenuation
             inverse = vectors.inverse_distance(type(position)(self.position), position)
             intensity = law(distance, *self.attenuation, intensity, inverse)
+        if not is_number(self.shell, 0):
+            distance = dr.maximum(distance - self.shell, 0)
         return Arrival(toward, intensity, distance)
 
 
@@ -91,6 +97,8 @@ class PointLight(_LightFromPoint, plugin="heuristic_point"):
         ``(0, 0, 1)`` the inverse square of 8.6.
     clamped
         Use the other form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``.
+    shell
+        Radius about the position in which nothing casts a shadow: the body of the lamp.
 
     Raises
     ------
@@ -103,6 +111,7 @@ class PointLight(_LightFromPoint, plugin="heuristic_point"):
     intensity: Colour
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
+    shell: Number = 0
 
     def illuminate(self, position: Position) -> Arrival:
         """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6)."""
@@ -118,7 +127,7 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
 
     Parameters
     ----------
-    position, intensity, attenuation, clamped
+    position, intensity, attenuation, clamped, shell
         See :class:`PointLight`.
     direction
         ``v_L``, the axis, in the direction of travel; any length but zero.
@@ -142,6 +151,7 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
     exponent: float = 0
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
+    shell: Number = 0
 
     def compiled(self) -> dict[str, Any]:
         even = {"exponent": 0} if is_number(self.exponent, 0) else {}

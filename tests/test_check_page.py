@@ -1,6 +1,7 @@
 """The page of a check that failed, and what it says: objects and causes."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import mitsuba as mi
@@ -115,6 +116,9 @@ def test_a_failure_writes_a_page_which_a_pass_takes_away(run, baselines_folder, 
     html = page.read_text(encoding="utf-8")
     for part in ("1 of 2 scenes moved", "Only the reference moved", "row 2, column 3", "sphere"):
         assert part in html, part
+    accepting = re.search("If this change is intended: <code>(.*?)</code>", html)[1]
+    assert accepting.endswith(" --update")
+    assert str(baselines_folder) in accepting
     assert html.count("<figure>") == 5
     assert "Textbook half: Now" not in html
     assert "<script" not in html

@@ -24,7 +24,7 @@ _SUSPECTS = {
     " lights are paired.",
     ("reference",): "Only the reference moved: look at the physical materials and lights, the"
     " integrator, or the version of Mitsuba.",
-    HALVES: "Both halves moved: look at what they share, such as geometry, camera, textures or"
+    HALVES: "Both halves moved: look at what they share, such as geometry, camera, materials or"
     " lights.",
 }
 

@@ -11,6 +11,7 @@ Parameter                 Type (default)      Meaning
 ``clamped``               boolean (false)     the other form of 8.6, ``min(..., 1)``
 ``cutoff``                float (30)          spot: half angle of the cone, degrees
 ``exponent``              float (0)           spot: ``m`` of 6.4
+``shell``                 float (0)           point and spot: radius in which nothing casts a shadow
 ========================  ==================  =====================================================
 
 Position, direction, intensity and the coefficients are exposed to ``mitsuba.traverse``. Python::
@@ -87,6 +88,9 @@ def define() -> None:
                 self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
                 for name, default in coefficients.items():
                     self._keep(props, name, mi.Float, default)
+            self.shell = 0
+            if "shell" in names and props.get("shell", 0.0) > 0:
+                self._keep(props, "shell", mi.Float, 0.0)
 
         def parameters_changed(self, keys=()):
             """Make edited numbers opaque, so new values compile nothing."""
@@ -164,7 +168,10 @@ def define() -> None:
             length = dr.norm(half)
             direction = half * dr.select(is_away, dr.rcp(length), 0)
             distance = numerics.at_most(2 * length * size, numerics.largest(length))
-            ds = self._direction_sample(it, self.position, direction, distance)
+            end = self.position
+            if "shell" in self.numbers:  # shadow rays end there
+                end = end - direction * dr.minimum(self.shell, distance)
+            ds = self._direction_sample(it, end, direction, distance)
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
             weight = law(distance, *self.attenuation, self._spectrum(it, active))
             return ds, IRRADIANCE_PER_INTENSITY * weight & active

@@ -130,10 +130,10 @@ def light_map(scene: Any, light: Any, resolution: int) -> LightMap:
     radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
     if isinstance(light, DirectionalLight):
         return _square(scene, light, resolution, (low + high) / 2, radius)
-    return _cube(scene, light, resolution, LEAST * radius)
+    return _cube(scene, light, resolution, dr.maximum(LEAST * radius, light.shell))
 
 
-def _cube(scene: Any, light: Any, resolution: int, start: float) -> CubeMap:
+def _cube(scene: Any, light: Any, resolution: int, start: Any) -> CubeMap:
     centre = mi.Point3f(light.position)
     toward = dr.normalize(_cube_direction(resolution))
     depths = _traced(scene, centre + toward * start, toward) + start

@@ -80,7 +80,7 @@ def _failure(result: Result) -> dict[str, Any]:
         "versions": lines.versions_line(result),
         "halves": [half for half in halves if half["moved"]] or halves,
         "moved": [_cells(move) for move in check.moved[:SHOWN]],
-        "update": program.command("check", result.path, "--update"),
+        "accepting": program.command("check", result.path, "--update"),
     }
 
 

@@ -39,7 +39,7 @@ def _to_heuristic(light: Given) -> PairedEmitter:
 def _far_light(
     graph: Graph, shape: int, radiance: Any, made: mi.Shape
 ) -> tuple[mi.Properties, PairedEmitter]:
-    centroid, area, normal = _extent(made)
+    centroid, area, normal, radius = _extent(made)
     if _varies(graph, radiance):
         radiance = measured.surface_mean(graph, made)
     flatness = float(np.linalg.norm(normal))
@@ -51,6 +51,8 @@ def _far_light(
         cone = {"direction": mi.ScalarVector3f(*normal), "cutoff": 90.0, "exponent": exponent}
     else:
         plugin, factor, form, cone = "heuristic_point", CLOSED_LIGHT_FACTOR * area, "closed, ", {}
+    if flatness < 1:  # its light leaves through the shape
+        cone["shell"] = radius
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
@@ -64,14 +66,21 @@ def _varies(graph: Graph, value: Any) -> bool:
     return graph.instantiate(value.index()).is_spatially_varying()
 
 
-def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float]]:
-    """Return centroid, area and mean normal of a shape, by its own sampling on a regular grid."""
+ROOM = 1.02
+"""Factor on the radius of a lamp: the grid's places lie up to a 64th inside its edges."""
+
+
+def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
+    """Return centroid, area, mean normal and radius of a shape, by its sampling on a grid."""
     cells = (np.arange(64) + 0.5) / 64
     x, y = (axis.ravel() for axis in np.meshgrid(cells, cells))
     sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
-    centroid = np.array(sample.p).mean(axis=1)
+    places = np.array(sample.p, float)
+    centroid = places.mean(axis=1)
     normal = np.array(sample.n).mean(axis=1)
-    return centroid.tolist(), float(np.ravel(shape.surface_area())[0]), normal.tolist()
+    radius = ROOM * np.linalg.norm(places - centroid[:, None], axis=0).max()
+    area = float(np.ravel(shape.surface_area())[0])
+    return centroid.tolist(), area, normal.tolist(), float(radius)
 
 
 def _glow(graph: Graph, shape: int, radiance: Any) -> None:

@@ -1,0 +1,67 @@
+"""Lamps whose light leaves through their own shape: balls, boxes, domes."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.cost.cost import cost
+from comparisons.cost.effort import COARSE
+from comparisons.options import Options
+from reference.scene.source import Source
+
+WHITE = {"type": "diffuse", "reflectance": 0.6}
+LAMPS = {
+    "ball": lambda to_world: {"type": "sphere", "to_world": to_world},
+    "box": lambda to_world: {"type": "cube", "to_world": to_world},
+    "tube": lambda to_world: {"type": "cylinder", "p0": (0, 0, -1), "to_world": to_world},
+}
+
+
+def room(kind):
+    """A floor, a small ball on it, and a lamp above that is closed or nearly."""
+    above = mi.ScalarTransform4f().translate((1.5, 0, 3)).scale(0.4)
+    camera = mi.ScalarTransform4f().look_at((0, -6, 4), (0, 0, 0), (0, 0, 1))
+    lamp = LAMPS[kind](above)
+    return {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "fov": 40,
+            "to_world": camera,
+            "film": {"type": "hdrfilm", "width": 48, "height": 36, "rfilter": {"type": "box"}},
+        },
+        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(4), "bsdf": WHITE},
+        "ball": {"type": "sphere", "center": (-1, 0, 0.5), "radius": 0.5, "bsdf": WHITE},
+        "lamp": lamp | {"bsdf": WHITE, "emitter": {"type": "area", "radiance": 20.0}},
+    }
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
+    pair = Options().pair(Source("lamp", room(kind)))
+    scene = pair.heuristic.instantiate()
+    floor = {"spp": 16, "seed": 1}
+    bare, shadowed, mapped, traced = (
+        np.array(mi.render(scene, integrator=mi.load_dict(each), **floor))
+        for each in (
+            {"type": "heuristic"},
+            {"type": "heuristic", "occlusion": True},
+            {"type": "heuristic", "model": "shadow-map"},
+            {"type": "direct"},
+        )
+    )
+    lit = bare.mean(axis=2) > 0.01
+    kept = [np.mean(each.mean(axis=2)[lit] > 0.01) for each in (shadowed, mapped, traced)]
+    # The ball's shadow, and the part of the ball that it shades itself.
+    assert min(kept) > 0.85
+    assert max(kept) < 1
+
+
+@pytest.mark.parametrize("kind", ["ball", "box"])
+def test_shadows_are_not_blamed_for_the_lamp(rgb, kind):
+    found = cost(Source("lamp", room(kind)), Options(resolution=(48, 36)), COARSE).record
+    errors = {point.rung: point.error for point in found.points}
+    assert errors["kernel with shadows"] < 1.5 * errors["Phong kernel"]
+    removed = {price.effect: price.removes.value for price in found.prices.effects}
+    assert removed["occlusion"] > -1
+    assert abs(removed["extended lights"]) < 3
