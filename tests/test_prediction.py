@@ -143,6 +143,14 @@ def test_errors_of_nothing_but_edges_vanish_no_faster_than_they():
     assert law.at(4096, 16) > 0
 
 
+def test_a_method_without_error_is_predicted_to_have_none():
+    rng = np.random.default_rng(7)
+    exact = law_of(0.0, 0.0, 0.0, rng)
+    value, low, high = intervals([exact, law_of(1.0, 20.0, 0.5, rng)], 512)(exact, 32)
+    assert (value, low) == (0, 0)
+    assert 0 < high < 0.1
+
+
 @pytest.mark.guarantee(
     "prices",
     "Intervals of predicted times and errors contain nine of ten later measurements.",

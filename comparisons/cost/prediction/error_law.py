@@ -102,7 +102,8 @@ class ErrorLaw:
         _, middle, last = self.widths
         reach = hypot((1 / last - 1 / width) / (1 / middle - 1 / last), OWN_CHANCE)
         value, error = self.at(width, spp), self._mean(2, self.counts[-1])
-        noise = max(value - self.curve.bias * value / self.curve.at(spp), 0.0)
+        bias = self.curve.bias / max(self.curve.at(spp), TINY)
+        noise = value * max(1.0 - bias, 0.0)
         rounds = self.errors[last, self.counts[-1]]
         return hypot(
             reach * sqrt(_shrunk(self.missed_by_size, by_size, len(self.counts)) * value),
