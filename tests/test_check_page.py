@@ -1,6 +1,7 @@
 """The page of a check that failed, and what it says: objects and causes."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import mitsuba as mi
@@ -118,6 +119,9 @@ def test_a_failure_writes_a_page_which_a_pass_takes_away(run, baselines_folder, 
     assert html.count("<figure>") == 5
     assert "Textbook half: Now" not in html
     assert "<script" not in html
+    linked = re.findall(r'href="([^"#]+)"', html)
+    assert linked == ["fig-8-6b/check.json"]
+    assert (page.parent / linked[0]).is_file()
     assert f"`{page}`" in summary.read_text(encoding="utf-8")
     record = json.loads((out / "check/fig-8-6b/check.json").read_text(encoding="utf-8"))
     assert record["objects"]["reference"]["sphere"] > 0.9
