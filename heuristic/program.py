@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import sys
 
 VARIABLE = "FOTISMOS_PROGRAM"
 """Environment variable with the words that start the program, such as ``./run``."""
@@ -15,3 +16,8 @@ def program() -> list[str]:
 def command(*words: object) -> str:
     """Return a command of the program, as a shell takes it."""
     return shlex.join([*program(), *map(str, words)])
+
+
+def installation(*packages: str) -> str:
+    """Return the command that installs packages for this interpreter, as a shell takes it."""
+    return shlex.join([sys.executable, "-m", "pip", "install", *packages])

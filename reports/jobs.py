@@ -98,15 +98,15 @@ scenes_argument = click.argument(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
-def output_option(default: str) -> Decorator:
-    """Return the option for the folder of the results."""
+def output_option(default: str, below: str = "") -> Decorator:
+    """Return the option for the folder of the results, which go to ``below`` in it."""
     return click.option(
         "-o",
         "--output",
         default=default,
         show_default=True,
         type=click.Path(path_type=Path),
-        help="Folder for the results.",
+        help="Folder for the results" + (f", which go to OUTPUT/{below}." if below else "."),
     )
 
 

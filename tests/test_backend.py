@@ -147,6 +147,12 @@ def test_the_wheel_is_used_where_it_is_installed():
         assert said.strip().endswith(str(backend.find_wheel()))
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "docs/shaders").glob("*.py")), ids=lambda p: p.stem)
+def test_a_shader_of_the_documentation_imports_heuristic_before_drjit(path):
+    imported = re.findall(r"^(?:import|from) (heuristic|drjit)\b", path.read_text("utf-8"), re.M)
+    assert imported[0] == "heuristic"
+
+
 @pytest.mark.parametrize("version", [(15, 0, 7), (19, 1, 7)])
 def test_drjit_imported_first_is_told(monkeypatch, tmp_path, version):
     packages = install_fake_wheel(tmp_path, ["libLLVM.so"])

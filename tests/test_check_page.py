@@ -122,6 +122,9 @@ def test_a_failure_writes_a_page_which_a_pass_takes_away(run, baselines_folder, 
     assert html.count("<figure>") == 5
     assert "Textbook half: Now" not in html
     assert "<script" not in html
+    linked = re.findall(r'href="([^"#]+)"', html)
+    assert linked == ["fig-8-6b/check.json"]
+    assert (page.parent / linked[0]).is_file()
     assert f"`{page}`" in summary.read_text(encoding="utf-8")
     record = json.loads((out / "check/fig-8-6b/check.json").read_text(encoding="utf-8"))
     assert record["objects"]["reference"]["sphere"] > 0.9

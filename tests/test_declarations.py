@@ -6,8 +6,10 @@ Each declaration is a toy of a few lines. A fixture declares it and takes it bac
 import csv
 import json
 import re
+import tomllib
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
 
 import drjit as dr
 import jsonschema
@@ -24,6 +26,7 @@ from comparisons.departure.metrics import BUILT_IN, METRICS
 from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
 from comparisons.fit.summary import departure
 from comparisons.study import columns
+from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import HEURISTICS, Heuristic
 from reference.effects.obstacles import OCCLUSION
@@ -71,6 +74,25 @@ def layer(results, name):
     with OpenEXR.File(path, separate_channels=True) as file:
         pixels = {key: channel.pixels for key, channel in file.channels().items()}
     return np.stack([pixels[f"{name}.{c}"] for c in "RGBXYZ" if f"{name}.{c}" in pixels], axis=-1)
+
+
+def test_the_packages_metric_of_the_documentation_is_found(tmp_path, monkeypatch):
+    page = (Path(__file__).parents[1] / "docs/api.md").read_text(encoding="utf-8")
+    code, project = (
+        re.findall(rf"```{kind}\n(.*?)```", page, re.S)[0] for kind in ("python", "toml")
+    )
+    found = tomllib.loads(project)
+    group, entries = next(iter(found["project"]["entry-points"].items()))
+    (tmp_path / f"{found['tool']['setuptools']['py-modules'][0]}.py").write_text(code)
+    installed = tmp_path / "absolute_metric-1.dist-info"
+    installed.mkdir()
+    (installed / "METADATA").write_text(f"Name: {found['project']['name']}\nVersion: 1\n")
+    lines = "".join(f"{name} = {value}\n" for name, value in entries.items())
+    (installed / "entry_points.txt").write_text(f"[{group}]\n{lines}")
+    monkeypatch.syspath_prepend(tmp_path)
+    metrics = Declared("metric", METRICS.group)
+    image = np.zeros((2, 3, 3))
+    assert metrics["absolute"](image + 0.25, image).mean() == 0.25
 
 
 def test_a_metric_from_outside_is_in_the_record_and_the_exr(results):

@@ -1,6 +1,7 @@
 """Heuristics in GLSL: the same points as in Python, and every mistake in words."""
 
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from comparisons.case import Request, open_case
 from comparisons.compare import compare, prepare
 from comparisons.fit.fit import fit
-from heuristic import trial
+from heuristic import program, trial
 from heuristic.errors import InputError, InstallationError
 from heuristic.glsl import gpu, shader_files, shader_text
 from heuristic.heuristics import Heuristic, in_file, named
@@ -344,7 +345,7 @@ def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
 def test_without_moderngl_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "moderngl", None)
     monkeypatch.setattr(gpu, "_kept", gpu.threading.local())
-    with pytest.raises(InstallationError, match=r"pip install 'fotismos\[glsl\]'"):
+    with pytest.raises(InstallationError, match=re.escape(program.installation("moderngl"))):
         gpu.device()
     assert "pip install" in doctor.shaded()
 

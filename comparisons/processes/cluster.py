@@ -7,8 +7,6 @@ worker persist.
 """
 
 import logging
-import shlex
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -18,6 +16,7 @@ from typing import Any
 from uuid import uuid4
 
 from comparisons.processes.worker import Task
+from heuristic import program
 from heuristic.errors import FotismosError, InstallationError, LostProcessError
 
 NEEDED = ("dask", "distributed")
@@ -198,7 +197,6 @@ def _distributed() -> Any:
         import distributed
     except ImportError as error:
         raise InstallationError(
-            "a cluster needs Dask, which is not installed. Run:"
-            f" {shlex.join([sys.executable, '-m', 'pip', 'install', *NEEDED])}"
+            f"a cluster needs Dask, which is not installed. Run: {program.installation(*NEEDED)}"
         ) from error
     return distributed

@@ -1,8 +1,8 @@
 """Rough diffuse surfaces after Oren and Nayar (SIGGRAPH 1994), the qualitative model."""
 
-import drjit as dr
+from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
-from heuristic import Range
+import drjit as dr
 
 
 def shade(point, sigma: Range(0, 1.5) = 0.5):

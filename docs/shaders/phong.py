@@ -1,5 +1,7 @@
 """The chapters' model (8.10): what the built-in heuristic `phong` computes."""
 
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
 import drjit as dr
 
 

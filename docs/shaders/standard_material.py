@@ -6,6 +6,8 @@ document (google.github.io/filament). What differs is the base's share of the li
 
 from types import SimpleNamespace
 
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
 import drjit as dr
 
 

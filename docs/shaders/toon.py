@@ -1,8 +1,8 @@
 """A toon ramp: the cosine in steps, and a dark outline."""
 
-import drjit as dr
+from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
-from heuristic import Range
+import drjit as dr
 
 
 def shade(point, steps: Range(1, 8) = 3, outline: Range(0, 1) = 0.2):

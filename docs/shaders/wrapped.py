@@ -1,8 +1,8 @@
 """Wrapped diffuse: light reaches beyond the horizon, as if it were scattered below the surface."""
 
-import drjit as dr
+from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
-from heuristic import Range
+import drjit as dr
 
 
 def shade(point, wrap: Range(0, 1) = 0.5):

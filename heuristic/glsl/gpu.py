@@ -5,6 +5,7 @@ import threading
 from dataclasses import dataclass, field
 from typing import Any
 
+from heuristic import program
 from heuristic.errors import InstallationError
 
 VERSION = 430
@@ -59,8 +60,8 @@ def _opened() -> Device:
         import moderngl
     except ImportError as error:
         raise InstallationError(
-            "moderngl is not installed, and heuristics in GLSL need it. Install the extra `glsl`:"
-            " pip install 'fotismos[glsl]'."
+            "moderngl is not installed, and heuristics in GLSL need it. Install it:"
+            f" {program.installation('moderngl')}"
         ) from error
     try:
         options: Any = {"backend": "egl"}  # moderngl annotates all options as one

@@ -27,7 +27,7 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
 @click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba, such as roughplastic.")
 @click.option("-p", "parameters", type=_parameter, multiple=True, metavar="NAME=VALUE",
               help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
-@jobs.output_option("out")
+@jobs.output_option("out", "audit/NAME")
 @jobs.timeout_option
 @verbosity.quiet_option
 @verbosity.verbose_option

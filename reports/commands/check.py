@@ -38,7 +38,7 @@ from reports.terminal import verbosity
 )
 @jobs.json_option
 @asked.with_options(*asked.files)
-@jobs.output_option("out")
+@jobs.output_option("out", "check")
 @jobs.timeout_option
 @jobs.workers_option
 @jobs.scheduler_option
@@ -68,8 +68,8 @@ def check(
 
     BASELINE is a file that an earlier --update wrote, or a folder of them. Each scene is rendered
     again with its baseline's options and seed; --seed replaces the seed. If something moved, the
-    exit code is 1, and OUTPUT has pictures that show where. If a baseline could not be checked, it
-    is 2; the others are checked nevertheless.
+    exit code is 1, and OUTPUT/check/index.html shows what moved and where. If a baseline could not
+    be checked, it is 2; the others are checked nevertheless.
 
     A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
 

@@ -14,7 +14,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @jobs.scene_argument
-@jobs.output_option("out")
+@jobs.output_option("out", "cost/SCENE")
 @jobs.figures_option
 @jobs.timeout_option
 @jobs.rendering_options

@@ -13,7 +13,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @jobs.scene_argument
-@jobs.output_option("out")
+@jobs.output_option("out", "export/SCENE")
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options

@@ -14,7 +14,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @jobs.scenes_argument
-@jobs.output_option("out")
+@jobs.output_option("out", "fit/SCENE")
 @click.option(
     "--loss",
     default="perceptual",

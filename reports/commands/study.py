@@ -12,7 +12,7 @@ from reports.terminal import verbosity
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
-@jobs.output_option("out")
+@jobs.output_option("out", "study/NAME")
 @click.option(
     "--processes",
     type=click.IntRange(min=1),
