@@ -229,11 +229,13 @@ def _kind(value: Any) -> str:
 
 
 def _advice(error: BaseException) -> str:
-    """Return advice for the most frequent mistake: a branch on an array."""
+    """Return advice for the most frequent mistakes: a branch on an array, and NumPy."""
     text = str(error)
     while error.__cause__ is not None:
         error = error.__cause__
         text += str(error)
+    if "not aligned" in text:  # NumPy's words
+        return " For arrays of Dr.Jit use drjit.dot in place of numpy.dot."
     if "bool" in text:
         return (
             " All points are shaded at once: in place of `if` use drjit.select(condition, a, b),"

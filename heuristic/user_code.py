@@ -12,6 +12,9 @@ from typing import Any
 from heuristic.errors import suggestion
 from heuristic.opened import is_users, noted
 
+CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
+"""What a user's code calls the objects of these classes."""
+
 
 @contextmanager
 def contained(path: Path) -> Iterator[set[Path]]:
@@ -32,7 +35,11 @@ def told(error: BaseException) -> str:
     message = error.msg if isinstance(error, SyntaxError) else str(_first(error))
     first = _first(error)
     if isinstance(first, AttributeError) and first.name:
-        message += suggestion(first.name, [each for each in dir(first.obj) if each[0] != "_"])
+        names = [each for each in dir(first.obj) if each[0] != "_"]
+        known = CALLED.get(type(first.obj).__name__)
+        if known:
+            message = f"a {known} has no {first.name!r}, but {', '.join(names)}"
+        message += suggestion(first.name, names)
     return f"{where}{type(first).__name__}: {message}".strip().rstrip(":.")
 
 

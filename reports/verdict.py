@@ -39,6 +39,9 @@ WITH_CAUSES = "--why"
 NAMED = 3
 """Number of effects that the sentence names."""
 
+NO_REMEDY = "none at the small size of the study; `cost SCENE` tries more"
+"""What stands in place of a method if none of the study's is within the tolerance."""
+
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
 
@@ -83,7 +86,10 @@ class Part:
 
 @dataclass(frozen=True)
 class Remedy:
-    """The cheapest method of a study whose mean error stays within a tolerance."""
+    """The cheapest method of a study whose mean error stays within a tolerance.
+
+    The kernel without shadows is none: it is what was judged.
+    """
 
     method: str
     seconds: float
@@ -158,8 +164,12 @@ def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
 
 def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
     from comparisons.cost.front import cheapest  # only with a study of cost
+    from comparisons.cost.rungs import KERNELS, Kernel
 
-    best = cheapest(cost.points, tolerance)
+    is_judged = {
+        rung.name for rung in KERNELS if isinstance(rung.method, Kernel) and not rung.method.shadows
+    }
+    best = cheapest((point for point in cost.points if point.rung not in is_judged), tolerance)
     return Remedy(best.rung, best.seconds.median) if best else None
 
 
@@ -172,7 +182,8 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
         said = [
             f"{only.subject} looks right in {only.scene}."
             if right
-            else f"{only.subject} is visibly wrong in {100 * share:.0f} % of {only.scene}."
+            else f"{only.subject} is visibly wrong in {100 * share:.0f} % of the pixels of"
+            f" {only.scene}."
         ]
     else:
         subjects = {found.subject for found in findings}
@@ -214,8 +225,8 @@ def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
             continue
         remedy = found.remedies[tolerance]
         cause = f"mostly {_noun(found.cause)}" if found.cause else "no cause is known"
-        way = f"{remedy.method} in {seconds(remedy.seconds)}" if remedy else "no method tried"
-        lines.append(f"{found.scene}: {cause}; within {LEADING.label} {tolerance:g}: {way}")
+        way = f"{remedy.method} in {seconds(remedy.seconds)}" if remedy else NO_REMEDY
+        lines.append(f"{found.scene}: {cause}; mean within {LEADING.label} {tolerance:g}: {way}")
     return lines
 
 

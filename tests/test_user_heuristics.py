@@ -591,3 +591,16 @@ def test_a_trial_reads_as_it_is_declared(rgb):
     assert trial.examine(seen) == ("ambient",)
     assert isinstance(heuristic.Range(0, 1), Range)
     assert SimpleNamespace(**{p.name: p.default for p in seen.parameters}) == SimpleNamespace()
+
+
+@pytest.mark.parametrize(
+    ("shade", "said"),
+    [
+        (lambda p: p.material.albedo, "a material has no 'albedo', but "),
+        (lambda p: p.lights[0].direction, "a light has no 'direction', but "),
+        (lambda p: np.dot(p.normal, p.view), "use drjit.dot"),
+    ],
+)
+def test_wrong_names_and_numpy_are_told_in_a_users_words(shade, said):
+    with pytest.raises(InputError, match=said):
+        trial.examine(Heuristic("mine", shade))

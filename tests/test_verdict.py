@@ -7,6 +7,7 @@ from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import HEURISTICS
 from heuristic.points import Point
 from reports import verdict
+from reports.terminal import progress
 from tests import cost_records, records
 
 
@@ -46,6 +47,15 @@ def test_the_remedy_is_the_fastest_method_that_reaches_the_tolerance():
     assert remedies[1.0] is None
 
 
+def test_what_was_judged_is_no_remedy():
+    cost = cost_records.record()
+    first = min(cost.points, key=lambda point: point.seconds.median)
+    for name in ("flat kernel", "Gouraud kernel", "Phong kernel"):
+        kernel = structs.replace(first, rung=name, error=0.0)
+        with_kernel = structs.replace(cost, points=(kernel, *cost.points))
+        assert of_record(10.0, with_kernel).remedies == of_record(10.0, cost).remedies
+
+
 def test_what_cannot_be_seen_is_exact():
     assert of_record(0.0).is_exact
     assert of_record(0.009, high=0.009).is_exact
@@ -63,7 +73,7 @@ def test_the_sentences_count_scenes_and_name_what_those_that_fail_lack():
         "What it lacks most is interreflection, then occlusion, then spectral light.",
     ]
     assert verdict.sentences([found("a", beyond=0.42)]) == [
-        "Textbook shading is visibly wrong in 42 % of a."
+        "Textbook shading is visibly wrong in 42 % of the pixels of a."
     ]
     assert verdict.sentences([found("a", beyond=0.0)]) == ["Textbook shading looks right in a."]
 
@@ -90,8 +100,8 @@ def test_advice_names_cause_and_remedy_of_each_scene_that_fails():
         ]
     )
     assert lines == [
-        "a: mostly occlusion; within ΔE2000 2: path 3 in 41.0 ms",
-        "b: no cause is known; within ΔE2000 2: no method tried",
+        "a: mostly occlusion; mean within ΔE2000 2: path 3 in 41.0 ms",
+        f"b: no cause is known; mean within ΔE2000 2: {verdict.NO_REMEDY}",
     ]
     (line,) = verdict.advice([found("a")])
     assert verdict.WITH_CAUSES in line
@@ -128,3 +138,9 @@ def test_a_shader_is_called_by_its_name_and_not_textbook(heuristic, names):
     found = verdict.judged(record)
     assert (found.subject, found.title, found.name) == names
     assert verdict.sentences([verdict.finding(record)])[0].startswith(f"{names[0]} ")
+
+
+def test_verbose_lines_tell_losses_and_settings_that_are_not_used():
+    lines = "\n".join(progress.details(records.record()))
+    assert "  lost: pane (dielectric): refraction; seen straight through" in lines
+    assert "  not used: sampler independent, but multijitter" in lines

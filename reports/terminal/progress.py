@@ -155,7 +155,7 @@ def _table(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
 
 
 def details(record: ComparisonRecord) -> Iterator[str]:
-    """Yield the verbose lines of a scene: simulation, pairing, warnings, times."""
+    """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
     plan, pairing = record.plan, record.pairing
     shadows = "" if plan.shadows else ", no shadow rays"
     yield (
@@ -170,6 +170,10 @@ def details(record: ComparisonRecord) -> Iterator[str]:
             yield f"  {material.name}: {material.given} as {material.derived} ({material.note})"
     for miss in pairing.misses:
         yield f"  missed: {miss.what}, {miss.wanted:.3g} requested, {miss.reached:.3g} reached"
+    for loss in record.unrepresentable:
+        yield f"  lost: {loss.name} ({loss.plugin}): {loss.lost}; {loss.nearest}"
+    for setting in record.overridden:
+        yield f"  not used: {setting.what} {setting.given}, but {setting.used}"
     for warning in record.warnings:
         yield f"  warning: {warning}"
     stages = record.time.stages

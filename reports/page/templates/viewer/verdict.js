@@ -5,6 +5,7 @@ function makeVerdict(element) {
   const rows = [.../** @type {NodeListOf<HTMLElement>} */ (element.querySelectorAll("li[data-scene]"))];
   const buttons = [.../** @type {NodeListOf<HTMLElement>} */ (element.querySelectorAll("[data-tolerance]"))];
   const bars = /** @type {HTMLElement} */ (element.querySelector(".bars"));
+  const line = /** @type {HTMLElement} */ (element.querySelector("[data-line]"));
   const count = /** @type {HTMLElement} */ (element.querySelector("[data-count]"));
 
   /** @param {string} tolerance */
@@ -20,6 +21,7 @@ function makeVerdict(element) {
       }
     }
     bars.style.setProperty("--at", tolerance);
+    line.textContent = tolerance;
     const passing = rows.filter((row) => row.classList.contains("passes")).length;
     count.textContent = `${passing} of ${rows.length} ${rows.length === 1 ? "scene passes" : "scenes pass"}.`;
   }
