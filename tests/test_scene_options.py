@@ -30,6 +30,13 @@ def test_a_placeholder_without_a_value_is_refused_by_name(run, scene, tmp_path):
     assert "grey" in messages.replace("grey.xml", "")
 
 
+@pytest.mark.parametrize("command", ["plan", "compare"])
+def test_a_value_without_a_placeholder_names_the_nearest_one(command, run, scene):
+    code, _, messages = run(command, scene, "-D", "grey=0.5", "-D", "gray=0.2", *SMALL)
+    assert code == 2
+    assert "it has no placeholder $gray (did you mean grey?)" in messages
+
+
 def test_a_defined_value_is_used_and_recorded(run, scene, tmp_path):
     albedos = {}
     for value in ("0.2", "0.6"):

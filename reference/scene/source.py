@@ -8,10 +8,10 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic.errors import InputError
+from heuristic.errors import InputError, suggestion
 from reference.scene import messages
 from reference.scene.graph import Graph, files_from, resolving
-from reference.scene.reading import included, require_named_files
+from reference.scene.reading import included, placeholders, require_named_files
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -98,6 +98,15 @@ class Source:
             self._read["content"] = self.content()
         return self._read["content"]
 
+    def _require_placeholders(self, path: Path) -> None:
+        """Ensure that the file has a placeholder for each given value."""
+        known = placeholders(path) if self.parameters else set()
+        for name in sorted(set(self.parameters) - known):
+            raise InputError(
+                f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
+                " into the file, or leave the option -D out."
+            )
+
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
         content, resolver = self._content(), None
@@ -108,6 +117,7 @@ class Source:
             else:
                 path = Path(content)
                 included(path, self.parameters)
+                self._require_placeholders(path)
                 resolver = files_from(path.resolve().parent)
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
