@@ -157,7 +157,10 @@ def _plain(draw, plugin):
         waves = {"type": "bitmap", "filename": str(_picture(draw)), "raw": True}
         return {"type": plugin, "arbitrary": waves, "scale": 0.1, "bsdf": _plain(draw, "diffuse")}
     if plugin == "principled":
-        return {"type": plugin, "base_color": draw.colour(), "roughness": alpha}
+        found = {"type": plugin, "base_color": draw.colour(), "roughness": alpha}
+        names = ("metallic", "specular", "clearcoat", "sheen", "spec_tint", "anisotropic")
+        found |= {name: draw.uniform(0, 1) for name in names if draw.chance(0.3)}
+        return found | ({"spec_trans": float(draw.chance(0.5)) * 0.4} if draw.chance(0.2) else {})
     if plugin == "mask":
         return {"type": plugin, "opacity": draw.uniform(0, 1), "bsdf": _plain(draw, "diffuse")}
     return {"type": plugin}

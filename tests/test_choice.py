@@ -12,7 +12,7 @@ from comparisons.cost.front import cheapest
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
-from reports.terminal.choice_lines import sentence
+from reports.terminal.choice_lines import lines
 from tests.benchmarks.choice import searched
 from tests.test_cost import TINY
 
@@ -80,7 +80,7 @@ def offer(method, seconds, error, prepare_s=0.0):
 
 
 def told(chosen, within=3.0):
-    return sentence(
+    found = lines(
         Choice(
             scene="box",
             resolution=(8, 8),
@@ -91,15 +91,24 @@ def told(chosen, within=3.0):
             full=offer("full plan", 0.21, 2.75),
         )
     )
+    return " ".join(found)
 
 
 def test_the_sentence_has_the_price_and_what_it_is_in_place_of():
-    assert told(offer("constant ambient", 0.004, 2.1, 0.1)) == (
-        "constant ambient with 16 samples per pixel: ΔE2000 2.10 at 4.00 ms and once 100 ms to"
+    assert told(offer("constant ambient", 0.004, 2.1, 0.1)).startswith(
+        "At 8x8: constant ambient with 16 samples per pixel: ΔE2000 2.10 at 4.00 ms and once 100 ms to"
         " prepare, in place of full plan with 16 samples per pixel: ΔE2000 2.75 at 210 ms."
     )
-    assert told(offer("full plan", 0.21, 2.75)).endswith("nothing cheaper stays within 3.")
-    assert "No measured method stays within ΔE2000 3. The nearest is path 5" in told(None)
+    assert "Nothing cheaper stays within 3." in told(offer("full plan", 0.21, 2.75))
+    none = "At 8x8 no measured method stays within ΔE2000 3. The nearest is path 5"
+    assert told(None).startswith(none)
+
+
+def test_the_methods_of_the_sentence_are_explained():
+    said = told(offer("constant ambient", 0.004, 2.1, 0.1))
+    assert "constant ambient: Ambient light that stands in" in said
+    assert said.endswith("full plan: Everything that the scene calls for.")
+    assert told(offer("full plan", 0.21, 2.75)).count("full plan: ") == 1
 
 
 def test_the_command_answers_and_its_exit_code_tells_whether_there_is_one(run, monkeypatch):
@@ -110,7 +119,7 @@ def test_the_command_answers_and_its_exit_code_tells_whether_there_is_one(run, m
     assert json.loads(said)["chosen"]["error"] <= 90
     code, said, _ = run(*words, "--within", 1e-9)
     assert code == 1
-    assert said.startswith("No measured method stays within")
+    assert said.startswith("At 12x12 no measured method stays within")
     code, _, said = run(*words, "--within", 1, "--verify")
     assert code == 2
     assert "give one" in said

@@ -319,6 +319,12 @@ def test_places_of_several_compilers_are_read(log):
     assert "a.glsl, at its end: " in told
 
 
+def test_of_each_line_the_first_error_counts():
+    log = "0:2(9): error: undeclared\n0:2(1): error: no matching types\n0:3(1): error: end\n"
+    told = shader_text.explained(log, "a.glsl", "one\ntwo\nthree")
+    assert told == "a.glsl, line 2: undeclared; a.glsl, line 3: end"
+
+
 def test_a_warning_is_no_error():
     log = "0:1(2): warning: unused\n0:2(9): error: oops\n"
     assert shader_text.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: oops"

@@ -1,5 +1,6 @@
 """The rules of pruning: each is refused where a premise does not hold, and the images show why."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -49,6 +50,59 @@ def means(description):
 def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):
     (planned, error), (stock, other) = means(SCENES[name]())
     assert abs(planned - stock) < 0.002 * stock + 5 * np.hypot(error, other) + 1e-6
+
+
+PRINCIPLED = {"type": "principled", "base_color": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("more", "opaque"),
+    [
+        ({}, True),
+        ({"spec_trans": 0.0, "metallic": 1.0, "base_color": 0.0}, True),
+        ({"spec_trans": 0.2}, False),
+        ({"spec_trans": {"type": "checkerboard"}}, False),
+    ],
+)
+def test_principled_only_reflects_unless_it_says_otherwise(rgb, more, opaque):
+    light = lamp((0, -3, 3))
+    described = scene(one=sphere(PRINCIPLED | more), light=light)
+    (found,) = facts_of(described).structure.shapes
+    assert (found.opaque, found.outer) == (opaque, True)
+    assert found.inner is not opaque
+    both = sphere({"type": "twosided", "bsdf": PRINCIPLED | more})
+    if opaque:  # Mitsuba has no two-sided form of the others
+        (found,) = facts_of(scene(one=both, light=light)).structure.shapes
+        assert (found.opaque, found.outer, found.inner) == (True,) * 3
+
+
+def test_what_principled_reflects_never_comes_from_below(rgb):
+    """The premise of the rule, at random parameters, directions and samples."""
+    rng, size, reflecting = np.random.default_rng(5), 4096, 0
+    for _ in range(40):
+        given = {name: float(rng.choice([0, 1, rng.random()])) for name in OF_PRINCIPLED}
+        bsdf = mi.load_dict(PRINCIPLED | given)
+        si = dr.zeros(mi.SurfaceInteraction3f, size)
+        si.sh_frame, si.n = mi.Frame3f(mi.Vector3f(0, 0, 1)), mi.Normal3f(0, 0, 1)
+        si.wi, wo = (mi.warp.square_to_uniform_sphere(points(rng, size)) for _ in range(2))
+        below = np.array((si.wi.z < 0) | (wo.z < 0))
+        value = np.array(bsdf.eval(mi.BSDFContext(), si, wo))
+        assert (value[:, below] == 0).all()
+        reflecting += (value[:, ~below] > 0).any()
+        sample = mi.Float(rng.random(size))
+        bs, weight = bsdf.sample(mi.BSDFContext(), si, sample, points(rng, size))
+        assert (np.array(weight)[:, np.array((si.wi.z < 0) | (bs.wo.z < 0))] == 0).all()
+    assert reflecting > 30  # others are mirrors, which no random direction meets
+
+
+OF_PRINCIPLED = (
+    "roughness", "metallic", "anisotropic", "specular", "spec_tint", "clearcoat",
+    "clearcoat_gloss", "sheen", "sheen_tint", "flatness",
+)  # fmt: skip
+
+
+def points(rng, size):
+    return mi.Point2f(*(mi.Float(row) for row in rng.random((2, size))))
 
 
 def test_with_every_premise_taken_for_true_it_is_wrong(rgb, monkeypatch):

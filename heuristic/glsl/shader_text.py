@@ -131,20 +131,24 @@ def refusal(text: str) -> tuple[int, str] | None:
 def explained(log: str, file: str, text: str) -> str:
     """Return the compiler's first errors, with places in a user's text as ``FILE, line N``.
 
-    Compilers write a place as ``0:3(7)``, ``0(3)`` or ``0:3``: source, line, column.
+    Compilers write a place as ``0:3(7)``, ``0(3)`` or ``0:3``: source, line, column. Of each line
+    only the first counts, since others follow from it.
     """
     lines = [line.strip() for line in log.splitlines() if "error" in line.lower()]
-    told = [_placed(line, file, text.count("\n") + 1) for line in lines]
-    return "; ".join(told[:3]) or f"{file}: {' '.join(log.split())}"
+    told: dict[str, str] = {}
+    for line in lines:
+        told.setdefault(*_placed(line, file, text.count("\n") + 1))
+    found = [f"{place}: {message}" for place, message in told.items()]
+    return "; ".join(found[:3]) or f"{file}: {' '.join(log.split())}"
 
 
-def _placed(line: str, file: str, length: int) -> str:
+def _placed(line: str, file: str, length: int) -> tuple[str, str]:
     found = _PLACE.search(line)
     message = re.sub(r"(?i)^error:\s*", "", line[found.end() :] if found else line).strip()
     number = int(next(filter(None, found.groups()))) if found else 0
     if number > length:
-        return f"{file}, at its end: {message}"
-    return f"{file}, line {number}: {message}" if number else f"{file}: {message}"
+        return f"{file}, at its end", message
+    return f"{file}, line {number}" if number else file, message
 
 
 def _structure(name: str, fields: dict[str, int], more: str = "") -> str:

@@ -4,7 +4,7 @@ Everything here errs on one side: a shape is called flat, closed or convex only 
 (:mod:`reference.planning.forms`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -112,7 +112,7 @@ def _facts(graph: Graph, index: int | None, shape: mi.Shape, found: Geometry) ->
     box = shape.bbox()
     nested = graph.children(index, BSDF) if index is not None else []
     bsdf = nested[0][1] if nested else None  # an instance has its group's
-    plugins, front, back = _sides(graph, bsdf)
+    opaque, front, back = _sides(graph, bsdf)
     return ShapeFacts(
         name=shape.id(),
         low=np.array(box.min, float).ravel(),
@@ -122,24 +122,28 @@ def _facts(graph: Graph, index: int | None, shape: mi.Shape, found: Geometry) ->
         inner=back if found.is_outward else front,
         shines_outwards=found.is_outward,
         plane=found.plane,
-        opaque=bool(plugins) and all(rule_of(p).reflectances is not None for p in plugins),
+        opaque=opaque,
     )
 
 
-def _sides(graph: Graph, bsdf: int | None) -> tuple[tuple[str, ...], bool, bool]:
-    """Return the plugins of a BSDF, and whether it can reflect on its front and on its back."""
+def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
+    """Return whether a BSDF only reflects, and whether it can on its front and on its back."""
     if bsdf is None:
-        return (), True, True
+        return False, True, True
     plugin, props = graph.plugin(bsdf), graph.props(bsdf)
     if plugin == "twosided":
         inner = [_sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
-        plugins = tuple(name for names, _, _ in inner for name in names)
         reflects = any(front or back for _, front, back in inner)
-        return plugins, reflects, reflects
-    reflectances = rule_of(plugin).reflectances
-    if reflectances is None:
-        return (plugin,), True, True
-    reflects = any(
-        values.may_be_nonzero(props.get(name, default)) for name, default in reflectances.items()
+        return bool(inner) and all(one[0] for one in inner), reflects, reflects
+    rule = rule_of(plugin)
+    if rule.reflectances is None or _any(props, rule.transmittances):
+        return False, True, True
+    reflects = not rule.reflectances or _any(props, rule.reflectances)
+    return True, reflects, reflects and bool(props.get("twosided", False))
+
+
+def _any(props: mi.Properties, defaults: Mapping[str, float]) -> bool:
+    """Return whether any of some parameters, given with defaults, may be other than 0."""
+    return any(
+        values.may_be_nonzero(props.get(name, default)) for name, default in defaults.items()
     )
-    return (plugin,), reflects, reflects and bool(props.get("twosided", False))

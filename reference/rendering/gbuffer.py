@@ -1,7 +1,8 @@
 """The geometry that the camera sees."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import starmap
 from typing import Any
 
 import drjit as dr
@@ -13,6 +14,9 @@ from heuristic.errors import InputError
 
 GRID = 192
 """Rays along each side for means over visible surfaces: some 37,000, enough for three digits."""
+
+
+UNNAMED = "unnamed"
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,20 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
     )
     seen = np.array(hit).reshape(height, width)
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
-    return GBuffer(points, normals, seen, _owners(shape, seen), _owners(si.bsdf(), seen))
+    shapes = _owners(shape, seen)
+    return GBuffer(points, normals, seen, shapes, _told_apart(_owners(si.bsdf(), seen), shapes))
+
+
+def _told_apart(materials: Owners, shapes: Owners) -> Owners:
+    """Name a material without an id, or with another's, after the first shape that shows it."""
+
+    def named(place: int, name: str) -> str:
+        shown = shapes.places[materials.places == place]
+        if not len(shown) or (name != UNNAMED and materials.names.count(name) == 1):
+            return name
+        return f"{'material' if name == UNNAMED else name} of {shapes.names[shown.min()]}"
+
+    return replace(materials, names=tuple(starmap(named, enumerate(materials.names))))
 
 
 def _owners(pointers, seen):
@@ -120,7 +137,7 @@ def _owners(pointers, seen):
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
     named = zip(found, first, strict=True)
-    names = tuple((pointers[int(at)].id() or "unnamed") if number else "" for number, at in named)
+    names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
     return Owners(np.where(seen, places.reshape(seen.shape), -1), names)
 
 

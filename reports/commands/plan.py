@@ -61,7 +61,7 @@ def plan(
             with progress.shown() as bar:
                 words = (scene, request, within, metric)
                 found = pool.do(Task(scene, tasks.chosen, words, bar.of(scene)))
-            lines, code = [choice_lines.sentence(found)], int(found.chosen is None)
+            lines, code = choice_lines.lines(found), int(found.chosen is None)
         elif verify:
             with progress.shown() as bar:
                 task = Task(scene, tasks.verified, (scene, request, None, True), bar.of(scene))

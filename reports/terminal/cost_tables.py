@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
+from reports.glossary import meanings
 from reports.terminal.tables import printed
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def lines(record: Cost) -> Iterator[str]:
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
     yield from _section("Error and time of each method", _rungs(record))
+    yield from _meanings(record)
     for method in record.left_out:
         yield f"left out: {method.name}: {method.reason}"
     yield from _section("Best within a time", _equal_time(record))
@@ -139,6 +141,14 @@ def _rungs(record: Cost) -> Rows:
             f"{max(point.mse, 0) ** 0.5:.2g}",
             "front" if point.pareto else "",
         )
+
+
+def _meanings(record: Cost) -> Iterator[str]:
+    """Yield what the physical methods leave out; the names of the others say it."""
+    known = meanings()
+    for rung in record.rungs:
+        if rung.family == "physical" and rung.name in known:
+            yield f"{rung.name}: {known[rung.name]}"
 
 
 def _first(point: Measured) -> str:

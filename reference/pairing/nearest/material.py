@@ -93,13 +93,15 @@ class Context:
 class Rule:
     """How to find the nearest material of a BSDF, and what planning knows about the BSDF.
 
-    ``reflectances`` are parameters with defaults; it reflects nothing if all are 0. They are None
-    unless it only reflects, on the side of the normal. ``wraps`` is whether it is made of other
+    ``reflectances`` are parameters with defaults; it reflects nothing if all are 0, and without any
+    it may always reflect. It only reflects, on the side of the normal, if all ``transmittances``
+    are 0; ``reflectances`` is None if that is not known. ``wraps`` is whether it is made of other
     BSDFs.
     """
 
     nearest: Callable[[Context, int], Nearest]
     reflectances: Mapping[str, float] | None = None
+    transmittances: Mapping[str, float] = field(default_factory=dict)
     wraps: bool = False
 
 
@@ -107,13 +109,11 @@ RULES: dict[str, Rule] = {}
 """By plugin; filled by :func:`rule`."""
 
 
-def rule(
-    *plugins: str, reflectances: Mapping[str, float] | None = None, wraps: bool = False
-) -> Callable:
-    """Declare a function as the :class:`Rule` of some plugins."""
+def rule(*plugins: str, **known: Any) -> Callable:
+    """Declare a function as the :class:`Rule` of some plugins, with what is known about them."""
 
     def declared(nearest):
-        RULES.update(dict.fromkeys(plugins, Rule(nearest, reflectances, wraps)))
+        RULES.update(dict.fromkeys(plugins, Rule(nearest, **known)))
         return nearest
 
     return declared

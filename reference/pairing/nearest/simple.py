@@ -112,7 +112,7 @@ def conductor(context: Context, index: int) -> Nearest:
     return Nearest(k_a=reflected, **probe.lobe(context, reflected, alpha), lost=tuple(lost))
 
 
-@rule("principled")
+@rule("principled", reflectances={}, transmittances={"spec_trans": 0.0})
 def principled(context: Context, index: int) -> Nearest:
     """``principled``: ``k_d = base_color (1 - metallic) (1 - spec_trans)``; the rest is a lobe.
 
