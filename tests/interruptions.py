@@ -36,8 +36,8 @@ STUDY = """
 name = "sharpness"
 scene = "lobe"
 [part.parameters]
-alpha = [0.1, 0.2, 0.4]
-light_angle = { from = 0, to = 60, steps = 6 }
+alpha = [0.1, 0.4]
+light_angle = { from = 0, to = 60, steps = 3 }
 """
 REPORT = """
 if __name__ != "__main__":  # in the process that renders

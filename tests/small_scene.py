@@ -1,4 +1,6 @@
-"""A scene file for tests: a ball over a floor, lit by a point and a constant emitter."""
+"""Scene files for tests: a ball over a floor."""
+
+import re
 
 SCENE = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="3"/></integrator>
@@ -24,4 +26,12 @@ SCENE = """<scene version="3.0.0">
   </emitter>
   <emitter type="constant"><rgb name="radiance" value="0.2"/></emitter>
 </scene>
+"""
+"""Lit by a point and a constant emitter: it has most effects."""
+
+PLAIN = re.sub(r"  <emitter type=.constant.*\n", "", SCENE)
+PLAIN = re.sub(r'(?s)"roughplastic">.*?</bsdf>', '"diffuse"/>', PLAIN, count=1)
+PLAIN = PLAIN.replace('"max_depth" value="3"', '"max_depth" value="2"')
+"""Diffuse, under the point alone, light reflected once: shadows are its one effect. Its study of
+cost takes a fifth of the other's time, in tests that are not about effects.
 """

@@ -16,7 +16,7 @@ import pytest
 from tests.interruptions import results
 from tests.programs import ROOT
 from tests.schemas import schema
-from tests.small_scene import SCENE
+from tests.small_scene import PLAIN, SCENE
 
 ABORTS = """
 import os, signal
@@ -106,6 +106,7 @@ def test_a_view_is_found_again_as_it_was_written(run, folder, tmp_path, monkeypa
         return written[-1][1]
 
     monkeypatch.setattr(output, "write_scene", spy)
+    (folder / "a.xml").write_text(PLAIN, encoding="utf-8")
     run("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4, "--why")
     (key, view), place = written[0], tmp_path / "out/a"
     found = finished.load(place, key)

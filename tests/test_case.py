@@ -6,7 +6,7 @@ import pytest
 from comparisons.case import Request, open_case
 from heuristic.errors import InputError
 from reference.scene import source
-from tests.small_scene import SCENE
+from tests.small_scene import PLAIN, SCENE
 
 SMALL = ("--spp", 4, "--resolution", "12x12")
 
@@ -50,6 +50,7 @@ def parses(monkeypatch):
 
 @pytest.mark.parametrize("command", ["compare", "plan", "cost", "fit"])
 def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses, command):
+    scene_file.write_text(PLAIN, encoding="utf-8")
     words = {"plan": (), "cost": ("--rounds", 2)}.get(command, ())
     folder = () if command == "plan" else ("-o", tmp_path / "out")
     assert run(command, scene_file, *words, *folder, *SMALL)[0] == 0

@@ -31,6 +31,7 @@ from heuristic.errors import InputError
 from heuristic.heuristics import HEURISTICS, Heuristic
 from reference.effects.obstacles import OCCLUSION
 from tests.schemas import schema
+from tests.small_scene import PLAIN
 
 # -- A metric ------------------------------------------------------------------------------------
 
@@ -231,6 +232,7 @@ def all_three(metric, monkeypatch):
 
 def test_all_three_are_in_json_tables_page_and_chart(all_three, run, scene_file, tmp_path):
     """Nothing but their declarations names them in the product."""
+    scene_file.write_text(PLAIN, encoding="utf-8")
     out = tmp_path / "out"
     words = ("--heuristic", "flat-tone", "--cost", "--figures", "--resolution", "12x12")
     assert run("compare", scene_file, "-o", out, "--spp", 4, *words)[0] == 0

@@ -14,7 +14,7 @@ from reports.commands import __path__ as commands
 from reports.files import listing, ownership
 from reports.run import output, places
 from tests.programs import ROOT
-from tests.small_scene import SCENE
+from tests.small_scene import PLAIN
 
 SMALL = ("--spp", 2, "--resolution", "12x12")
 
@@ -37,7 +37,7 @@ def scenes(folder, *names):
     made = [folder / name for name in names]
     for path in made:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(SCENE, encoding="utf-8")
+        path.write_text(PLAIN, encoding="utf-8")
     return made
 
 

@@ -220,7 +220,7 @@ def test_the_cheapest_way_is_the_fastest_that_reaches_an_error():
 def predicted():
     """A study that predicts for a small size, and measures there."""
     case = open_case("fig-8-9", Request())
-    effort = Effort(rounds=3, largest=4, reference_spp=4, replicates=3, replicate_spp=4)
+    effort = Effort(rounds=2, largest=4, reference_spp=4, replicates=3, replicate_spp=4)
     return cost(case.source, case.options, effort, at=(64, 48), is_measured=True).record
 
 

@@ -9,6 +9,7 @@ from heuristic.points import Point
 from reports import verdict
 from reports.terminal import progress
 from tests import cost_records, records
+from tests.small_scene import PLAIN
 
 
 def found(scene="a", mean=4.0, beyond=0.5, parts=(), remedies=None):
@@ -110,6 +111,7 @@ def test_advice_names_cause_and_remedy_of_each_scene_that_fails():
 def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
     run, causes, scene_file, tmp_path
 ):
+    scene_file.write_text(PLAIN, encoding="utf-8")
     for words, has_causes in (((), True), (("--no-why",), False)):
         out = tmp_path / f"{has_causes}"
         small = ("--spp", 4, "--resolution", "12x8")
