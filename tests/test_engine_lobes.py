@@ -79,9 +79,9 @@ FORMS = {
 
 def integral(f, degrees):
     """``int f(fixed, o) cos o do`` over the hemisphere: Gauss and Legendre, and trapezoids."""
-    nodes, weights = np.polynomial.legendre.leggauss(256)
+    nodes, weights = np.polynomial.legendre.leggauss(192)
     z, weights = (nodes + 1) / 2, weights / 2
-    azimuth = np.linspace(0, 2 * np.pi, 512, endpoint=False)
+    azimuth = np.linspace(0, 2 * np.pi, 160, endpoint=False)
     z, azimuth = np.meshgrid(z, azimuth, indexing="ij")
     sine = np.sqrt(1 - z**2)
     over = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z])

@@ -79,7 +79,7 @@ def test_principled_only_reflects_unless_it_says_otherwise(rgb, more, opaque):
 def test_what_principled_reflects_never_comes_from_below(rgb):
     """The premise of the rule, at random parameters, directions and samples."""
     rng, size, reflecting = np.random.default_rng(5), 4096, 0
-    for _ in range(40):
+    for _ in range(12):
         given = {name: float(rng.choice([0, 1, rng.random()])) for name in OF_PRINCIPLED}
         bsdf = mi.load_dict(PRINCIPLED | given)
         si = dr.zeros(mi.SurfaceInteraction3f, size)
@@ -92,7 +92,7 @@ def test_what_principled_reflects_never_comes_from_below(rgb):
         sample = mi.Float(rng.random(size))
         bs, weight = bsdf.sample(mi.BSDFContext(), si, sample, points(rng, size))
         assert (np.array(weight)[:, np.array((si.wi.z < 0) | (bs.wo.z < 0))] == 0).all()
-    assert reflecting > 30  # others are mirrors, which no random direction meets
+    assert reflecting > 8  # others are mirrors, which no random direction meets
 
 
 OF_PRINCIPLED = (
