@@ -120,7 +120,7 @@ def spread_about(value):
 FORECASTS = [
     ("full plan", 4, 0.04, 4.0),
     ("full plan", 16, 0.16, 2.0),
-    ("Phong kernel", 4, 2e-3, 7),
+    ("Phong kernel", 4, 0.002, 7.0),
 ]
 
 
@@ -201,4 +201,7 @@ def test_errors_of_nothing_are_drawn_at_the_lower_border():
     svg = vl_convert.vegalite_to_svg(prediction_chart.prediction_chart(record))
     (_, nothing), (measured,) = symbol_layers(svg)
     assert nothing[1] == measured[1] == pytest.approx(380, abs=1e-3)
+    bands = re.findall(r'aria-roledescription="area mark" d="([^"]+)Z"', svg)
+    heights = [float(y) for band in bands for y in re.findall(r",([^L]+)", band)]
+    assert max(heights) == pytest.approx(380, abs=1e-3)
     assert "NaN" not in svg
