@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from comparisons.gallery.builtin import builtin
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade
-from heuristic.errors import InputError
+from heuristic.errors import InputError, OutputError
 from heuristic.interpolation import (
     Interpolation,
     barycentric_coordinates,
@@ -21,6 +21,9 @@ from heuristic.interpolation import (
 )
 from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
 from heuristic.vertex_normals import Weighting
+from reference import Source
+from reference.pairing import meshing
+from reference.pairing.halves import pair
 from reference.scene import messages
 from reference.scene.graph import Reference, properties
 from tests import oracle
@@ -669,3 +672,68 @@ def test_the_integrator_refuses_shapes_that_are_not_meshes(variant):
     scene = mi.load_dict(two_balls(twosided=False))
     with pytest.raises(InputError, match=r"shape '(out|in)ward' is a Sphere: .* need triangle"):
         scene.integrator().render(scene, spp=1)
+
+
+# --- A scene's shapes become meshes ---------------------------------------------------------------
+
+TETRAHEDRON = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)
+SIDES = ((0, 1, 3), (0, 2, 1), (0, 3, 2), (1, 2, 3))
+
+
+def seen(**shapes):
+    """A scene of diffuse shapes under a parallel light."""
+    film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+    to_world = mi.ScalarTransform4f().look_at((1, -6, 2), (0, 0, 0), (0, 0, 1))
+    sun = {"type": "directional", "direction": (-1, 2, -1)}
+    sensor = {"type": "perspective", "to_world": to_world, "film": film}
+    return Source("a test", {"type": "scene", "sensor": sensor, "sun": sun, **shapes})
+
+
+def half(source, interpolation=PHONG, **others):
+    return pair(source, interpolation=interpolation, **others).heuristic.instantiate()
+
+
+def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
+    """Under parallel light a diffuse face is even, however it is shaded."""
+    path = tmp_path / "four.ply"
+    triangle_mesh(TETRAHEDRON, faces=SIDES).write_ply(str(path))
+    shape = {"type": "ply", "filename": str(path), "face_normals": True}
+    pictures = {
+        name: np.array(mi.render(half(seen(it=shape), **how), spp=4))
+        for name, how in {
+            "as it is": {},
+            "as a mesh": {"tessellation": 4},
+            "flat": {"interpolation": FLAT},
+            "gouraud": {"interpolation": GOURAUD},
+        }.items()
+    }
+    expected = pictures.pop("as it is")
+    assert len(np.unique(expected[..., 0].round(4))) > 3
+    for name, picture in pictures.items():
+        np.testing.assert_allclose(picture, expected, atol=1e-5, err_msg=name)
+
+
+def test_meshes_without_normals_get_those_of_their_faces(rgb):
+    """The normals of a sphere's mesh are nearly its radii."""
+    ball = {"type": "ellipsoidsmesh", "centers": mi.TensorXf([0.5, 1, -1], (1, 3)),
+            "scales": mi.TensorXf([0.7] * 3, (1, 3)),
+            "quaternions": mi.TensorXf([0, 0, 0, 1], (1, 4))}  # fmt: skip
+    (mesh,) = half(seen(it=ball), GOURAUD).shapes()
+    radii = rows(meshes.positions(mesh)) - (0.5, 1, -1)
+    radii /= np.linalg.norm(radii, axis=1, keepdims=True)
+    assert np.sum(rows(meshes.normals(mesh)) * radii, axis=1) == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
+def test_instances_are_refused_by_name(rgb, interpolation):
+    group = {"type": "shapegroup", "ball": {"type": "sphere"}}
+    copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
+    source = seen(group=group, left=copy)
+    with pytest.raises(InputError, match=r"instances and their groups .* --interpolation phong"):
+        half(source, interpolation)
+
+
+def test_without_room_for_the_meshes_it_says_what_to_do(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(meshing, "mkdtemp", lambda prefix: str(tmp_path / "gone"))
+    with pytest.raises(OutputError, match=r"a test: .*gone.* Free some space, or set TMPDIR"):
+        half(seen(it={"type": "sphere"}), FLAT)
