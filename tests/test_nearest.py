@@ -15,8 +15,7 @@ from reference import Convention, Source
 from reference.pairing import albedo, halves, partners
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.lights.measured import beam, mean_radiance
-from reference.pairing.nearest import nearest_of
-from reference.pairing.nearest.probe import SMOOTH_ALPHA
+from reference.pairing.nearest import nearest_of, probe
 from reference.scene.graph import Reference
 from tests.test_physics import look_at
 
@@ -281,7 +280,7 @@ def test_a_textured_plastic_is_paired_by_name_at_each_point(rgb, reflectance):
 def test_a_smooth_plastic_is_paired_by_name_as_a_rough_one_with_a_narrow_lobe(rgb):
     given = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.7}
     smooth = material({"type": "plastic", **given}, Convention.LITERAL)
-    rough = {"type": "roughplastic", "alpha": SMOOTH_ALPHA, **given}
+    rough = {"type": "roughplastic", "alpha": probe.SMOOTH_ALPHA, **given}
     rough = material(rough, Convention.LITERAL)
     for name in ("k_a", "k_d", "k_s", "n"):
         expected = np.ravel(getattr(rough, name))
@@ -390,6 +389,13 @@ def test_an_unknown_material_that_cannot_be_sampled_is_grey_and_said_to_be_so(rg
     ((_, instead),) = found.lost
     assert "it cannot be sampled" in instead
     assert partner({"type": "unsampled"}).base_color == 0.5
+
+
+@pytest.mark.parametrize("plugin", ["conductor", "dielectric", "principled"])
+def test_a_known_material_that_cannot_be_sampled_is_refused_by_name(rgb, monkeypatch, plugin):
+    monkeypatch.setattr(probe, "probe", lambda bsdf: None)
+    with pytest.raises(InputError, match=r"odd: its albedo is not a number, or .* cannot sample"):
+        material({"type": plugin, "id": "odd"})
 
 
 def test_hair_without_absorption_is_white_and_with_much_of_it_dark(rgb):
