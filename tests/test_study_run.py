@@ -118,6 +118,8 @@ def test_a_row_names_the_material_that_pairing_derived(rgb):
     derived = {"alpha": plastic.alpha, "int_ior": plastic.int_ior}
     derived["reflectance"] = plastic.diffuse_reflectance[0]
     assert {name: found[name] for name in derived} == pytest.approx(derived, rel=1e-3)
+    found = first_row("n = 20\nk_d = 0.3\nk_s = 0")  # diffuse, which has no roughness
+    assert not any(found.get(name) for name in ("alpha", "int_ior", "reflectance"))
 
 
 def test_a_plan_that_a_probe_contradicts_simulates_everything(rgb, monkeypatch):
