@@ -52,6 +52,13 @@ def camera(inner):
     return '<sensor type="perspective">', f'<sensor type="perspective" id="eye">{inner}'
 
 
+def table(values):
+    inner = '<string name="wavelengths" value="400, 500, 600"/>'
+    inner += f'<string name="values" value="{values}"/>'
+    spectrum = f'<spectrum type="irregular" name="reflectance" id="odd">{inner}</spectrum>'
+    return MATTE, f'<bsdf type="diffuse">{spectrum}</bsdf>'
+
+
 def film(inner):
     return FILM, f"{FILM}{inner}"
 
@@ -84,6 +91,24 @@ BROKEN = {
     ),
     "NaN transform": (SPHERE, BALL + transform('<translate x="nan"/>'), "ball: to_world .*finite"),
     "infinite transform": (SPHERE, BALL + transform('<scale value="inf"/>'), "ball: to_world"),
+    "a matrix that no axis leaves": (
+        SPHERE,
+        BALL + transform('<matrix value="1 0 0 0  1 0 0 0  0 0 1 0  0 0 0 1"/>'),
+        "ball: to_world .*inverted",
+    ),
+    "a matrix that flattens": (
+        SPHERE,
+        BALL + transform('<matrix value="1 1 0 0  1 1 0 0  0 0 1 0  0 0 0 1"/>'),
+        "ball: to_world .*inverted",
+    ),
+    "a cylinder without length": (
+        END,
+        '<shape type="cylinder" id="tube"><point name="p0" x="1" y="2" z="3"/>'
+        f'<point name="p1" x="1" y="2" z="3"/></shape>{END}',
+        "tube: p0 and p1 are the same point",
+    ),
+    "a table with a NaN": (*table("0.1, nan, 0.3"), "odd: values = .*finite"),
+    "a table with a word": (*table("0.1, some, 0.3"), "some"),
     "camera at its target": (LOOK, LOOK.replace("0, -5, 2", "0, 0, 0"), "invalid lookat"),
     "camera along up": (LOOK, LOOK.replace('up="0, 0, 1"', 'up="0, -5, 2"'), "invalid lookat"),
     "fov NaN": (*camera(number("fov", "nan")), "eye: fov = nan .*between 0 and 180"),
@@ -133,6 +158,7 @@ BROKEN = {
         '<bsdf type="blendbsdf" id="odd"><bsdf type="diffuse"/></bsdf>',
         "odd: it needs 2 BSDF elements, and has 1",
     ),
+    "a NUL byte": ("point", "p\0int", "holds a NUL byte"),
     "not UTF-8": ("point", "p\udce9int", "not UTF-8"),
 }
 
@@ -328,6 +354,44 @@ def test_text_without_end_is_refused(rgb, tmp_path, monkeypatch):
     (tmp_path / "part.xml").write_text(f'<scene version="3.0.0"><!--{4000 * "x"}--></scene>')
     with pytest.raises(InputError, match=r"part.xml: .*4200 are allowed"):
         compared(tmp_path, SCENE.replace(END, '<include filename="part.xml"/>' + END))
+
+
+def test_a_chain_of_includes_ends(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "DEEPEST", 3)
+    for place in range(4):
+        inner = f'<include filename="{place + 1}.xml"/>'
+        (tmp_path / f"{place}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
+    (tmp_path / "4.xml").write_text('<scene version="3.0.0"/>')
+    with pytest.raises(InputError, match=r"2.xml: more than 3 files include each other"):
+        compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
+    included = reading.included(tmp_path / "2.xml")
+    assert [path.name for path in included] == ["2.xml", "3.xml", "4.xml"]
+
+
+@pytest.mark.parametrize("reader", READERS.values(), ids=READERS.keys())
+def test_a_name_too_long_for_a_file_is_refused(rgb, tmp_path, reader):
+    with pytest.raises(InputError, match="xxxx"):
+        compared(tmp_path, SCENE.replace(END, reader.format(5000 * "x") + END))
+
+
+def test_a_name_too_long_for_a_file_is_refused_in_a_dictionary_too(rgb):
+    given = {"type": "scene", "mesh": {"type": "ply", "filename": 5000 * "x"}}
+    with pytest.raises(InputError, match=r"^'x+': File name too long. Give a file.$"):
+        open_case(given)
+
+
+def test_a_name_with_a_nul_is_refused(rgb, tmp_path):
+    """From a placeholder's value: a file that holds one is refused as a whole."""
+    text = SCENE.replace(END, '<shape type="ply"><string name="filename" value="$mesh"/></shape>'
+                         + END)  # fmt: skip
+    with pytest.raises(InputError, match="ball"):
+        compared(tmp_path, text, define={"mesh": "ball\0.ply"})
+
+
+def test_a_folder_is_not_read_as_a_scene(tmp_path):
+    with pytest.raises(InputError, match="no such regular file"):
+        reading.included(tmp_path)
+    assert reading.placeholders(tmp_path) == set()
 
 
 # -- Options ---------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from heuristic.errors import InputError
 from reports import cli
 from tests.programs import python
 from tests.schemas import schema
@@ -97,6 +98,8 @@ def test_a_scene_that_cannot_be_used_is_refused_in_one_message(name, run, tmp_pa
         (("fig-8-9", "--variant", "cuda_rgb"), "llvm_ad_rgb"),
         (("fig-8-9", "--spp", "1"), "range"),
         (("fig-8-9", "--pairing", "fit"), "literal"),
+        (("fig-8-9", "-D", "grey"), "'grey' is not a definition; write it like name=value"),
+        (("fig-8-9", "-D", "=0.5"), "'=0.5' is not a definition"),
         ((), "Missing argument"),
         (("",), "'' is neither a file nor"),  # an empty variable of a shell is not this folder
         (("x" * 1000,), "File name too long"),
@@ -114,6 +117,22 @@ def test_a_folder_that_cannot_be_written_is_refused_before_rendering(run, tmp_pa
     code, _, messages = run("compare", "fig-8-9", "-o", tmp_path / "file" / "out")
     assert code == 2
     assert f"{tmp_path / 'file' / 'out'}: Not a directory" in messages
+
+
+def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
+    run, scene_file, tmp_path, monkeypatch
+):
+    def fails(*_args, **_kwargs):
+        raise InputError("the effects have no price")
+
+    monkeypatch.setattr("comparisons.cost.cost.quick", fails)
+    words = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path)
+    assert run("compare", scene_file, "--why", *words)[0] == 0
+    record = json.loads((tmp_path / "my-scene/comparison.json").read_text(encoding="utf-8"))
+    assert record["metrics"]["dE2000"]["mean"] > 0
+    assert record["warnings"][-1] == "The causes are unknown: the effects have no price"
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "The causes are unknown: the effects have no price" in page
 
 
 def test_an_error_leaves_the_earlier_result(run, scene_file, tmp_path, monkeypatch):

@@ -1,9 +1,13 @@
 """Batches and checks on a Dask cluster give what they give here."""
 
+from pathlib import Path
+
 import pytest
 
 from comparisons.processes import cluster
 from comparisons.processes.worker import Task
+from heuristic.errors import InputError
+from reports import jobs
 from tests import dask_cluster
 from tests.interruptions import results
 from tests.small_baselines import change
@@ -53,3 +57,13 @@ def test_workers_of_two_kinds_exclude_each_other(run, scene_file, tmp_path):
     code, _, messages = run(*words, "--workers", 2)
     assert code == 2
     assert "exclude each other" in messages
+
+
+def test_a_worker_without_the_folder_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "here").mkdir()
+    jobs._enter(str(tmp_path / "here"))
+    assert Path.cwd() == tmp_path / "here"
+    with pytest.raises(InputError, match=r"gone: No such file or directory, on a worker"):
+        jobs._enter(str(tmp_path / "gone"))
+    assert Path.cwd() == tmp_path / "here"

@@ -7,8 +7,8 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from comparisons.cost.cost_record import Measured
-from reports.charts import error_over_time
+from comparisons.cost.cost_record import Measured, Prediction
+from reports.charts import error_over_time, prediction_chart, vega
 from tests import cost_records
 
 
@@ -56,12 +56,18 @@ def test_it_draws_and_names_axes_units_and_every_rung(points, floor):
     assert "NaN" not in svg
 
 
+def symbol_layers(svg):
+    """Return the places of the points of each layer that has some, in pixels."""
+    return [
+        [tuple(map(float, place)) for place in re.findall(r"translate\(([^,]+),([^)]+)\)", marks)]
+        for marks in re.findall(r'<g class="mark-symbol role-mark [^>]*>(.*?)</g>', svg)
+    ]
+
+
 def symbols(svg):
     """Return the places of the points of a chart, in pixels."""
-    (marks,) = re.findall(r'<g class="mark-symbol role-mark [^>]*>(.*?)</g>', svg)
-    return [
-        tuple(map(float, place)) for place in re.findall(r"translate\(([^,]+),([^)]+)\)", marks)
-    ]
+    (marks,) = symbol_layers(svg)
+    return marks
 
 
 def lines(svg):
@@ -102,3 +108,100 @@ def test_names_stand_beside_the_plot_and_lead_to_their_slowest_point():
     assert between >= error_over_time.LABEL_GAP
     for name, (_, y) in found.items():
         assert y == pytest.approx(places[name][1] + 3, abs=error_over_time.LABEL_GAP)
+
+
+# --- Predictions ----------------------------------------------------------------------------------
+
+
+def spread_about(value):
+    return {"value": value, "low": 0.8 * value, "high": 1.5 * value}
+
+
+FORECASTS = [
+    ("full plan", 4, 0.04, 4.0),
+    ("full plan", 16, 0.16, 2.0),
+    ("Phong kernel", 4, 0.002, 7.0),
+]
+
+
+def predicted(forecasts=FORECASTS, measured=()):
+    """A record with forecasts at a size, and the seconds and errors measured for the first ones."""
+    rows = [
+        {"method": name, "spp": spp, "seconds": spread_about(time), "error": spread_about(error)}
+        for name, spp, time, error in forecasts
+    ]
+    for row, (time, error) in zip(rows, measured, strict=False):
+        seconds = cost_records.point(row["method"], 4, time, error, False)["seconds"]
+        row["measured"] = {"seconds": seconds, "error": error, "error_spread": 0.1}
+    found = {"resolution": (640, 480), "level": 0.9, "fitted": [(64, 48), (128, 96)], "rounds": 3}
+    found |= {"laws": [], "forecasts": rows, "cheapest": []}
+    whole = cost_records.record("synthetic")
+    return structs.replace(whole, prediction=convert(found, Prediction))
+
+
+def on_axes(places, values):
+    """Return where logarithmic axes through the first and the last place have other values."""
+    places, logarithms = np.array(places), np.log(values)
+    begin, end = logarithms[0], logarithms[-1]
+    return places[0] + (logarithms - begin) / (end - begin) * (places[-1] - places[0])
+
+
+def test_forecasts_and_measurements_lie_on_the_same_axes():
+    measured = [(0.05, 5.0), (0.02, 2.5)]
+    svg = vl_convert.vegalite_to_svg(prediction_chart.standing_alone(predicted(measured=measured)))
+    points, crosses = symbol_layers(svg)
+    values = [row[2:] for row in FORECASTS]
+    expected = on_axes([points[0], *crosses, *points[1:]], [values[0], *measured, *values[1:]])
+    np.testing.assert_allclose([points[0], *crosses, *points[1:]], expected, atol=1e-3)
+    (slow_x, low_y), (fast_x, high_y) = points[1:]
+    assert fast_x < slow_x
+    assert high_y < low_y  # larger errors stand higher
+    assert np.all((np.array(points) > 0) & (np.array(points) < (560, 380)))
+    strokes = re.findall(
+        r'aria-label="fastest[^"]*" [^>]*translate\(([^,]+),[^>]*x2="([^"]+)"', svg
+    )
+    for (x, _), (begin, length) in zip(points, np.array(strokes, float), strict=True):
+        scale = (slow_x - fast_x) / np.log(0.16 / 2e-3)
+        assert begin - x == pytest.approx(scale * np.log(0.8), abs=1e-3)
+        assert begin + length - x == pytest.approx(scale * np.log(1.5), abs=1e-3)
+
+
+def test_bands_reach_from_the_low_to_the_high_error_of_each_forecast():
+    svg = vl_convert.vegalite_to_svg(prediction_chart.standing_alone(predicted()))
+    (points,) = symbol_layers(svg)
+    bands = re.findall(r'aria-roledescription="area mark" d="([^"]+)Z"', svg)
+    corners = {
+        tuple(np.round(np.array(corner.split(","), float), 1))
+        for band in bands
+        for corner in band[1:].split("L")
+    }
+    rise = (points[1][1] - points[2][1]) / np.log(3.5)  # from an error of 2 to one of 7
+    expected = {(x, y - rise * np.log(share)) for x, y in points for share in (0.8, 1.5)}
+    # A band of one forecast has no width, and so both its ends in one place of the outline.
+    assert len(corners) == len(expected)
+    for corner in expected:
+        assert min(np.abs(np.array(list(corners)) - corner).max(axis=1)) < 0.15
+
+
+def test_a_prediction_is_titled_by_its_size_and_tells_of_crosses_only_where_some_are():
+    bare, seen = predicted(), predicted(measured=[(0.05, 5.0)])
+    for record, says_so in ((bare, False), (seen, True)):
+        svg = vega.paper(prediction_chart.standing_alone(record)).decode()
+        assert "synthetic: predicted at 640 × 480 pixels" in svg
+        assert "fitted to 64x48, 128x96" in svg
+        assert "90% intervals" in svg
+        assert ("crosses: measured" in svg) == says_so
+        assert len(symbol_layers(svg)) == 1 + says_so
+        assert "NaN" not in svg
+
+
+def test_errors_of_nothing_are_drawn_at_the_lower_border():
+    rows = [("full plan", 4, 0.04, 4.0), ("Phong kernel", 4, 2e-3, 0.0)]
+    record = predicted(rows, measured=[(0.05, 0.0)])
+    svg = vl_convert.vegalite_to_svg(prediction_chart.prediction_chart(record))
+    (_, nothing), (measured,) = symbol_layers(svg)
+    assert nothing[1] == measured[1] == pytest.approx(380, abs=1e-3)
+    bands = re.findall(r'aria-roledescription="area mark" d="([^"]+)Z"', svg)
+    heights = [float(y) for band in bands for y in re.findall(r",([^L]+)", band)]
+    assert max(heights) == pytest.approx(380, abs=1e-3)
+    assert "NaN" not in svg

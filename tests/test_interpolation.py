@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from comparisons.gallery.builtin import builtin
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade
-from heuristic.errors import InputError
+from heuristic.errors import InputError, OutputError
 from heuristic.interpolation import (
     Interpolation,
     barycentric_coordinates,
@@ -21,6 +21,9 @@ from heuristic.interpolation import (
 )
 from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
 from heuristic.vertex_normals import Weighting
+from reference import Source
+from reference.pairing import meshing
+from reference.pairing.halves import pair
 from reference.scene import messages
 from reference.scene.graph import Reference, properties
 from tests import oracle
@@ -601,3 +604,136 @@ def test_a_scenes_shapes_are_replaced_by_meshes_that_keep_material_and_name(rgb,
     )
     stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
     np.testing.assert_allclose(stored, np.broadcast_to(expected, stored.shape), atol=1e-5)
+
+
+# --- Through the plugins --------------------------------------------------------------------------
+
+
+def two_balls(twosided):
+    """Two coarse balls, of which the camera sees the outside of one and the back of the other."""
+    phong = {"type": "phong", "k_d": 0.5, "k_s": 0.7, "n": 9.0, "twosided": twosided}
+    balls = {
+        name: mi.load_dict({"type": "sphere", "id": name, "center": (x, 0, 0), "bsdf": phong}
+                           | {"flip_normals": x > 0})
+        for name, x in {"outward": -1, "inward": 1}.items()
+    }  # fmt: skip
+    film = {"type": "hdrfilm", "width": 16, "height": 16}
+    to_world = mi.ScalarTransform4f().look_at((1, -6, 2), (0, 0, 0), (0, 0, 1))
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic", "interpolation": "flat"},
+        "sensor": {"type": "perspective", "to_world": to_world, "film": film},
+        "lamp": {"type": "heuristic_point", "position": (3, -5, 4), "k0": 0.0, "k2": 0.1}
+        | {"intensity": {"type": "uniform", "value": 3.0}},
+        **balls,
+    }
+
+
+@pytest.mark.parametrize(
+    "variant", ["llvm_ad_rgb", "llvm_ad_mono", "llvm_ad_spectral"], indirect=True
+)
+@pytest.mark.parametrize("twosided", [False, True])
+def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
+    """Of the face's own normal, on the side that is seen; the corners are those of the mesh."""
+    given = two_balls(twosided)
+    names = ("outward", "inward")
+    given |= {name: meshes.to_mesh(given[name], 3) for name in names}
+    scene = mi.load_dict(given, optimize=False)
+    mi.render(scene, spp=1)  # stores the values, in variants that do
+    x, z = np.random.default_rng(6).uniform(-2, 2, (2, 400))
+    ray = mi.Ray3f(mi.Point3f(1, -6, 2), dr.normalize(mi.Vector3f(x - 1, 6, z - 2)))
+    if mi.is_spectral:
+        ray.wavelengths = mi.Spectrum(450, 500, 550, 600)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, len(x))
+    found, valid, _ = scene.integrator().sample(scene, sampler, mi.RayDifferential3f(ray))
+    found = np.array(found & valid).T
+    si = scene.ray_intersect(ray)
+    material = oracle.Material(k_d=0.5, k_s=0.7, n=9)
+    lamp = oracle.Light("point", 3.0, position=(3, -5, 4), attenuation=(0, 0, 0.1))
+    for mesh, middle in ((given[name], x) for name, x in zip(names, (-1, 1), strict=True)):
+        where = np.array(si.shape == mi.ShapePtr(mesh)) & np.array(si.is_valid())
+        assert where.sum() > 50
+        corners = rows(meshes.positions(mesh))[rows(meshes.faces(mesh)).astype(int)]
+        points = corners[np.array(si.prim_index)[where]]
+        centroid, (a, b, c) = points.mean(axis=1), points.transpose(1, 0, 2)
+        normal = np.cross(b - a, c - a)
+        normal *= np.sign(np.sum(normal * (centroid - (middle, 0, 0)), axis=1))[:, None]
+        view = np.array((1, -6, 2)) - centroid
+        expected = oracle.shade(centroid, normal, view, material, [lamp])
+        assert np.ptp(expected) > 0.2
+        if mesh is given["inward"] and not twosided:
+            expected = 0 * expected
+        np.testing.assert_allclose(found[where], expected + 0 * found[where], atol=1e-5)
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+def test_the_integrator_refuses_shapes_that_are_not_meshes(variant):
+    scene = mi.load_dict(two_balls(twosided=False))
+    with pytest.raises(InputError, match=r"shape '(out|in)ward' is a Sphere: .* need triangle"):
+        scene.integrator().render(scene, spp=1)
+
+
+# --- A scene's shapes become meshes ---------------------------------------------------------------
+
+TETRAHEDRON = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)
+SIDES = ((0, 1, 3), (0, 2, 1), (0, 3, 2), (1, 2, 3))
+
+
+def seen(**shapes):
+    """A scene of diffuse shapes under a parallel light."""
+    film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+    to_world = mi.ScalarTransform4f().look_at((1, -6, 2), (0, 0, 0), (0, 0, 1))
+    sun = {"type": "directional", "direction": (-1, 2, -1)}
+    sensor = {"type": "perspective", "to_world": to_world, "film": film}
+    return Source("a test", {"type": "scene", "sensor": sensor, "sun": sun, **shapes})
+
+
+def half(source, interpolation=PHONG, **others):
+    return pair(source, interpolation=interpolation, **others).heuristic.instantiate()
+
+
+def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
+    """Under parallel light a diffuse face is even, however it is shaded."""
+    path = tmp_path / "four.ply"
+    triangle_mesh(TETRAHEDRON, faces=SIDES).write_ply(str(path))
+    shape = {"type": "ply", "filename": str(path), "face_normals": True}
+    pictures = {
+        name: np.array(mi.render(half(seen(it=shape), **how), spp=4))
+        for name, how in {
+            "as it is": {},
+            "as a mesh": {"tessellation": 4},
+            "flat": {"interpolation": FLAT},
+            "gouraud": {"interpolation": GOURAUD},
+        }.items()
+    }
+    expected = pictures.pop("as it is")
+    assert len(np.unique(expected[..., 0].round(4))) > 3
+    for name, picture in pictures.items():
+        np.testing.assert_allclose(picture, expected, atol=1e-5, err_msg=name)
+
+
+def test_meshes_without_normals_get_those_of_their_faces(rgb):
+    """The normals of a sphere's mesh are nearly its radii."""
+    ball = {"type": "ellipsoidsmesh", "centers": mi.TensorXf([0.5, 1, -1], (1, 3)),
+            "scales": mi.TensorXf([0.7] * 3, (1, 3)),
+            "quaternions": mi.TensorXf([0, 0, 0, 1], (1, 4))}  # fmt: skip
+    (mesh,) = half(seen(it=ball), GOURAUD).shapes()
+    radii = rows(meshes.positions(mesh)) - (0.5, 1, -1)
+    radii /= np.linalg.norm(radii, axis=1, keepdims=True)
+    assert np.sum(rows(meshes.normals(mesh)) * radii, axis=1) == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
+def test_instances_are_refused_by_name(rgb, interpolation):
+    group = {"type": "shapegroup", "ball": {"type": "sphere"}}
+    copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
+    source = seen(group=group, left=copy)
+    with pytest.raises(InputError, match=r"instances and their groups .* --interpolation phong"):
+        half(source, interpolation)
+
+
+def test_without_room_for_the_meshes_it_says_what_to_do(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(meshing, "mkdtemp", lambda prefix: str(tmp_path / "gone"))
+    with pytest.raises(OutputError, match=r"a test: .*gone.* Free some space, or set TMPDIR"):
+        half(seen(it={"type": "sphere"}), FLAT)

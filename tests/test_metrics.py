@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from comparisons.departure.metric import Pixelwise
+from comparisons.departure import definitions
+from comparisons.departure.metric import Metric, Pixelwise
 from comparisons.departure.metrics import (
     LOG2_EPSILON,
     METRICS,
@@ -24,8 +25,9 @@ from comparisons.departure.statistics import (
     summarise_log2_luminance,
 )
 from comparisons.records import plain
-from heuristic.errors import InputError, NonFiniteError
+from heuristic.errors import InputError, InstallationError, NonFiniteError
 from reference.rendering.renderer import require_finite
+from reports.commands import doctor
 
 VIEWING = Viewing()
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
@@ -382,3 +384,54 @@ def test_wrong_shapes_and_viewing_are_refused(images):
             Viewing(exposure=value)
     with pytest.raises(InputError, match="white_luminance"):
         Viewing(white_luminance=0.0)
+
+
+# --- Metrics from outside, and the definitions that `fotismos doctor` compares --------------------
+
+
+def declared(**others):
+    """A metric of a user's own: a colour space and a distance that are plain functions."""
+    return Pixelwise(
+        name="own", label="Own", unit="", definition="", caution="", map_range=(0.0, 1.0),
+        coordinates=lambda rgb, viewing: np.sqrt(viewing.exposure * np.maximum(rgb, 0)),
+        difference=lambda one, other: np.abs(one - other).sum(axis=-1),
+        **others,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("exposure", [1.0, 0.25])
+def test_a_metric_of_plain_functions_is_measured_as_the_others(images, exposure):
+    test, reference = images
+    viewing, metric = Viewing(exposure=exposure), declared()
+    roots = [np.sqrt(exposure * image) for image in images]
+    expected = np.abs(roots[0] - roots[1]).sum(axis=-1)
+    np.testing.assert_allclose(metric(test, reference, viewing), expected, rtol=1e-12)
+    where = expected > np.median(expected)
+    distances = metric.against(reference, where, viewing)
+    for image, factor in ((test, 1.0), (reference, 0.0)):
+        np.testing.assert_allclose(distances(image), factor * expected[where], rtol=1e-12)
+    summary, _ = summarise(metric, test, reference, where, viewing=viewing)
+    assert summary.mean == pytest.approx(expected[where].mean())
+
+
+def test_a_metric_without_a_function_says_so(images):
+    given = {"name": "own", "label": "Own", "unit": "", "definition": "", "caution": ""}
+    metric = Metric(**given, map_range=(0.0, 1.0))
+    with pytest.raises(InputError, match="'own' has no function"):
+        metric(*images)
+
+
+def test_the_doctor_finds_the_metrics_as_defined():
+    assert 0 < doctor.compared() <= definitions.AGREEMENT
+
+
+@pytest.mark.parametrize("name", [*definitions.DEFINED, *definitions.FLIPS])
+def test_the_doctor_finds_out_a_metric_that_is_not_as_defined(monkeypatch, name):
+    right = METRICS[name]
+
+    def wrong(*images):
+        return right(*images) + 2 * definitions.AGREEMENT
+
+    monkeypatch.setattr(definitions, "METRICS", {**METRICS, name: wrong})
+    with pytest.raises(InstallationError, match="from colour-science's"):
+        doctor.compared()

@@ -10,11 +10,13 @@ import pytest
 from comparisons.compare import prepare
 from comparisons.options import Options
 from comparisons.verification import verify
+from heuristic.errors import InputError
 from reference import Convention, Source
-from reference.pairing import albedo, halves
+from reference.pairing import albedo, halves, partners
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.lights.measured import beam, mean_radiance
-from reference.pairing.nearest import nearest_of
+from reference.pairing.nearest import nearest_of, probe
+from reference.scene.graph import Reference
 from tests.test_physics import look_at
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
@@ -250,10 +252,71 @@ def test_the_base_of_a_plastic_follows_from_two_albedos(rgb, nonlinear):
     assert texture.eval(si)[0][0] == pytest.approx(wanted.diffuse[0], rel=1e-4)
 
 
-@pytest.mark.parametrize(("alpha", "diffuse"), [(0.1, 0.3), (0.3, 0.6)])
-def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
-    """A plugin of a user's own around ``roughplastic``, for which there is a rule to compare."""
-    given = {"type": "roughplastic", "alpha": alpha, "diffuse_reflectance": diffuse}
+def at(graph, value, uv):
+    """Evaluate a value of a material at a place of the texture plane, in the first channel."""
+    if not isinstance(value, Reference):
+        return float(np.ravel(value)[0])
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.uv = mi.Point2f(*uv)
+    return float(graph.instantiate(value.index()).eval(si)[0][0])
+
+
+@pytest.mark.parametrize("reflectance", ["diffuse_reflectance", "specular_reflectance"])
+def test_a_textured_plastic_is_paired_by_name_at_each_point(rgb, reflectance):
+    given = {"type": "roughplastic", "alpha": 0.2, "specular_reflectance": 0.7}
+    graph = Source(
+        "a test",
+        {"type": "scene", "s": {"type": "sphere", "b": given | {reflectance: GREY_CHECKS}}},
+    ).parse()
+    ((_, index),) = graph.children(1, BSDF)
+    textured = nearest_of(graph, index, Convention.LITERAL)
+    for level, uv in ((0.2, (0.1, 0.1)), (0.8, (0.1, 0.6))):
+        plain = material(given | {reflectance: level}, Convention.LITERAL)
+        for name in ("k_a", "k_d", "k_s", "n"):
+            found, expected = (at(graph, getattr(one, name), uv) for one in (textured, plain))
+            assert found == pytest.approx(expected, rel=1e-5), name
+
+
+def test_a_smooth_plastic_is_paired_by_name_as_a_rough_one_with_a_narrow_lobe(rgb):
+    given = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.7}
+    smooth = material({"type": "plastic", **given}, Convention.LITERAL)
+    rough = {"type": "roughplastic", "alpha": probe.SMOOTH_ALPHA, **given}
+    rough = material(rough, Convention.LITERAL)
+    for name in ("k_a", "k_d", "k_s", "n"):
+        expected = np.ravel(getattr(rough, name))
+        assert np.broadcast_to(getattr(smooth, name), expected.shape) == pytest.approx(expected)
+    assert "mirror image" in dict(smooth.lost)
+
+
+PHONG = {"type": "phong", "k_d": 0.2, "k_s": 0.5, "n": 12.0}
+TEXTURED_LOBE = {"type": "roughconductor", "alpha": {"type": "checkerboard", "color0": 0.15,
+                                                     "color1": 0.4}}  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_blend_of_lobes_of_two_scales_is_at_its_ends_each_of_them(rgb, order):
+    """A textured roughness makes a normalised lobe; the other one's is not."""
+    inner = (PHONG, TEXTURED_LOBE)[::order]
+    for weight, alone in zip((0.0, 1.0), inner, strict=True):
+        blend = {"type": "blendbsdf", "weight": weight, "a": inner[0], "b": inner[1]}
+        shown, expected = (
+            images(scene({"s": {"type": "rectangle", "b": each}}))[0] for each in (blend, alone)
+        )
+        assert expected.max() > 0.1
+        np.testing.assert_allclose(shown, expected, atol=1e-5)
+
+
+def test_a_textured_exponent_beside_a_textured_roughness_is_refused_unless_normalised(rgb):
+    phong = PHONG | {"n": GREY_CHECKS}
+    blend = {"type": "blendbsdf", "a": phong, "b": TEXTURED_LOBE}
+    with pytest.raises(InputError, match="single n, or make it normalised"):
+        material(blend)
+    assert material(blend | {"a": phong | {"normalised": True}}).normalised
+    assert material(blend | {"a": phong | {"k_s": 0.0}}).normalised
+
+
+def wrap(name, given, **instead):
+    """Register a plugin of a user's own around a BSDF, with methods ``instead`` of its own."""
 
     class Own(mi.BSDF):
         def __init__(self, props):
@@ -263,10 +326,10 @@ def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
             self.m_flags = self.inner.flags()
 
         def sample(self, ctx, si, sample1, sample2, active=True):
-            return self.inner.sample(ctx, si, sample1, sample2, active)
+            return instead.get("sample", self.inner.sample)(ctx, si, sample1, sample2, active)
 
         def eval(self, ctx, si, wo, active=True):
-            return self.inner.eval(ctx, si, wo, active)
+            return instead.get("eval", self.inner.eval)(ctx, si, wo, active)
 
         def pdf(self, ctx, si, wo, active=True):
             return self.inner.pdf(ctx, si, wo, active)
@@ -277,7 +340,14 @@ def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
         def to_string(self):
             return "Own[]"
 
-    mi.register_bsdf("own", Own)
+    mi.register_bsdf(name, Own)
+
+
+@pytest.mark.parametrize(("alpha", "diffuse"), [(0.1, 0.3), (0.3, 0.6)])
+def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
+    """A plugin of a user's own around ``roughplastic``, for which there is a rule to compare."""
+    given = {"type": "roughplastic", "alpha": alpha, "diffuse_reflectance": diffuse}
+    wrap("own", given)
     known, found = material(given), material({"type": "own"})
     assert found.k_d == pytest.approx(known.k_d[0], rel=0.1)
     assert found.n == pytest.approx(known.n, rel=0.3)
@@ -285,6 +355,57 @@ def test_an_unknown_material_is_measured_for_what_it_is(rgb, alpha, diffuse):
     assert whole[1] == pytest.approx(whole[0], rel=0.02)
     heuristic, reference = images(scene({"s": {"type": "rectangle", "b": {"type": "own"}}}))
     assert heuristic.mean() == pytest.approx(reference.mean(), rel=0.15)
+
+
+def partner(bsdf):
+    graph = Source("a test", {"type": "scene", "shape": {"type": "sphere", "bsdf": bsdf}}).parse()
+    ((_, index),) = graph.children(1, BSDF)
+    return partners.read(graph, Convention.MATCHED)[index]
+
+
+def test_an_unknown_materials_parameters_are_near_those_it_was_made_of(rgb):
+    """As a user's heuristic has them: roughness, index, and the albedo of the diffuse part."""
+    given = {"type": "roughplastic", "alpha": 0.2, "diffuse_reflectance": 0.6, "int_ior": 1.6}
+    wrap("own", given | {"ext_ior": 1.0})
+    found = partner({"type": "own"})
+    assert found.alpha == pytest.approx(0.2, rel=0.2)
+    assert found.ior == pytest.approx(1.6, rel=0.1)
+    diffuse = albedo.of_roughplastic(RoughPlastic((0.6,) * 3, 0.2, 1.6, 1.0)).diffuse[0]
+    assert found.base_color == pytest.approx(diffuse, rel=0.1)
+    assert found.metallic == 0
+
+
+def fails(ctx, si, *others):
+    raise RuntimeError("it has no sampling")
+
+
+@pytest.mark.parametrize(
+    "instead", [{"sample": fails}, {"eval": lambda ctx, si, *others: mi.Spectrum(dr.nan)}]
+)
+def test_an_unknown_material_that_cannot_be_sampled_is_grey_and_said_to_be_so(rgb, instead):
+    wrap("unsampled", {"type": "diffuse"}, **instead)
+    found = material({"type": "unsampled"})
+    assert (found.k_a, found.k_d, found.k_s) == (0.5, 0.5, 0)
+    ((_, instead),) = found.lost
+    assert "it cannot be sampled" in instead
+    assert partner({"type": "unsampled"}).base_color == 0.5
+
+
+@pytest.mark.parametrize("plugin", ["conductor", "dielectric", "principled"])
+def test_a_known_material_that_cannot_be_sampled_is_refused_by_name(rgb, monkeypatch, plugin):
+    monkeypatch.setattr(probe, "probe", lambda bsdf: None)
+    with pytest.raises(InputError, match=r"odd: its albedo is not a number, or .* cannot sample"):
+        material({"type": plugin, "id": "odd"})
+
+
+def test_hair_without_absorption_is_white_and_with_much_of_it_dark(rgb):
+    """All light leaves a fibre that absorbs none; it counts as diffuse, whatever its side."""
+    clear, dark = (material({"type": "hair", "sigma_a": sigma}) for sigma in (0.0, 50.0))
+    assert clear.k_d == pytest.approx(1, abs=0.02)
+    assert np.max(dark.k_d) < 0.2
+    for found in (clear, dark):
+        assert found.k_a == found.k_d
+        assert (found.k_s, found.transmittance, found.twosided) == (0, 0, True)
 
 
 # --- Lights ----------------------------------------------------------------------------------

@@ -1,13 +1,21 @@
 """A comparison in a notebook."""
 
 from base64 import b64decode
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 
 import nbformat
+import numpy as np
+import pytest
 from nbclient import NotebookClient
 from PIL import Image
 
+from comparisons.case import Request, open_case
+from comparisons.compare import compare
+from heuristic.errors import InputError
+from reports.charts.term_figure import number
+from reports.notebook import Shown
 from tests.programs import ROOT
 
 CELL = """
@@ -40,3 +48,38 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     assert page.count('src="data:image/webp') == 3
     assert "box <b>" not in page
     assert "box &lt;b&gt;" in page
+
+
+@pytest.fixture(scope="module")
+def shown():
+    """A sphere in front of nothing, wider than high so that no column passes for a row."""
+    case = open_case("fig-8-9", Request(spp=4, resolution=(24, 16)))
+    return Shown(compare(case.source, case.options), page="")
+
+
+@pytest.mark.parametrize("place", [(12, 8), (9, 5)])
+def test_the_terms_at_a_pixel_come_with_the_reference_there(shown, place):
+    found, images = shown.at(*place), shown.comparison.images
+    assert found.terms.pixel == place
+    x, y = place
+    np.testing.assert_array_equal(found.reference, images.reference[y, x])
+    assert found.standard_error == images.reference_stderr[y, x].max() > 0
+    parts = [found.terms.emission, found.terms.ambient, found.terms.others]
+    parts += [part for light in found.terms.lights for part in (light.diffuse, light.specular)]
+    np.testing.assert_allclose(np.sum(parts, axis=0), found.terms.total, rtol=1e-6)
+    html = found._repr_html_()
+    assert f"Pixel {x}, {y}" in html
+    assert "<svg" in html
+    assert f"physical reference, ± {number(found.standard_error)}" in html
+    cells = "".join(f"<td>{number(value)}</td>" for value in images.reference[y, x])
+    assert cells in html
+
+
+def test_pixels_without_terms_say_why(shown):
+    with pytest.raises(InputError, match="pixel 0, 0 sees no surface"):
+        shown.at(0, 0)
+    with pytest.raises(InputError, match="outside the image"):
+        shown.at(24, 0)
+    flat = replace(shown.comparison, terms=None, no_terms="Flat shading has none.")
+    with pytest.raises(InputError, match=r"there are no terms. Flat shading has none"):
+        Shown(flat, shown.page).at(12, 8)

@@ -278,6 +278,39 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path, make, message):
         picture_files.read(make(tmp_path / "x.exr"))
 
 
+def layered(path, *names):
+    """Write an EXR of which every channel is the number of its name, such as ``beauty.R``."""
+    channels = {name: np.full((8, 8), number, np.float32) for number, name in enumerate(names)}
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
+        file.write(str(path))
+    return str(path)
+
+
+def test_a_layer_is_read_by_its_name_and_others_are_named(rgb, tmp_path):
+    names = [f"{layer}.{c}" for layer in ("a", "beauty") for c in "RGB"]
+    path = layered(tmp_path / "x.exr", *names)
+    expected = np.broadcast_to([3.0, 4.0, 5.0], (8, 8, 3))
+    np.testing.assert_array_equal(picture_files.read(f"{path}:beauty"), expected)
+    with pytest.raises(InputError, match=rf"no channel R. .* a, beauty: give {path}:a"):
+        picture_files.read(path)
+    with pytest.raises(InputError, match=r"no layer 'beuty' \(did you mean beauty\?\)"):
+        picture_files.read(f"{path}:beuty")
+
+
+@pytest.mark.parametrize("layer", ["", ":beauty"])
+def test_a_picture_without_colours_is_refused_by_its_channels(rgb, tmp_path, layer):
+    path = layered(tmp_path / "x.exr", "Z", "Y", "beauty.G")
+    with pytest.raises(InputError, match=r"its channels are Y, Z, beauty.G. Give R, G and B"):
+        picture_files.read(path + layer)
+
+
+def test_what_is_no_png_is_refused(rgb, tmp_path):
+    path = tmp_path / "x.png"
+    path.write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
+        picture_files.read(str(path), "srgb")
+
+
 def test_a_png_needs_its_transfer_function(rgb, tmp_path):
     Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(tmp_path / "x.png")
     with pytest.raises(

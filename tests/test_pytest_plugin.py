@@ -1,11 +1,15 @@
 """The pytest plugin, in the suite of someone else: passing, failing, updating, skipping."""
 
+import json
 import os
 import subprocess
 import sys
 
 import pytest
 
+from heuristic.errors import InputError
+from reports.ci.testing import Fotismos
+from tests import small_baselines
 from tests.programs import ROOT, python
 
 SCENE = """<scene version="3.0.0">
@@ -144,3 +148,49 @@ def test_the_package_brings_the_plugin():
 
     data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert data["project"]["entry-points"]["pytest11"] == {"fotismos": "reports.ci.pytest_plugin"}
+
+
+# --- In this process ------------------------------------------------------------------------------
+
+SMALL = {"spp": 32, "resolution": (8, 6)}
+
+
+@pytest.fixture
+def fixtures(rgb, tmp_path):
+    """What a test gets without and with ``--fotismos-update``, in a folder with a scene."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/scene.xml").write_text(SCENE, encoding="utf-8")
+    places = tmp_path / "baselines", lambda: tmp_path
+    return Fotismos(*places), Fotismos(*places, update=True)
+
+
+def test_options_other_than_the_baselines_fail_until_it_is_written_again(fixtures, tmp_path):
+    checked, updated = fixtures
+    path = tmp_path / "baselines/scene.json"
+    assert updated.unchanged("scenes/scene.xml", **SMALL)
+    before = path.read_bytes()
+    other = SMALL | {"spp": 48}
+    with pytest.raises(AssertionError, match=r"differ: \{'spp': \(32, 48\)\}.*--fotismos-update"):
+        checked.unchanged("scenes/scene.xml", **other)
+    assert path.read_bytes() == before
+    assert updated.unchanged("scenes/scene.xml", **other)
+    assert json.loads(path.read_bytes())["options"]["spp"] == 48
+
+
+def test_a_baseline_can_be_named_by_its_path(fixtures, tmp_path):
+    checked, updated = fixtures
+    updated.unchanged("scenes/scene.xml", **SMALL)
+    assert checked.unchanged("baselines/scene.json")
+    small_baselines.change(tmp_path / "baselines/scene.json")
+    with pytest.raises(AssertionError, match=r"scene.json: \d+ of \d+ moved"):
+        checked.unchanged("baselines/scene.json")
+    with pytest.raises(AssertionError, match="there is no such baseline"):
+        checked.unchanged(tmp_path / "baselines/none.json")
+
+
+def test_what_cannot_be_measured_is_refused(fixtures):
+    checked, _ = fixtures
+    with pytest.raises(InputError, match=r"metric 'dE2001'.*dE2000"):
+        checked.departure("scenes/scene.xml", metric="dE2001", **SMALL)
+    with pytest.raises(InputError, match="a dictionary needs a name"):
+        checked.unchanged({"type": "scene"})

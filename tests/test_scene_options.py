@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from reference import Source
+from reference.pairing import halves
 from tests.small_scene import PLAIN
 
 BALL = '<bsdf type="diffuse"><rgb name="reflectance" value="$grey"/></bsdf>'
@@ -84,3 +86,38 @@ def test_a_baseline_keeps_them(run, scene, tmp_path):
     code, printed, _ = run("check", baseline, "-q", "-o", tmp_path)
     assert code == 1
     assert "1 of 1" in printed
+
+
+def test_a_sensor_that_is_not_there_is_refused_with_the_numbers_of_those_that_are(
+    run, scene, tmp_path
+):
+    words = ("-D", "grey=0.5", "--sensor", 2, "-o", tmp_path / "out", *SMALL)
+    code, _, messages = run("compare", scene, *words)
+    assert code == 2
+    assert "there is no sensor 2: choose one from 0 to 1" in messages
+
+
+SPECTRAL_FILM = """<film type="specfilm">
+  <integer name="width" value="24"/><integer name="height" value="16"/>
+  <integer name="crop_offset_x" value="3"/><integer name="crop_width" value="8"/>
+  <rfilter type="tent"><float name="radius" value="1.5"/></rfilter>{bands}
+</film>"""
+BANDS = '<spectrum name="band" value="400:0, 500:1, 600:0"/>'
+
+
+def test_another_film_keeps_its_size_its_crop_and_its_filter(rgb, tmp_path):
+    """A film of bands becomes one of colours, and the record says so."""
+    made = {}
+    for kind, text in {
+        "specfilm": SPECTRAL_FILM.format(bands=BANDS),
+        "hdrfilm": SPECTRAL_FILM.format(bands="").replace("specfilm", "hdrfilm"),
+    }.items():
+        path = tmp_path / f"{kind}.xml"
+        path.write_text(re.sub("<film.*?</film>", text, SCENE, flags=re.DOTALL), encoding="utf-8")
+        made[kind] = halves.pair(Source("a test", path))
+    films = [each.physical.instantiate().sensors()[0].film() for each in made.values()]
+    assert [str(film) for film in films] == 2 * [str(films[1])]
+    assert (*films[0].crop_size(), *films[0].crop_offset()) == (8, 16, 3, 0)
+    assert films[0].rfilter().radius() == 1.5
+    told = {kind: [each.what for each in one.overridden] for kind, one in made.items()}
+    assert told == {"specfilm": ["film"], "hdrfilm": []}

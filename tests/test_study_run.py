@@ -17,7 +17,10 @@ from comparisons.processes import cluster
 from comparisons.study import dataset, design, editing, point, rendered, running
 from comparisons.study.scenes import SCENES, bsdf
 from heuristic.errors import InputError, LostProcessError
-from reference.pairing import halves
+from reference.effects import EFFECTS
+from reference.pairing import factors, halves
+from reference.pairing.albedo import RoughPlastic
+from reference.rendering.guard import Guard, Verdict
 from reference.scene.source import Source
 
 SMALL = "spp = 16\nresolution = [12, 12]"
@@ -94,6 +97,52 @@ def test_an_edited_scene_renders_as_one_made_anew(scene, rgb):
             np.testing.assert_allclose(images[0], images[1], rtol=1e-5, atol=1e-6)
     # One scene of each half serves all roughplastic points; the phong ones are another structure.
     assert [keeper.made for keeper in kept] == [2, 2]
+
+
+def first_row(parameters, scene="sphere"):
+    (block,) = blocks(study(parameters, scene))
+    (found,) = point.rows(block)
+    return found
+
+
+def test_a_row_names_the_material_that_pairing_derived(rgb):
+    """Of either side: by the factors for the values of the row."""
+    found = first_row("alpha = 0.3\nint_ior = 1.5\nreflectance = 0.4")
+    plastic = RoughPlastic((0.4,) * 3, 0.3, 1.5, 1.0)
+    phong, _ = factors.to_phong(plastic, factors.Convention.MATCHED)
+    derived = {"n": phong.n, "k_d": phong.k_d[0], "k_s": phong.k_s[0]}
+    assert {name: found[name] for name in derived} == pytest.approx(derived, rel=1e-3)
+    found = first_row("n = 20\nk_d = 0.3\nk_s = 0.4")
+    phong = factors.Phong((0.3,) * 3, (0.4,) * 3, 20.0)
+    plastic, _ = factors.to_roughplastic(phong, factors.Convention.MATCHED)
+    derived = {"alpha": plastic.alpha, "int_ior": plastic.int_ior}
+    derived["reflectance"] = plastic.diffuse_reflectance[0]
+    assert {name: found[name] for name in derived} == pytest.approx(derived, rel=1e-3)
+    found = first_row("n = 20\nk_d = 0.3\nk_s = 0")  # diffuse, which has no roughness
+    assert not any(found.get(name) for name in ("alpha", "int_ior", "reflectance"))
+
+
+def test_a_plan_that_a_probe_contradicts_simulates_everything(rgb, monkeypatch):
+    probed = []
+
+    def examined(chosen, *_):
+        probed.append(chosen)
+        return Guard(Verdict.DISAGREED, rays=9, departure=0.1, error=0.01)
+
+    monkeypatch.setattr(rendered, "examine_plan", examined)
+    monkeypatch.setattr(rendered, "_guards", {})
+    plans = []
+    stages = rendered._plans
+    monkeypatch.setattr(rendered, "_plans", lambda chosen: plans.append(chosen) or stages(chosen))
+    for alpha in (0.2, 0.3):
+        first_row(f"alpha = {alpha}")
+    (pruned,) = probed  # once for both points, which are planned alike
+    assert not all(pruned.calls_for(effect) for effect in EFFECTS)
+    assert len(plans) == 2
+    for chosen in plans:
+        assert all(chosen.calls_for(effect) for effect in EFFECTS)
+        assert (chosen.integrator, chosen.max_depth) == ("path", -1)
+        assert chosen.sampler == pruned.sampler
 
 
 def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path, monkeypatch):

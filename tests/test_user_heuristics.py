@@ -322,6 +322,18 @@ MISTAKES = {
     "nothing in it": ("", r"no function `shade`. It has none"),
     "a number": ("shade = 3\n", r"mine.py is of type int: give a function of a point"),
     "no point": ("def shade(): return 1\n", r"^mine.py, line 1: it does not take a point"),
+    "a name in a signature": (
+        "def shade(point, gloss: 'Gloss' = 1.0): return gloss\n",
+        r"^mine.py, line 1: its signature cannot be read: name 'Gloss' is not defined",
+    ),
+    "any number of arguments": (
+        "def shade(point, *rest): return 1\n",
+        r"^mine.py, line 1: \*rest is not a number",
+    ),
+    "any names of arguments": (
+        "def shade(point, **rest): return 1\n",
+        r"^mine.py, line 1: \*\*rest is not a number",
+    ),
     "no default": (
         "def shade(point, gloss): return gloss\n",
         r"^mine.py, line 1: 'gloss' has no number as its default.*gloss: Range\(0, 1\) = 0.5",

@@ -86,7 +86,11 @@ def require_named_files(description: Mapping[str, Any]) -> None:
             require_named_files(value)
         elif key == FILENAME and isinstance(value, str) and "\0" not in value:
             path = Path(value)
-            if path.exists() and not path.is_file():
+            try:
+                is_special = path.exists() and not path.is_file()
+            except OSError as error:  # a name that is too long
+                raise InputError(f"{value[:60]!r}: {error.strerror}. Give a file.") from error
+            if is_special:
                 raise InputError(f"{_not_regular(path)} Give a file.")
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import mitsuba as mi
 
+from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS
 from heuristic.terms import normalisation
 from reference.pairing.factors import Convention
@@ -129,5 +130,13 @@ def alike(graph: Graph, first: Nearest, second: Nearest) -> tuple[Nearest, Neare
 def _normalised(graph: Graph, material: Nearest) -> Nearest:
     if material.normalised:
         return material
-    scale = 1 / float(normalisation(material.form, operations.plain(material.n)))
+    if operations.is_zero(material.k_s):
+        return replace(material, normalised=True)
+    n = operations.plain(material.n)
+    if n is None:
+        raise InputError(
+            f"{graph.name}: a phong whose n is a texture is mixed with a BSDF whose alpha is one:"
+            " give the phong a single n, or make it normalised."
+        )
+    scale = 1 / float(normalisation(material.form, n))
     return replace(material, normalised=True, k_s=operations.product(graph, material.k_s, scale))

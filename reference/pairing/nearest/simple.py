@@ -76,7 +76,7 @@ def plastic(context: Context, index: int) -> Nearest:
     base = context.value(index, "diffuse_reflectance", 0.5)
     coat = context.value(index, "specular_reflectance", 1.0)
     if context.convention is Convention.LITERAL:
-        n = exponent_of(probe.SMOOTH_ALPHA)
+        n = exponent_of(probe.SMOOTH_ALPHA, "blinn")
         return Nearest(k_a=base, k_d=base, k_s=coat, n=n, lost=(MIRROR,))
     levels = [
         albedo.of_smooth_plastic(
