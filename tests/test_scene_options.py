@@ -1,6 +1,7 @@
 """What a command takes from a scene file: values for its placeholders, and one of its sensors."""
 
 import json
+import re
 
 import pytest
 
@@ -113,7 +114,7 @@ def test_another_film_keeps_its_size_its_crop_and_its_filter(rgb, tmp_path):
         "hdrfilm": SPECTRAL_FILM.format(bands="").replace("specfilm", "hdrfilm"),
     }.items():
         path = tmp_path / f"{kind}.xml"
-        path.write_text(re.sub("<film.*?</film>", text, SCENE, flags=re.DOTALL), encoding="utf-8")
+        path.write_text(re.sub("<film.*?</film>", text, PLAIN, flags=re.DOTALL), encoding="utf-8")
         made[kind] = halves.pair(Source("a test", path))
     films = [each.physical.instantiate().sensors()[0].film() for each in made.values()]
     assert [str(film) for film in films] == 2 * [str(films[1])]
