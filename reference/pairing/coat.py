@@ -22,7 +22,6 @@ from functools import cache, lru_cache
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from scipy.special import erfinv
 
 ROWS = 64
 """Cosines at which the plugin tabulates."""
@@ -155,6 +154,8 @@ def _rule(size: int) -> Rule:
 @cache
 def _rule_in(variant: str, size: int) -> Rule:
     """Return the :class:`Rule` with the arrays of a variant."""
+    from scipy.special import erfinv  # see refraction.of_lobe
+
     nodes, weights = legendre(size)
     half = size // 2
     place: np.ndarray = np.asarray(nodes, np.float32) * np.float32(0.5) + np.float32(0.5)

@@ -5,8 +5,6 @@ from dataclasses import replace
 from math import exp, log, sqrt
 
 import numpy as np
-from scipy.optimize import root_scalar
-from scipy.optimize.elementwise import find_root
 
 from reference.pairing import albedo
 from reference.pairing.albedo import Albedo, RoughPlastic
@@ -39,6 +37,8 @@ def of_lobe(plastic: RoughPlastic, wanted: float) -> float:
         return LARGEST_IOR
     if wanted <= reached(log(SMALLEST_IOR)):
         return SMALLEST_IOR
+    from scipy.optimize import root_scalar  # above, it would be a tenth of a command's start
+
     root = min(sqrt(wanted), 0.8)
     guess = log((1 + root) / (1 - root))
     found = root_scalar(
@@ -90,6 +90,8 @@ def nearest(plastics: Sequence[RoughPlastic], wanted: Sequence[Albedo]) -> list[
     # If the slope rises even at the smallest IOR, that one is nearest; if it never rises, the
     # highest is: there is no minimum in between.
     if between:
+        from scipy.optimize.elementwise import find_root  # see of_lobe
+
         bracket, places = (low[between], high[between]), np.array(between)
         low[between] = find_root(slope, bracket, args=(places,), tolerances={"xatol": 1e-4}).x
     return np.exp(np.exp(low)).tolist()

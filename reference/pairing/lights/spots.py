@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from heuristic.lights import SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR
@@ -60,6 +59,8 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
         fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
         return np.sum(weight * (fitted - wanted) ** 2)
 
+    from scipy.optimize import minimize_scalar  # see refraction.of_lobe
+
     # In log(1 + m), because sharp spots differ little from one exponent to the next.
     found = minimize_scalar(distance, bounds=(0, np.log(LARGEST_EXPONENT)), method="bounded")
     return float(np.expm1(found.x))
@@ -88,6 +89,8 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
     """Return the minimum of a function that has only one, including the ends of the interval."""
+    from scipy.optimize import minimize_scalar  # see refraction.of_lobe
+
     found = minimize_scalar(function, bounds=(low, high), method="bounded").x
     return float(min((low, high, found), key=function))
 
