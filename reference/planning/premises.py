@@ -86,8 +86,9 @@ def _clear(facts: Facts) -> str | None:
 
 
 OPAQUE = Premise(
-    "Every BSDF is known only to reflect: a plain one, `principled` without `spec_trans`, or such"
-    " inside of `twosided`; masks, blends, bumps, instances and plugins from outside are not known.",
+    "Every BSDF is known only to reflect: a plain one, `principled` without `spec_trans`, or"
+    " such inside of `twosided`; masks, blends, bumps, instances and plugins from outside are not"
+    " known.",
     _clear,
 )
 
