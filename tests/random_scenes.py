@@ -117,14 +117,14 @@ def _hull(draw):
     return path
 
 
-CLEAR = ("dielectric", "mask", "null")
+CLEAR = ("dielectric", "mask", "null", "clear principled")
 
 
 def _bsdf(draw):
     plugin = draw.one(
         diffuse=6, roughplastic=2, roughconductor=2, anisotropic=1.5, conductor=0.7, plastic=0.7,
         textured=1.2, blendbsdf=0.5, bumpmap=0.4, principled=0.4, black=0.5, mask=0.6,
-        dielectric=0.4, null=0.1,
+        dielectric=0.4, null=0.1, **{"clear principled": 0.1},
     )  # fmt: skip
     if plugin in CLEAR or not draw.chance(0.5):
         return _plain(draw, plugin)
@@ -156,11 +156,12 @@ def _plain(draw, plugin):
     if plugin == "bumpmap":
         waves = {"type": "bitmap", "filename": str(_picture(draw)), "raw": True}
         return {"type": plugin, "arbitrary": waves, "scale": 0.1, "bsdf": _plain(draw, "diffuse")}
-    if plugin == "principled":
-        found = {"type": plugin, "base_color": draw.colour(), "roughness": alpha}
+    if plugin in ("principled", "clear principled"):
+        found = {"type": "principled", "base_color": draw.colour(), "roughness": alpha}
         names = ("metallic", "specular", "clearcoat", "sheen", "spec_tint", "anisotropic")
         found |= {name: draw.uniform(0, 1) for name in names if draw.chance(0.3)}
-        return found | ({"spec_trans": float(draw.chance(0.5)) * 0.4} if draw.chance(0.2) else {})
+        clear = 0.4 if plugin.startswith("clear") else 0.0
+        return found | ({"spec_trans": clear} if clear or draw.chance(0.2) else {})
     if plugin == "mask":
         return {"type": plugin, "opacity": draw.uniform(0, 1), "bsdf": _plain(draw, "diffuse")}
     return {"type": plugin}
