@@ -1,4 +1,4 @@
-"""Six small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
+"""Small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
 
 import mitsuba as mi
 
@@ -7,6 +7,7 @@ from reference.rendering.albedo_table import AlbedoTable
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
 TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}
+BLACK = {"type": "diffuse", "reflectance": 0.0}
 SKY = {"type": "constant", "radiance": 1.0}
 
 
@@ -79,6 +80,14 @@ def _brushed():
     return scene(ball=sphere(brushed), sky=SKY)
 
 
+def _mirrored():
+    to_world = mi.ScalarTransform4f().translate((0, 0, 1.2)).rotate((1, 0, 0), 40)
+    tube = {"type": "cylinder", "to_world": to_world.scale((0.5, 0.5, -0.5)), "bsdf": BLACK}
+    floor = {"type": "rectangle", "bsdf": TWO_SIDED}
+    tube["emitter"] = {"type": "area", "radiance": 3.0}
+    return scene((0, -3, 6), integrator="direct", floor=floor, tube=tube)
+
+
 SCENES = {
     "a two-sided rectangle seen from behind": _behind,
     "a two-sided sphere cut open by the near clip plane": _cut_open,
@@ -86,5 +95,6 @@ SCENES = {
     "a camera inside a two-sided sphere, a point outside": _leaking,
     "a camera inside a sphere with flipped normals, light outside": _dark_room,
     "an anisotropic sphere": _brushed,
+    "a mirrored cylinder that shines": _mirrored,
 }
 """By what is wrong in them; a function each, since transforms belong to a variant."""

@@ -96,6 +96,7 @@ def random_shape(name, rng, layout):
         shines_outwards=True,
         plane=(centre, normal) if is_flat else None,
         opaque=True,
+        sampled_as_hit=True,
     )
 
 
@@ -174,4 +175,6 @@ def tile(number, side, height):
     size = np.array([0.5, 0.5, 0.0]) / side
     plane = centre, np.array([0.0, 0, 1])
     name = f"tile {number}"
-    return ShapeFacts(name, centre - size, centre + size, Form.FLAT, True, False, True, plane, True)
+    return ShapeFacts(
+        name, centre - size, centre + size, Form.FLAT, True, False, True, plane, True, True
+    )

@@ -21,6 +21,16 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
     return None
 
 
+def _sampled_elsewhere(facts: Facts) -> str | None:
+    structure = facts.structure
+    for light in structure.lights:
+        if light.shape is not None:
+            shape = structure.shape(light.shape)
+            if shape is None or not shape.sampled_as_hit:
+                return f"{light.shape}: samples of it may not be what rays hit"
+    return None
+
+
 LIGHT_BY_LIGHT = Pruning(
     name="light by light",
     absent="noise of picking one light: the sum over all equals the mean of one over its chance",
@@ -36,6 +46,12 @@ LIGHT_BY_LIGHT = Pruning(
             " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF"
             " does not, so its mean depends on how both are weighted.",
             _seen_inside_a_lamp,
+        ),
+        Premise(
+            "Every lamp's shape is a mesh, a rectangle, a disk, a sphere, or a cylinder that is"
+            " round and not mirrored: Mitsuba's samples of other cylinders face the other way or"
+            " lie beside what rays hit, so its mean depends on how both are weighted.",
+            _sampled_elsewhere,
         ),
     ),
 )

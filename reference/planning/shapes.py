@@ -43,6 +43,8 @@ class ShapeFacts:
         ``(point, normal)`` of a flat shape, else None.
     opaque
         Whether its BSDF only reflects; no rule covers transmitted light.
+    sampled_as_hit
+        Whether the points that Mitsuba samples on it are those that rays hit, and face alike.
     """
 
     name: str
@@ -54,6 +56,7 @@ class ShapeFacts:
     shines_outwards: bool
     plane: tuple | None
     opaque: bool
+    sampled_as_hit: bool
 
     @property
     def reflects(self) -> bool:
@@ -123,7 +126,26 @@ def _facts(graph: Graph, index: int | None, shape: mi.Shape, found: Geometry) ->
         shines_outwards=found.is_outward,
         plane=found.plane,
         opaque=opaque,
+        sampled_as_hit=_is_sampled_as_hit(graph, index, shape),
     )
+
+
+def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool:
+    """Return whether it is a shape whose samples Mitsuba 3.9 is known to place right.
+
+    On a cylinder that is mirrored they face the other way, and on one that is not round they lie
+    beside it.
+    """
+    if shape.shape_type() != +mi.ShapeType.Cylinder:
+        round_or_flat = (+mi.ShapeType.Sphere, +mi.ShapeType.Disk)
+        return shape.is_mesh() or shape.shape_type() in round_or_flat
+    props = graph.props(index) if index is not None else {}
+    given = np.array(props.get("to_world", mi.ScalarTransform4f()).matrix, float)[:3, :3]
+    squares = given.T @ given
+    if "p0" not in props and "p1" not in props:
+        squares[2, 2] = squares[0, 0]  # it may be long
+    is_round = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-5 * squares[0, 0])
+    return index is not None and is_round and bool(np.linalg.det(given) > 0)
 
 
 def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
