@@ -1,4 +1,4 @@
-"""Batches: scenes apart from each other, finished scenes, folders, and what is no scene."""
+"""Batches: scenes apart from each other, finished scenes, folders, and files that are not scenes."""
 
 import json
 import os
