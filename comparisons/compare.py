@@ -255,6 +255,7 @@ def _compare(
             *ready.pair.warnings,
             *record.guard_warnings(guard),
             *record.path_warnings(ready),
+            *record.lamp_warnings(ready),
         ),
         versions=record.versions(),
         command=command,

@@ -33,7 +33,7 @@ from comparisons.terms.term_grid import TermGrid
 from heuristic import __version__
 from heuristic.heuristics import named
 from reference.pairing.halves import Pair
-from reference.planning.light_by_light import loses_light
+from reference.planning.light_by_light import SAMPLED_AS_HIT, loses_light
 from reference.planning.plan import Plan
 from reference.planning.premises import Ruling
 from reference.rendering.guard import Guard, Verdict
@@ -223,6 +223,16 @@ def path_warnings(ready: Prepared) -> Iterator[str]:
             " background, and drops the light that the masks reflect: the reference is too dark"
             " there. The integrator volpath is right."
         )
+
+
+def lamp_warnings(ready: Prepared) -> Iterator[str]:
+    """Yield a warning for a lamp whose light Mitsuba finds in two ways that disagree."""
+    for ruling in ready.plan.rulings:
+        if ruling.failed is SAMPLED_AS_HIT:
+            yield (
+                f"{ruling.evidence}, so the reference depends on how Mitsuba weights the two. Give"
+                " a cylinder that is round and not mirrored, or a mesh."
+            )
 
 
 def times(of_passes: PassTimes) -> Times:

@@ -1,4 +1,4 @@
-"""Batches: scenes apart from each other, finished scenes, folders, and files that are not scenes."""
+"""Batches: scenes apart from each other, finished scenes, folders, and other files."""
 
 import json
 import os

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import prepare
+from comparisons.compare import compare, prepare
 from comparisons.options import Options
 from reference.effects.obstacles import NO_SECOND_REFLECTION, NO_SHADOWS
 from reference.planning.facts import Facts, examine
@@ -259,6 +259,14 @@ def test_a_cylinder_that_shines_is_sampled_where_rays_hit_it_if_the_plan_says_so
         found.append((np.mean(passes), np.std(passes, ddof=1) / 2))
     (one, error), (other, noise) = found
     assert (abs(one - other) < 0.02 * one + 5 * np.hypot(error, noise)) is np.bool_(is_right)
+
+
+def test_a_lamp_whose_samples_are_not_its_hits_is_warned_of(rgb):
+    source, few = Source("tube", SCENES["a mirrored cylinder that shines"]()), Options(spp=16)
+    (said,) = (line for line in compare(source, few).record.warnings if "weights" in line)
+    assert said.startswith("tube: samples of it may not be what rays hit")
+    again = compare(Source("sky", SCENES["an anisotropic sphere"]()), few)
+    assert not any("weights" in line for line in again.record.warnings)
 
 
 def test_a_lamp_that_is_seen_from_inside_is_left_to_mitsuba(rgb):

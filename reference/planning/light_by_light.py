@@ -31,6 +31,14 @@ def _sampled_elsewhere(facts: Facts) -> str | None:
     return None
 
 
+SAMPLED_AS_HIT = Premise(
+    "Every lamp's shape is a mesh, a rectangle, a disk, a sphere, or a cylinder that is round and"
+    " not mirrored: Mitsuba's samples of other cylinders face the other way or lie beside what"
+    " rays hit, so its mean depends on how both are weighted.",
+    _sampled_elsewhere,
+)
+
+
 LIGHT_BY_LIGHT = Pruning(
     name="light by light",
     absent="noise of picking one light: the sum over all equals the mean of one over its chance",
@@ -38,6 +46,7 @@ LIGHT_BY_LIGHT = Pruning(
     " all lights, which `direct_all` takes at each sample. The two are equal if each estimate of"
     " a light has the right mean, however a sample of the BSDF is weighted against it.",
     premises=(
+        SAMPLED_AS_HIT,
         NO_MEDIUM,
         OPAQUE,
         Premise("The scene's paths have a depth of 2 or more.", _shallow),
@@ -46,12 +55,6 @@ LIGHT_BY_LIGHT = Pruning(
             " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF"
             " does not, so its mean depends on how both are weighted.",
             _seen_inside_a_lamp,
-        ),
-        Premise(
-            "Every lamp's shape is a mesh, a rectangle, a disk, a sphere, or a cylinder that is"
-            " round and not mirrored: Mitsuba's samples of other cylinders face the other way or"
-            " lie beside what rays hit, so its mean depends on how both are weighted.",
-            _sampled_elsewhere,
         ),
     ),
 )
