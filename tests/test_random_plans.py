@@ -29,9 +29,10 @@ def test_it_is_in_other_variants(variant, tmp_path, seed):
 
 @pytest.mark.guarantee("plans", "A wrong plan among random scenes is detected.")
 def test_wrong_plans_are_found(rgb, tmp_path, monkeypatch):
-    """With every premise taken for true: seed 3 has shadows, or light reflected twice."""
+    """With every premise taken for true: some scenes have shadows, or light reflected twice."""
     monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
-    assert examine(3, tmp_path).state == "wrong"
+    states = [examine(seed, tmp_path).state for seed in range(FEW // 2)]
+    assert states.count("wrong") >= 2
 
 
 def test_the_scenes_differ_in_what_is_called_for(rgb, tmp_path):
