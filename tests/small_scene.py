@@ -32,6 +32,6 @@ SCENE = """<scene version="3.0.0">
 PLAIN = re.sub(r"  <emitter type=.constant.*\n", "", SCENE)
 PLAIN = re.sub(r'(?s)"roughplastic">.*?</bsdf>', '"diffuse"/>', PLAIN, count=1)
 PLAIN = PLAIN.replace('"max_depth" value="3"', '"max_depth" value="2"')
-"""Diffuse, under the point alone, light reflected once: shadows are its one effect. Its study of
-cost takes a fifth of the other's time, in tests that are not about effects.
+"""Diffuse, under the point alone, light reflected once: shadows are its one effect. So its study of
+cost has few methods and prices, for tests that are not about effects.
 """

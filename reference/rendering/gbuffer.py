@@ -1,8 +1,8 @@
 """The geometry that the camera sees."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import starmap
 from typing import Any
 
 import drjit as dr
@@ -122,14 +122,16 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
 
 def _told_apart(materials: Owners, shapes: Owners) -> Owners:
     """Name a material without an id, or with another's, after the first shape that shows it."""
+    seen, unseen, times = materials.places >= 0, len(shapes.names), Counter(materials.names)
+    first = np.full(len(materials.names), unseen)
+    np.minimum.at(first, materials.places[seen], shapes.places[seen])
 
-    def named(place: int, name: str) -> str:
-        shown = shapes.places[materials.places == place]
-        if not len(shown) or (name != UNNAMED and materials.names.count(name) == 1):
+    def named(name: str, shape: int) -> str:
+        if shape == unseen or (name != UNNAMED and times[name] == 1):
             return name
-        return f"{'material' if name == UNNAMED else name} of {shapes.names[shown.min()]}"
+        return f"{'material' if name == UNNAMED else name} of {shapes.names[shape]}"
 
-    return replace(materials, names=tuple(starmap(named, enumerate(materials.names))))
+    return replace(materials, names=tuple(map(named, materials.names, first)))
 
 
 def _owners(pointers, seen):
