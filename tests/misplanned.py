@@ -80,12 +80,13 @@ def _brushed():
     return scene(ball=sphere(brushed), sky=SKY)
 
 
-def _mirrored():
-    to_world = mi.ScalarTransform4f().translate((0, 0, 1.2)).rotate((1, 0, 0), 40)
-    tube = {"type": "cylinder", "to_world": to_world.scale((0.5, 0.5, -0.5)), "bsdf": BLACK}
-    floor = {"type": "rectangle", "bsdf": TWO_SIDED}
-    tube["emitter"] = {"type": "area", "radiance": 3.0}
-    return scene((0, -3, 6), integrator="direct", floor=floor, tube=tube)
+def tube(scale, **ends):
+    """A floor under a cylinder that shines, seen from above."""
+    around = mi.ScalarTransform4f().translate((0, 0, 1.2)).rotate((1, 0, 0), 40)
+    lamp = {"type": "cylinder", "to_world": around.scale(scale), "bsdf": BLACK, **ends}
+    lamp["emitter"] = {"type": "area", "radiance": 3.0}
+    floor = {"type": "rectangle", "bsdf": TWO_SIDED, "to_world": mi.ScalarTransform4f().scale(3)}
+    return scene((0, -3, 6), integrator="direct", floor=floor, tube=lamp)
 
 
 SCENES = {
@@ -95,6 +96,6 @@ SCENES = {
     "a camera inside a two-sided sphere, a point outside": _leaking,
     "a camera inside a sphere with flipped normals, light outside": _dark_room,
     "an anisotropic sphere": _brushed,
-    "a mirrored cylinder that shines": _mirrored,
+    "a mirrored cylinder that shines": lambda: tube((0.5, 0.5, -0.5)),
 }
 """By what is wrong in them; a function each, since transforms belong to a variant."""

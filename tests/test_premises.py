@@ -21,7 +21,16 @@ from reference.planning.shapes import Form
 from reference.planning.tabulation import TABULATED_ENVIRONMENT
 from reference.rendering.passes import pass_seed
 from reference.scene.source import Source
-from tests.misplanned import BLACK, DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere
+from tests.misplanned import (
+    DIFFUSE,
+    SCENES,
+    TWO_SIDED,
+    lamp,
+    prune_blindly,
+    scene,
+    sphere,
+    tube,
+)
 
 SPP, PASSES = 256, 4
 
@@ -230,25 +239,21 @@ def test_a_table_over_cosines_is_for_isotropic_even_surfaces(rgb, plugin, more, 
     assert TABULATED_ENVIRONMENT.judge(facts).holds is holds
 
 
-LAMP = {"type": "area", "radiance": 3.0}
 TUBES = {
-    "round": (lambda made: made.scale((0.5, 0.5, 0.9)), {}, True),
-    "round, between points": (lambda made: made.scale(0.5), {"p1": (0, 1, 1)}, True),
-    "mirrored": (lambda made: made.scale((0.5, 0.5, -0.5)), {}, False),
-    "turned twice": (lambda made: made.scale((-0.5, -0.5, 0.5)), {}, True),
-    "an ellipse": (lambda made: made.scale((0.7, 0.3, 0.5)), {}, False),
-    "an ellipse, between points": (lambda made: made.scale((1, 1, 2)), {"p1": (0, 1, 0)}, False),
+    "round": ((0.5, 0.5, 0.9), {}, True),
+    "round, between points": (0.5, {"p1": (0, 1, 1)}, True),
+    "mirrored": ((0.5, 0.5, -0.5), {}, False),
+    "turned twice": ((-0.5, -0.5, 0.5), {}, True),
+    "an ellipse": ((0.7, 0.3, 0.5), {}, False),
+    "an ellipse, between points": ((1, 1, 2), {"p1": (0, 1, 0)}, False),
 }
 
 
 @pytest.mark.parametrize("name", TUBES)
 def test_a_cylinder_that_shines_is_sampled_where_rays_hit_it_if_the_plan_says_so(rgb, name):
     """By Mitsuba's own estimates: from samples of the lamp alone, and from its hits alone."""
-    transformed, ends, is_right = TUBES[name]
-    around = mi.ScalarTransform4f().translate((0, 0, 1.2)).rotate((1, 0, 0), 40)
-    tube = {"type": "cylinder", "to_world": transformed(around), "bsdf": BLACK, **ends}
-    floor = {"type": "rectangle", "bsdf": TWO_SIDED, "to_world": mi.ScalarTransform4f().scale(3)}
-    lit = scene((0, -3, 6), integrator="direct", floor=floor, tube=tube | {"emitter": LAMP})
+    scale, ends, is_right = TUBES[name]
+    lit = tube(scale, **ends)
     assert LIGHT_BY_LIGHT.judge(facts_of(lit)).holds is is_right
     found = []
     for ways in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
