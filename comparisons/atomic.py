@@ -1,31 +1,28 @@
-"""Replacing files atomically: a path holds either the old file or the complete new one.
+"""Writing files atomically, and reading kept results back.
 
-A partial file's name identifies its writer, ``.NAME.HOST.PID-START.fotismos-partial``: only files
-of dead processes of this machine are ever cleared away. START distinguishes a process from later
-ones with the same number.
+A path holds either the old file or the complete new one. A partial file, ``.NAME.PID`` and
+`PARTIAL`, is left only by a killed process.
 """
 
 import errno
+import json
 import os
-import platform
-import re
-import shutil
-from collections.abc import Iterator
+import stat
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
-from heuristic.errors import OutputError
+from heuristic.errors import InputError, OutputError
 
-HOST = re.sub(r"[^A-Za-z0-9-]", "-", platform.node()) or "unknown"
-
-LEFT = re.compile(
-    r"\.(?P<name>.+)\.(?P<host>[A-Za-z0-9-]+)\.(?P<pid>\d+)(?:-(?P<start>\d+))?"
-    r"\.fotismos-(?P<kind>\w+)",
-    re.DOTALL,
-)
+PARTIAL = ".fotismos-partial"
 
 LONGEST = 255
 """Bytes of the longest name that file systems commonly allow."""
+
+LARGEST = 2**30
+"""Bytes of the largest file that is read at once: far more than any that is written."""
 
 ADVICE = {
     errno.ENOSPC: "Free some space",
@@ -42,13 +39,7 @@ ADVICE = {
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turn system errors of a block that writes into readable ones.
-
-    Raises
-    ------
-    OutputError
-        Naming the path, the reason and the remedy.
-    """
+    """Turn system errors of a block that writes into readable ones."""
     try:
         yield
     except OSError as error:
@@ -71,44 +62,33 @@ def printable(path: str | Path) -> str:
     return text if text.isprintable() else ascii(text)
 
 
-def beside(path: Path, kind: str = "partial") -> Path:
-    """Return where this process keeps what is about to replace ``path``, or what was there."""
-    pid = os.getpid()
-    end = f".{HOST}.{'-'.join(filter(None, (str(pid), _start(pid))))}.fotismos-{kind}"
-    room = LONGEST - 1 - len(end)
-    name = path.name
-    if len(os.fsencode(name)) > room:
-        name = os.fsencode(name)[:room].decode(errors="ignore")
-    return path.with_name(f".{name}{end}")
+def file_name(name: object, what: str) -> str:
+    """Return a name that a user gave for a file, which must not lead to another folder."""
+    is_plain = isinstance(name, str) and name.isprintable() and Path(name).name == name != ".."
+    if not is_plain:
+        raise InputError(
+            f"{what} has name = {name!r}: a file gets that name. Give one without a slash."
+        )
+    return str(name)
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a file to write to, and replace ``path`` with it if the block succeeds.
-
-    Raises
-    ------
-    OutputError
-        When the place cannot be written to; no partial file is left.
-    """
-    partial = beside(path)
+    """Yield a file to write to, and replace ``path`` with it if the block succeeds."""
+    end = f".{os.getpid()}{PARTIAL}"
+    name = os.fsencode(path.name)[: LONGEST - 1 - len(end)].decode(errors="ignore")
+    partial = path.with_name(f".{name}{end}")
     with explained(path):
         try:
             yield partial
             partial.replace(path)
         finally:
-            with suppress(OSError):  # the next run clears away the rest
+            with suppress(OSError):
                 partial.unlink(missing_ok=True)
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write bytes, or text as UTF-8.
-
-    Raises
-    ------
-    OutputError
-        See :func:`replacing`.
-    """
+    """Write bytes, or text as UTF-8, see :func:`replacing`."""
     with replacing(path) as partial:
         partial.write_bytes(encoded(content))
 
@@ -119,14 +99,7 @@ def encoded(content: str | bytes) -> bytes:
 
 
 def put(path: Path, content: str | bytes) -> None:
-    """Write to a path that a user named: replace a file, or write into a device or a pipe.
-
-    Raises
-    ------
-    OutputError
-        See :func:`replacing`.
-    """
-    content = content.encode() if isinstance(content, str) else content
+    """Write to a path that a user named: replace a file, or write into a device or a pipe."""
     with explained(path):
         if not path.exists() or path.is_file():
             write(Path(os.path.realpath(path)), content)  # a link stays one
@@ -135,47 +108,65 @@ def put(path: Path, content: str | bytes) -> None:
         descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
         os.set_blocking(descriptor, True)
         with open(descriptor, "wb") as file:
-            file.write(content)
+            file.write(encoded(content))
 
 
-def abandoned(folder: Path, kind: str = "partial") -> Iterator[tuple[Path, Path]]:
-    """Yield each path left behind in a folder, and the path that it was to replace.
+def content(path: str | Path, largest: int = LARGEST) -> bytes:
+    """Return the content of a regular file.
 
-    They are from dead processes of this machine, and from failed attempts of this process.
+    Raises ``OSError``, without opening it, for anything but a regular file (opening a FIFO waits
+    forever) or for more than ``largest`` bytes.
     """
-    for path in sorted(folder.iterdir()):
-        found = LEFT.fullmatch(path.name)
-        if found is None or (found["kind"], found["host"]) != (kind, HOST):
-            continue
-        if not _may_be_alive(int(found["pid"]), found["start"]):
-            yield path, folder / found["name"]
+    require_regular(path, largest)
+    with Path(path).open("rb") as file:
+        return file.read(largest)
 
 
-def remove(path: Path) -> None:
-    """Delete a file, link or folder that is known to be the project's."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+def require_regular(path: str | Path, largest: int | None = None) -> None:
+    """Raise ``OSError`` for anything but a regular file of at most ``largest`` bytes."""
+    found = os.stat(path)
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(None, "it is not a regular file")
+    if largest is not None and found.st_size > largest:
+        raise OSError(None, f"it has {found.st_size} bytes, and at most {largest} are read")
 
 
-def _may_be_alive(pid: int, start: str | None) -> bool:
-    """Return whether another process with this number, and start if known, may be alive."""
-    if start and (pid, start) == (os.getpid(), _start(pid)):
-        return False
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return not start or _start(pid) in ("", start)
+class Entry:
+    """A JSON file that keeps a mapping under ``key``, the text of all that it depends on.
 
+    A checksum detects a damaged file, which is no result.
+    """
 
-def _start(pid: int) -> str:
-    """Return when a process started, in ticks of the system's clock; empty if unknown."""
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_bytes()
-    except OSError:
-        return ""
-    return stat.rpartition(b")")[2].split()[19].decode()  # field 22; a name may hold spaces
+    def __init__(self, path: str | Path, key: str) -> None:
+        self.path, self.key = Path(path), key
+
+    def load(self) -> dict[str, Any] | None:
+        """Return the mapping; None if there is none, it is damaged, or it has another key.
+
+        The caller must check that it holds what it should.
+        """
+        try:
+            text = content(self.path)
+            body = text[len(self._head(b"")) : -1]
+            found = json.loads(body) if text == self._head(body) + body + b"}" else None
+        except (OSError, ValueError, RecursionError):
+            return None
+        return found if isinstance(found, dict) else None
+
+    def save(self, content: Mapping[str, Any]) -> None:
+        """Save a mapping, in place of the old one."""
+        try:
+            if self.path.exists():
+                require_regular(self.path)
+            body = json.dumps(content, ensure_ascii=False).encode()
+            write(self.path, self._head(body) + body + b"}")
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: {error.strerror or error}. Results are kept there: make room,"
+                " or choose another output folder with -o."
+            ) from error
+
+    def _head(self, body: bytes) -> bytes:
+        """Return the text before the content: the key, and the content's checksum."""
+        key = json.dumps(self.key, ensure_ascii=False)
+        return f'{{"key": {key}, "sha256": "{sha256(body).hexdigest()}", "content": '.encode()

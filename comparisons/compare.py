@@ -1,148 +1,69 @@
-"""Comparing the halves of a scene: render both pass by pass, and measure the difference."""
+"""Comparing the halves of a scene: render both pass by pass, and measure the difference.
+
+With a noise target, passes continue until the noise reaches it, or a limit on samples stops them.
+The seed of pass ``i`` is hashed from the run's seed and ``i``.
+"""
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from comparisons import record, render
+from comparisons import pixel_terms, record
 from comparisons.comparison import (
+    Comparison,
     ComparisonRecord,
-    PictureRecord,
+    Images,
+    NoiseTarget,
     Significant,
     TimeSpent,
 )
-from comparisons.departure import limits, marks, objects, regions, statistics
-from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
-from comparisons.departure.spaces import Viewing
-from comparisons.departure.statistics import histogram
+from comparisons.departure import limits, marks, regions, statistics
+from comparisons.departure.blocks import bands
+from comparisons.departure.colour import Viewing
+from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn, leading_distance
 from comparisons.options import Options
-from comparisons.record import Comparison, Images
-from comparisons.records import Pixels
-from comparisons.render import Kept
-from comparisons.terms import tracing
+from comparisons.prepared import Prepared, guarded, require_light
 from heuristic import heuristics
-from heuristic.arrays import Array, Scene
-from heuristic.errors import InputError
-from reference.pairing.halves import Pair
-from reference.planning.plan import Plan, plan, sampler
-from reference.rendering import memory
-from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
-from reference.rendering.guard import Guard, Verdict, examine_plan
-from reference.rendering.passes import Progress
-from reference.rendering.renderer import LARGEST_PASS, Renderer, physical_integrator, variant
+from reference.records import Pixels
+from reference.rendering.gbuffer import GBuffer, image_size
+from reference.rendering.passes import Progress, passes
+from reference.rendering.sums import (
+    DEVIATION,
+    MEAN,
+    Accumulator,
+    DifferenceEstimate,
+    DifferenceSums,
+    add_difference,
+)
 from reference.scene import messages
-from reference.scene.sampler import with_sampler
 from reference.scene.source import Source
 
-if TYPE_CHECKING:
-    from comparisons.pictures.registration import Registration
+PERCENTILE = 95
+"""A noise target is for this percentile of the noise over the counted pixels."""
+
+Sums: TypeAlias = tuple[Accumulator, Accumulator, DifferenceSums]
+"""Sums of the heuristic half, of the reference, and of their difference."""
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half."""
+class Estimates:
+    """The passes of both halves and of their difference, and where they stopped (or None).
 
-    pair: Pair
-    plan: Plan
-    scene: Scene
-    heuristic: Renderer
-    reference: Renderer
+    The halves have only means (H, W, 3) and the reference's standard error: the relevant
+    uncertainty is the difference's.
+    """
+
+    heuristic: np.ndarray
+    reference: np.ndarray
+    standard_error: np.ndarray
+    difference: DifferenceEstimate
     passes: int
-    planning_seconds: float
-    guard: Guard | None = None
-
-    @property
-    def surface(self) -> GBuffer:
-        """What each pixel sees. It is traced each time: cached, it would take much memory."""
-        found = gbuffer(self.scene, *image_size(self.scene))
-        dr.flush_malloc_cache()
-        return found
-
-    @cached_property
-    def counted(self) -> np.ndarray:
-        """The pixels (H, W) that count: those that see a surface."""
-        return self.surface.hit
-
-
-def prepare(source: Source, options: Options | None = None) -> Prepared:
-    """Pair and plan a scene in the current variant, and make both halves ready to render.
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or paired, or its image is too large.
-    """
-    options = options or Options()
-    if options.image:
-        from comparisons.pictures import pictured
-
-        options = pictured.sized(source, options)
-    pair = options.pair(source)
-    physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
-    width, height = image_size(physical)
-    if width * height > LARGEST_PASS:
-        raise InputError(
-            f"{source.name}: an image of {width}x{height} pixels is too large: at most"
-            f" {LARGEST_PASS} pixels are allowed. Give a smaller --resolution."
-        )
-    memory.require(source.name, width, height)
-    begin = perf_counter()
-    chosen = plan(pair, physical, options.interpolation, options.everything)
-    integrator = physical_integrator(chosen, physical, pair.hide_emitters)
-    planning = perf_counter() - begin
-    # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
-    gc.collect()
-    planned = render.schedule(chosen, width * height, options.spp, options.noise)
-    if len(options.image) > 1:
-        planned = render.Schedule.of(planned.spp * planned.passes, len(options.image))
-    return Prepared(
-        pair=pair,
-        plan=chosen,
-        scene=physical,
-        heuristic=_heuristic_renderer(source, pair, chosen, planned.spp, options),
-        reference=Renderer(physical, integrator, planned.spp, "reference image"),
-        passes=planned.passes,
-        planning_seconds=planning,
-    )
-
-
-def guarded(source: Source, options: Options | None = None) -> Prepared:
-    """Prepare a scene with :func:`prepare`, and probe it before anything relies on its plan.
-
-    If the probe disagrees with the plan, everything is simulated.
-
-    Raises
-    ------
-    InputError
-        See :func:`prepare`; also when no pixel sees a surface, unless the options allow it.
-    """
-    options = options or Options()
-    ready = _probed(source, options)
-    if not options.allow_empty:
-        require_surface(ready.counted, source.name)
-    return ready
-
-
-def _probed(source: Source, options: Options) -> Prepared:
-    ready = prepare(source, options)
-    width, height = image_size(ready.scene)
-    samples = ready.reference.spp * ready.passes * width * height
-    hidden = ready.pair.hide_emitters
-    found = examine_plan(ready.plan, ready.scene, hidden, samples, options.seed)
-    if found.state is not Verdict.DISAGREED:
-        return replace(ready, guard=found)
-    whole = prepare(source, replace(options, everything=True))
-    return replace(whole, plan=whole.plan.unpruned("guard", found.words), guard=found)
+    stop: NoiseTarget | None
 
 
 def compare(
@@ -150,167 +71,171 @@ def compare(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
-    kept: Kept | None = None,
-    with_terms: bool = True,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
-    Parameters
-    ----------
-    source
-        The scene.
-    options
-        What to render, and how to judge it.
-    progress
-        Called as ``progress(stage, done, total)`` after each pass.
-    command
-        How to repeat the comparison, for the record.
-    kept
-        Holds the passes of an interrupted run, and takes those of this one
-        (:func:`comparisons.render.render`).
-    with_terms
-        Whether to read the terms of equation 8.10.
-
-    Returns
-    -------
-    Comparison
+    ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
+    after each pass; with a noise target, ``total`` is the limit.
 
     Raises
     ------
     InputError
-        When the scene cannot be read or paired, or no pixel sees a surface.
+        When the scene cannot be read or paired, no pixel sees a surface, or both halves are black.
     NonFiniteError
         When a rendering holds a NaN or an infinity.
     """
-    options = options or Options()
-    said: list[str] = []
-    with messages.collected(said):
-        comparison = _compare(source, options, progress, command, kept, with_terms)
-    told = messages.counted([*source.said, *said])
-    made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *told))
+    printed: list[str] = []
+    with messages.collected(printed):
+        comparison = _compare(source, options or Options(), progress, command)
+    lines = messages.counted([*source.messages, *printed])
+    made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
     return replace(comparison, record=made)
 
 
 def _compare(
-    source: Source,
-    options: Options,
-    progress: Progress | None,
-    command: str,
-    kept: Kept | None,
-    with_terms: bool,
+    source: Source, options: Options, progress: Progress | None, command: str
 ) -> Comparison:
-    stages = _Stages()
+    stages: dict[str, float] = {}
+    begin = perf_counter()
+
+    def done(stage: str, elsewhere: float = 0.0) -> None:
+        """Note the time of a stage, without what is counted elsewhere."""
+        nonlocal begin
+        now = perf_counter()
+        stages[stage], begin = now - begin - elsewhere, now
+
     ready = guarded(source, options)
     heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
     reference, guard = ready.reference, ready.guard
     assert guard is not None
-    stages.done("scene and pairing", ready.planning_seconds + guard.seconds)
-    stages.seconds |= {"planning": ready.planning_seconds, "guard": guard.seconds}
+    done("scene and pairing", ready.planning_seconds + guard.seconds)
+    stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     width, height = image_size(ready.scene)
-    # Before any long rendering: a picture may be flipped.
-    place = heuristic.located(ready.scene) if options.image else None
-    estimates = render.render(ready, options, ready.counted, progress, kept)
-    # Passes of an earlier run took no time in this one.
-    rendering = sum(heuristic.times[-estimates.new :]) + sum(reference.times[-estimates.new :])
-    stages.done("sums of passes", rendering if estimates.new else 0.0)
-    numbers, images = _measure(
-        estimates, ready.surface, options, ready.plan.exact and not options.image
-    )
-    picture = _picture(place, options, images) if place else None
-    stages.done("metrics")
-    faults = limits.count(
-        ready.scene,
-        estimates.reference,
-        estimates.standard_error,
-        images.counted,
-    )
-    stages.done("limits of the reference")
-    terms, no_terms = tracing.trace(ready, options) if with_terms else (None, "")
-    stages.done("terms")
+    if options.image:  # before any long rendering: a picture may be flipped
+        from comparisons.pictures import picture_warnings
+
+        place = picture_warnings.located(heuristic, ready.scene)
+    estimates = render(ready, options, ready.counted, progress)
+    done("sums of passes", sum(heuristic.times) + sum(reference.times))
+    exact = ready.plan.exact and not options.image
+    numbers, images = _measure(estimates, ready.surface, options, exact)
+    shown = images.heuristic, images.reference, images.counted
+    caution = require_light(*shown, source.name, options)
+    picture = picture_warnings.picture_record(place, options, images) if options.image else None
+    done("metrics")
+    noisy = estimates.reference, estimates.standard_error
+    faults = limits.count(ready.scene, ready.pair.physical, *noisy, images.counted)
+    done("limits of the reference")
+    terms, no_terms = pixel_terms.trace(ready.heuristic, options)
+    done("terms")
     made = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
         heuristic_variant=heuristic.variant,
         heuristic=f"picture {', '.join(options.image)}" if options.image else options.heuristic,
-        interpolation=options.interpolation.value,
+        interpolation=options.polygon_shading.value,
         seed=options.seed,
         resolution=(width, height),
-        plan=record.plan_record(ready, estimates.passes),
+        plan=record.plan_record(ready, reference.spp * estimates.passes, estimates.passes),
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
         limits=faults,
         regions=regions.find(images.maps[LEADING.name], images.counted),
-        histograms={name: histogram(images.maps[name][images.counted]) for name in drawn()},
-        pairing=record.pairing(ready.pair),
+        histograms={
+            name: statistics.histogram(images.maps[name][images.counted]) for name in drawn()
+        },
+        pairing=ready.pair.pairing,
         time=TimeSpent(
-            heuristic=record.times(heuristic.pass_times()),
-            reference=record.times(reference.pass_times()),
-            stages=stages.seconds,
+            heuristic=heuristic.pass_times(),
+            reference=reference.pass_times(),
+            stages=stages,
         ),
-        unrepresentable=record.unrepresentable(ready.pair),
+        unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,
         overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
-        warnings=(
-            *(picture.odd if picture else ()),
-            *ready.pair.warnings,
-            *record.guard_warnings(guard),
-            *record.path_warnings(ready),
-            *record.lamp_warnings(ready),
-        ),
+        warnings=(*(picture.odd if picture else ()), *record.warnings(ready)),
         versions=record.versions(),
         command=command,
+        caution=caution,
         noise_target=estimates.stop,
         picture=picture,
-        suspicions=_suspicions(options),
+        mistakes=_mistakes(options),
         **numbers,
     )
     return Comparison(made, images, terms, no_terms)
 
 
-def _heuristic_renderer(
-    source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
-) -> Any:
-    """Make the heuristic half ready to render, in its own variant if it has one."""
-    with variant(options.heuristic_variant or mi.variant()):
-        if options.heuristic_variant:
-            pair = options.pair(source)
-        scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        made = Renderer(scene, None, spp, "heuristic image")
-        if not options.image:
-            return made
-        from comparisons.pictures import pictured
+def render(
+    ready: Prepared, options: Options, counted: np.ndarray, progress: Progress | None
+) -> Estimates:
+    """Render the passes of both halves in turn: a drift of the machine then affects both.
 
-        return pictured.Pictured(pictured.read(options), made)
+    ``counted`` (H, W) are the pixels whose noise counts.
+    """
+    sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
+    done, reached = 0, None
+    loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
+    for one in loop:
+        add_difference(sums, one.images)
+        done = one.number + 1
+        del one
+        if options.noise is not None and is_checked(done, ready.passes):
+            reached = noise_percentile(sums, counted, options.viewing)
+            if reached <= options.noise:
+                break
+    loop.close()
+    stop = None
+    if options.noise is not None:
+        assert reached is not None, "the noise is checked after the last pass"
+        stop = NoiseTarget(
+            target=options.noise,
+            reached=reached,
+            stopped_by="target" if reached <= options.noise else "samples",
+            limit_spp=ready.passes * ready.reference.spp,
+        )
+    # From here on images have single precision, like the files.
+    difference = sums[2].estimate(np.float32)
+    error = sums[1].standard_error(np.float32)
+    heuristic, reference = (total.mean(np.float32) for total in sums[:2])
+    return Estimates(heuristic, reference, error, difference, done, stop)
 
 
-def _picture(place: Registration, options: Options, images: Images) -> PictureRecord:
-    """Return the record of the pictures, and what is odd about them."""
-    from comparisons.pictures import suspicions
+def is_checked(done: int, passes: int) -> bool:
+    """Return whether the noise is checked after ``done`` passes: 4, 6, 8, 12, 16, 24, …, and last.
 
-    shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
-    found = PictureRecord(
-        files=options.image,
-        transfer=options.transfer,
-        repeats=len(options.image),
-        shift=None if place.x is None or place.y is None else (place.x, place.y),
-        edges=place.correlation,
-        ratio=suspicions.ratios(shown, reference),
-    )
-    given = images.heuristic, images.reference, images.counted
-    return structs.replace(found, odd=tuple(suspicions.told(found, *given)))
+    A check takes as long as a pass or two; the steps cost at most half as many passes again as are
+    needed.
+    """
+    power = 1 << (done.bit_length() - 1)
+    return done >= passes or (done >= 4 and done in (power, power + power // 2))
 
 
-def _suspicions(options: Options) -> tuple[str, ...]:
-    """Return what seems to be wrong with a user's heuristic."""
+def noise_percentile(sums: Sums, counted: np.ndarray, viewing: Viewing) -> float:
+    """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
+
+    The noise is that of the difference of the halves, in which shared noise cancels.
+    """
+    reference, noise = sums[1].mean(np.float32), sums[2].noise(np.float32)
+    if not noise[counted].any():
+        return 0.0
+    distance, distances = leading_distance(viewing), []
+    for rows in bands(len(counted)):
+        truth = reference[rows][counted[rows]].astype(np.float64)
+        distances.append(distance(truth + noise[rows][counted[rows]], truth))
+    return float(np.percentile(np.concatenate(distances), PERCENTILE))
+
+
+def _mistakes(options: Options) -> tuple[str, ...]:
+    """Return the mistakes that a user's heuristic seems to have."""
     if options.image or heuristics.named(options.heuristic).is_own:
         return ()
     from comparisons.audit import diagnosis
 
-    return diagnosis.told(options.heuristic)
+    return diagnosis.describe(options.heuristic)
 
 
 def _measure(
-    estimates: render.Rendered, surface: GBuffer, options: Options, exact: bool
+    estimates: Estimates, surface: GBuffer, options: Options, exact: bool
 ) -> tuple[dict[str, Any], Images]:
     """Compute fields of the record, and maps over the pixels that see a surface.
 
@@ -322,13 +247,7 @@ def _measure(
     metrics, maps = {}, {}
     for name, metric in METRICS.items():
         metrics[name], found = statistics.summarise(
-            metric,
-            test,
-            reference,
-            counted,
-            options.viewing,
-            noise,
-            estimates.difference.grouped,
+            metric, test, reference, counted, options.viewing, noise, estimates.difference.grouped
         )
         if metric.drawn:
             maps[name] = found
@@ -337,8 +256,8 @@ def _measure(
         estimates.difference, test, counted, leading_distance(options.viewing), exact=exact
     )
     error = maps[LEADING.name]
-    shapes, seen = objects.find(error, counted, surface.shape, surface.bsdf)
-    materials, made_of = objects.find(error, counted, surface.bsdf)
+    shapes, seen = regions.find_objects(error, counted, surface.shape, surface.bsdf)
+    materials, made_of = regions.find_objects(error, counted, surface.bsdf)
     images = Images(
         heuristic=test,
         reference=reference,
@@ -363,21 +282,3 @@ def _measure(
         ),
     }
     return numbers, images
-
-
-def leading_distance(viewing: Viewing) -> Callable[[Array, Array], Array]:
-    """Return the leading metric, ``(test, reference) -> (N,)``, for colours (N, 3)."""
-    return lambda test, reference: LEADING.against(reference, ..., viewing)(test)
-
-
-class _Stages:
-    """Wall time by stage, without the two renderings."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._begin = perf_counter()
-
-    def done(self, name: str, rendering: float = 0.0) -> None:
-        now = perf_counter()
-        self.seconds[name] = now - self._begin - rendering
-        self._begin = now

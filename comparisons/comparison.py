@@ -1,16 +1,21 @@
-"""The types of a comparison's record, ``comparison.json``."""
+"""What a comparison returns: its record, ``comparison.json``, and its images."""
 
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
+import numpy as np
 from msgspec import Meta
 
+from comparisons.departure.colour import Viewing
 from comparisons.departure.limits import LimitCounts
-from comparisons.departure.objects import Carrier
-from comparisons.departure.regions import Region
-from comparisons.departure.spaces import Viewing
+from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
-from comparisons.effects.nearness import Nearest, Renderings
-from comparisons.records import (
+from comparisons.hybrids.nearness import Nearest, Renderings
+from comparisons.pixel_terms import TermGrid
+from reference.pairing.factors import Unrepresentable
+from reference.pairing.halves import Pairing
+from reference.planning.plan import Plan
+from reference.records import (
     VERSION,
     Amount,
     Count,
@@ -22,104 +27,8 @@ from comparisons.records import (
     Size,
     Versions,
 )
-
-Depth = Annotated[
-    int, Meta(ge=-1, description="As Mitsuba counts: 2 is direct light alone, -1 is unlimited.")
-]
-
-
-class Decision(Record):
-    """Whether a scene calls for an effect, and why.
-
-    Attributes
-    ----------
-    rule
-        The kind of reason, and the reason: ``structural`` follows from the scene's structure,
-        ``simulated`` means that a premise of leaving it out is not known to hold, ``asked`` that
-        pruning is off, ``guard`` that a probe disagreed with the plan.
-    """
-
-    name: str
-    called_for: bool
-    rule: str
-
-
-class RuleRecord(Record):
-    """A rule of pruning, and whether it applies.
-
-    Attributes
-    ----------
-    name
-        What is done when it applies.
-    applies
-        Whether all its premises are known to hold.
-    premise
-        The first premise not known to hold; empty if it applies.
-    evidence
-        What is absent, or what contradicts the premise.
-    """
-
-    name: str
-    applies: bool
-    premise: str
-    evidence: str
-
-
-class Simulation(Record):
-    """The simulation of a scene: its plan, samples and passes."""
-
-    kernel_terms: Annotated[
-        tuple[str, ...], Meta(description="Coefficients whose terms the heuristic kernel holds.")
-    ]
-    integrator: Annotated[str, Meta(description="Mitsuba integrator of the reference.")]
-    max_depth: Depth
-    shadows: Annotated[bool, Meta(description="Whether the reference traces shadow rays.")]
-    tabulated_environment: Annotated[
-        bool, Meta(description="Whether a constant environment comes from a table of albedos.")
-    ]
-    spp: Annotated[Size, Meta(description="Samples per pixel, over all passes.")]
-    passes: Size
-    sampler: Annotated[str, Meta(description="Mitsuba sampler of both renderings.")]
-    rules: tuple[RuleRecord, ...] = ()
-    light_samples: Annotated[
-        Count,
-        Meta(
-            description="Lights that the reference picks for each sample, in proportion to their"
-            " contribution; 0 if it samples all."
-        ),
-    ] = 0
-    heuristic_reads: Annotated[
-        tuple[str, ...], Meta(description="What the heuristic reads of each point that it shades.")
-    ] = ()
-
-
-class GuardRecord(Record):
-    """The result of probing a plan that leaves something out, against everything.
-
-    Attributes
-    ----------
-    state
-        If it disagreed, everything was simulated; not needed if nothing is left out.
-    rays
-        Camera rays that were traced both ways.
-    departure, error
-        Relative difference of the plan's mean from the full one, and its standard error.
-    seconds
-        Time of the probe, which no other time includes.
-    """
-
-    state: Literal["agreed", "disagreed", "not needed"]
-    rays: Count
-    departure: float
-    error: Amount
-    seconds: Amount
-
-
-class PlanRecord(Simulation, kw_only=True):
-    """The effects that the scene calls for, and what was simulated."""
-
-    effects: tuple[Decision, ...]
-    guard: GuardRecord | None = None
+from reference.rendering.renderer import Times
+from reference.scene.prepare import Override
 
 
 class Significant(Record):
@@ -140,54 +49,6 @@ class Significant(Record):
     ]
 
 
-class BsdfPair(Record):
-    """A BSDF and its partner; grey colours are one value. The note says what is odd."""
-
-    name: str
-    given: str
-    derived: str
-    parameters: dict[str, Any]
-    note: str = ""
-
-
-class EmitterPair(Record):
-    """A light and its partner, and the factor between their intensities."""
-
-    name: str
-    given: str
-    derived: str
-    factor: float
-    exact: bool
-    note: str = ""
-
-
-class Missed(Record):
-    """A quantity that no partner reaches."""
-
-    what: str
-    wanted: float
-    reached: float
-
-
-class Pairing(Record):
-    """How heuristic and physical materials and lights correspond."""
-
-    convention: str
-    bsdfs: tuple[BsdfPair, ...]
-    emitters: tuple[EmitterPair, ...]
-    misses: tuple[Missed, ...]
-
-
-class Times(Record):
-    """Wall times of one rendering in seconds, evaluated and synchronised."""
-
-    median_s: Annotated[Amount, Meta(description="Median time per pass, once compiled.")]
-    passes: Size
-    first_s: Annotated[Amount, Meta(description="The first pass, with compilation.")]
-    total_s: Amount
-    compile_s: Annotated[Amount | None, Meta(description="Code generation and back end.")]
-
-
 CAUSES = "causes"
 """The stage that finds causes."""
 
@@ -204,23 +65,6 @@ class TimeSpent(Record):
         """The share of the whole time that finding causes took."""
         whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
         return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
-
-
-class Unrepresentable(Record):
-    """Something that the heuristic model cannot represent; compared nevertheless."""
-
-    name: Annotated[str, Meta(description="Id, or place in the file.")]
-    plugin: str
-    lost: str
-    nearest: Annotated[str, Meta(description="What replaces it, and by which rule.")]
-
-
-class Override(Record):
-    """A setting of the scene that is not used, and what is used instead."""
-
-    what: str
-    given: str
-    used: str
 
 
 class NoiseTarget(Record):
@@ -287,7 +131,7 @@ class ComparisonRecord(Record, kw_only=True):
     interpolation: Literal["flat", "gouraud", "phong"]
     seed: Annotated[Count, Meta(description="Seed of the run; each pass hashes its own from it.")]
     resolution: Resolution
-    plan: PlanRecord
+    plan: Plan
     viewing: Viewing
     metrics: Annotated[
         dict[str, Summary], Meta(description="Summaries by name of the declared metric.")
@@ -301,10 +145,12 @@ class ComparisonRecord(Record, kw_only=True):
         Meta(description="Boxes that hold most of dE2000, the most valuable first."),
     ]
     objects: Annotated[
-        tuple[Carrier, ...],
+        tuple[ObjectShare, ...],
         Meta(description="Shapes by share of dE2000; the last may hold all others."),
     ] = ()
-    materials: Annotated[tuple[Carrier, ...], Meta(description="The same for their BSDFs.")] = ()
+    materials: Annotated[
+        tuple[ObjectShare, ...], Meta(description="The same for their BSDFs.")
+    ] = ()
     histograms: Annotated[
         dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratios.")
     ]
@@ -316,9 +162,45 @@ class ComparisonRecord(Record, kw_only=True):
     warnings: tuple[str, ...]
     versions: Versions
     command: Annotated[str, Meta(description="Repeats this comparison.")]
+    caution: Annotated[
+        str, Meta(description="Why the numbers may mean nothing; empty if there is no such doubt.")
+    ] = ""
     noise_target: NoiseTarget | None = None
     picture: PictureRecord | None = None
-    suspicions: Annotated[
+    mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
     record_version: int = VERSION
+
+
+@dataclass(frozen=True)
+class Images:
+    """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
+
+    ``maps`` holds the perceptual metrics by name, and ``log2_luminance``. ``objects`` and
+    ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
+    """
+
+    heuristic: np.ndarray
+    reference: np.ndarray
+    reference_stderr: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    maps: dict[str, np.ndarray]
+    significant: np.ndarray
+    counted: np.ndarray
+    objects: np.ndarray
+    materials: np.ndarray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
+
+    ``no_terms`` gives the reason if there are no terms.
+    """
+
+    record: ComparisonRecord
+    images: Images
+    terms: TermGrid | None = None
+    no_terms: str = ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.records import Estimated
+from reference.records import Estimated
 
 LEVEL = 0.95
 

@@ -1,107 +1,199 @@
-"""The options of a comparison."""
+"""The options of a comparison, from which all that takes, keeps or repeats options derives.
 
-from dataclasses import dataclass
-from math import inf
+The command line, the notebook, baselines and studies name them alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
-from heuristic import heuristics
-from heuristic.errors import InputError
-from heuristic.interpolation import FINEST, Interpolation
-from reference.pairing.factors import Convention
-from reference.pairing.halves import Pair, pair
-from reference.scene.source import Source
+import msgspec
+from msgspec import Meta, inspect, structs
+
+from heuristic import program
+from heuristic.errors import InputError, unknown
+
+if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
+    from comparisons.departure.colour import Viewing
+    from heuristic.interpolation import Interpolation
+    from reference.pairing.factors import Convention
+    from reference.pairing.halves import Pair
+    from reference.scene.source import Source
 
 LARGEST_SPP = 2**20
 """Samples per pixel: the noise is a thousandth of one sample's, and an image takes days."""
 
-WHOLE = {
-    "seed": (0, 2**64 - 1),
-    "spp": (2, LARGEST_SPP),  # the noise needs at least 2
-    "tessellation": (1, FINEST),
-    "sensor": (0, 2**31 - 1),
-}
-"""Inclusive bounds of the options that are whole numbers."""
+Variant = Literal["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono"]
+Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
+Samples = Annotated[int, Meta(ge=2, le=LARGEST_SPP)]  # the noise needs at least 2
+Error = Annotated[float, Meta(gt=0, le=1000)]  # ΔE2000
+Side = Annotated[int, Meta(ge=1, le=2**31 - 1)]
+Fineness = Annotated[int, Meta(ge=1, le=512)]  # heuristic.meshes.FINEST
+Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of a comparison.
+def _help(description: str, default: str = "") -> Meta:
+    """Describe an option; ``default`` is what None stands for."""
+    return Meta(description=description, extra={"default": default} if default else None)
 
-    Parameters
-    ----------
-    seed
-        Of the run; each pass hashes its own from it (`pass_seed`).
-    spp
-        Total samples per pixel, instead of the plan's. They are split into the plan's number of
-        passes, or fewer (at least 2) to keep 4 per pass. With ``noise``, the limit.
-    noise
-        Render until the 95th percentile of the noise in ΔE2000 is at most this
-        (:mod:`comparisons.render`).
-    resolution
-        ``(width, height)`` instead of the film's own.
-    convention
-        How roughplastic and phong are paired.
-    heuristic
-        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
-    interpolation, tessellation
-        How the heuristic half shades its surfaces, and how fine its meshes are.
-    viewing
-        The viewing conditions.
-    heuristic_variant
-        Variant of the heuristic half if not the current one, as for RGB shading against a
-        spectral reference.
-    everything
-        Switch off all pruning, in the kernel and in the reference.
-    sensor
-        Number of the sensor, from 0.
-    image, transfer
-        Pictures instead of the heuristic half, several being repeats, and the transfer function
-        of their values (:mod:`comparisons.pictures.picture_files`).
-    allow_empty
-        Accept a scene in which no pixel sees a surface.
 
-    Raises
-    ------
-    InputError
-        For a number outside its bounds in :data:`WHOLE`, a noise target that is not positive and
-        finite, a resolution below 1, or a heuristic that is not declared.
+class Options(
+    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True
+):
+    """The options of a comparison, as the command line names them; None leaves one to the scene.
+
+    A ``heuristic`` may also be a function of a point or a :class:`heuristic.Heuristic`: it is
+    declared in this process, and stored by name. A value that is not allowed raises
+    :class:`InputError`.
     """
 
-    seed: int = 0
-    spp: int | None = None
-    noise: float | None = None
-    resolution: tuple[int, int] | None = None
-    convention: Convention = Convention.MATCHED
-    heuristic: str = heuristics.PHONG.name
-    interpolation: Interpolation = Interpolation.PHONG
-    tessellation: int | None = None
-    viewing: Viewing = DEFAULT_VIEWING
-    heuristic_variant: str | None = None
-    everything: bool = False
-    sensor: int = 0
-    allow_empty: bool = False
-    image: tuple[str, ...] = ()
-    transfer: str | None = None
+    variant: Annotated[
+        Variant | None,
+        _help("Mitsuba variant.", "llvm_ad_rgb, or llvm_ad_spectral for a scene with tabulated"
+              " spectra"),
+    ] = None  # fmt: skip
+    heuristic_variant: Annotated[
+        Variant | None,
+        _help("Variant of the heuristic half, such as RGB shading against a spectral reference.",
+              "the scene's own, else --variant"),
+    ] = None  # fmt: skip
+    seed: Annotated[Seed, _help("Seed of the run, from which each pass derives its own.")] = 0
+    spp: Annotated[
+        Samples | None,
+        _help("Samples per pixel, over all passes; with --noise, their limit.", "the plan's"),
+    ] = None
+    noise: Annotated[
+        Error | None,
+        _help("Continue until 95 % of pixels have noise under this ΔE2000, up to --spp samples per"
+              " pixel, or 4096."),
+    ] = None  # fmt: skip
+    resolution: Annotated[tuple[Side, Side] | None, _help("Width and height.", "the film's")] = None
+    heuristic: Annotated[
+        str,
+        _help("The heuristic: phong, blinn, one that engines use (such as mean-ambient), one that"
+              " a package declares, or a function shade(point) in a file."),
+    ] = "phong"  # fmt: skip
+    interpolation: Annotated[
+        Literal["flat", "gouraud", "phong"] | None,
+        _help("Shading of polygons in the heuristic half.", "the scene's own, else phong"),
+    ] = None
+    tessellation: Annotated[
+        Fineness | None,
+        _help("Mesh the shapes of the heuristic half: N edges per quarter turn or straight side.",
+              "the scene's own, else 16 for flat and gouraud"),
+    ] = None  # fmt: skip
+    everything: Annotated[bool, _help("Switch off all pruning: simulate every effect.")] = False
+    pairing: Annotated[
+        Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
+    ] = "matched"
+    define: Annotated[dict[str, str], _help("Values of placeholders $NAME of a scene file.")] = {}
+    sensor: Annotated[Sensor, _help("Which sensor of the scene, from 0.")] = 0
+    allow_empty: Annotated[
+        bool, _help("Accept pictures in which no pixel sees a surface, or none sees light.")
+    ] = False
+    image: Annotated[
+        tuple[str, ...],
+        _help("A picture of the scene, .exr (FILE.exr:LAYER) or .png, that replaces the heuristic"
+              " half; several are repeats, which show its noise."),
+    ] = ()  # fmt: skip
+    transfer: Annotated[
+        Literal["linear", "srgb"] | None,
+        _help("Transfer function of the picture.", "linear for .exr"),
+    ] = None
+    pixels_per_degree: Annotated[
+        Density | None, _help("FLIP: pixels per degree of vision.", "67")
+    ] = None
 
     def __post_init__(self) -> None:
-        heuristics.named(self.heuristic)
-        if self.image and self.heuristic != heuristics.PHONG.name:
+        for field in structs.fields(self):
+            value = _plain(field.name, getattr(self, field.name))
+            try:
+                value = msgspec.convert(value, field.type)
+            except msgspec.ValidationError:
+                raise _refusal(field.name, value, field.type) from None
+            structs.force_setattr(self, field.name, value)
+        if self.image and self.heuristic != "phong":
             raise InputError(
                 f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
             )
-        for name, bounds in WHOLE.items():
-            _require_whole(name, getattr(self, name), *bounds)
-        if self.noise is not None and not (isinstance(self.noise, Real) and 0 < self.noise < inf):
+
+    @classmethod
+    def of(cls, words: Mapping[str, Any]) -> Options:
+        """Return the options in a mapping, in which None means the default.
+
+        An unknown name, or a value that is not allowed, raises :class:`InputError`.
+        """
+        if others := sorted(set(words) - set(cls.__struct_fields__)):
             raise InputError(
-                f"noise = {self.noise!r} is not allowed: give a ΔE2000 above 0, such as 0.5."
+                f"unknown options {', '.join(others)}: choose from"
+                f" {', '.join(sorted(cls.__struct_fields__))}."
             )
-        if self.resolution is not None and not _is_size(self.resolution):
-            raise InputError(
-                f"resolution {self.resolution!r} is not allowed: give width and height, whole"
-                " numbers of at least 1."
-            )
+        return cls(**{name: value for name, value in words.items() if value is not None})
+
+    def changed(self, **changes: Any) -> Options:
+        """Return the options with some of them changed."""
+        return structs.replace(self, **changes)
+
+    def stated(self) -> dict[str, Any]:
+        """Return what differs from the defaults, the seed and the pairing, as plain data."""
+        plain = msgspec.to_builtins(self) | {"seed": self.seed, "pairing": self.pairing}
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in plain.items()}
+
+    def command(self, verb: str, scene: str, **more: Any) -> str:
+        """Return the command that does the same with a scene again."""
+        words = [verb, scene]
+        for name, value in (msgspec.to_builtins(self) | more).items():
+            option = f"--{name.replace('_', '-')}"
+            if name == "define":
+                words += [word for entry in value.items() for word in ("-D", "=".join(entry))]
+            elif name == "image":
+                images = (value,) if isinstance(value, str) else value
+                words += [word for image in images for word in (option, image)]
+            elif value is True:
+                words.append(option)
+            elif value not in (None, False):
+                words += [option, "x".join(map(str, value)) if name == "resolution" else str(value)]
+        return program.command(*words)
+
+    @property
+    def convention(self) -> Convention:
+        """How roughplastic and phong are paired."""
+        from reference.pairing.factors import Convention
+
+        return Convention(self.pairing)
+
+    @property
+    def polygon_shading(self) -> Interpolation:
+        """How the heuristic half shades polygons."""
+        from heuristic.interpolation import Interpolation
+
+        return Interpolation(self.interpolation or "phong")
+
+    @property
+    def viewing(self) -> Viewing:
+        """The viewing conditions."""
+        from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+
+        given = self.pixels_per_degree
+        return DEFAULT_VIEWING if given is None else Viewing(pixels_per_degree=given)
+
+    def pair(self, source: Source) -> Pair:
+        """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""
+        from reference.pairing.halves import pair
+
+        return pair(
+            source,
+            self.convention,
+            self.resolution,
+            self.polygon_shading,
+            self.tessellation,
+            prune=not self.everything,
+            sensor=self.sensor,
+            heuristic=self.heuristic,
+        )
 
     def require_model(self, what: str) -> None:
         """Raise InputError if a picture replaces the heuristic half, which ``what`` renders."""
@@ -111,30 +203,41 @@ class Options:
                 " image."
             )
 
-    def pair(self, source: Source) -> Pair:
-        """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""
-        return pair(
-            source,
-            self.convention,
-            self.resolution,
-            self.interpolation,
-            self.tessellation,
-            prune=not self.everything,
-            sensor=self.sensor,
-            heuristic=self.heuristic,
-        )
+
+def _plain(name: str, value: Any) -> Any:
+    """Return a value of an option as a file would have it."""
+    if name == "heuristic" and value is not None and not isinstance(value, str):
+        from heuristic.heuristics import known_as
+
+        return known_as(value)
+    if name == "define":
+        return {key: str(text) for key, text in dict(value or ()).items()}
+    if name == "image" and isinstance(value, str):
+        return (value,)
+    if isinstance(value, (list, tuple)):
+        return tuple(_plain("", each) for each in value)
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value)  # NumPy's too
 
 
-def _require_whole(name: str, value: Any, low: int, high: int) -> None:
-    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if value is not None and not (is_whole and low <= int(value) <= high):
-        raise InputError(
-            f"{name} = {value!r} is not allowed: give a whole number from {low} to {high}."
-        )
-
-
-def _is_size(resolution: object) -> bool:
-    if not isinstance(resolution, (tuple, list)):
-        return False
-    sides = [side for side in resolution if isinstance(side, Integral) and int(side) >= 1]
-    return len(sides) == len(resolution) == 2
+def _refusal(name: str, value: object, kind: Any) -> InputError:
+    """Return the error for a value that is not of an option's type."""
+    allowed = inspect.type_info(kind)
+    while isinstance(allowed, (inspect.Metadata, inspect.UnionType)):
+        allowed = allowed.type if isinstance(allowed, inspect.Metadata) else allowed.types[0]
+    match allowed:
+        case inspect.LiteralType(values):
+            return unknown(name, value, map(str, values))
+        case inspect.IntType():
+            give = f"a whole number from {allowed.ge} to {allowed.le}"
+        case inspect.FloatType():
+            low = "above 0" if allowed.ge is None else f"from {allowed.ge}"
+            give = f"a number {low} to {allowed.le}"
+        case inspect.TupleType():
+            give = "width and height, whole numbers of at least 1"
+        case inspect.BoolType():
+            give = "True or False"
+        case _:
+            give = "text"
+    return InputError(f"{name} = {value!r} is not allowed: give {give}.")

@@ -3,29 +3,22 @@
 Both references are rendered in turn, pass by pass. The difference is compared with the noise of
 both, and the times at equal noise: the variance of an independent mean falls with the time spent,
 so a method costs ``variance x time``.
-
-Three steps lead from everything to the plan, each with its own factor: the plan's sampler, then its
-integrator with nothing left out, then what it leaves out.
 """
-
-from dataclasses import replace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from comparisons.compare import Prepared, leading_distance, prepare
 from comparisons.departure import marks
+from comparisons.departure.metrics import leading_distance
 from comparisons.options import Options
-from comparisons.records import VERSION, Record
-from heuristic.arrays import Array
+from comparisons.prepared import prepare
 from reference.planning.plan import Plan
+from reference.records import VERSION, Estimated, Record
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import Progress, Stream, pass_seed, passes
-from reference.rendering.renderer import Renderer, physical_integrator
-from reference.rendering.sums import Accumulator
-from reference.scene.sampler import with_sampler
+from reference.rendering.renderer import Renderer
+from reference.rendering.sampler import with_sampler
+from reference.rendering.sums import Accumulator, DifferenceSums
 from reference.scene.source import Source
 
 LEVEL = 0.01
@@ -35,20 +28,8 @@ PASSES_WITH_PATHS = 4
 """Factor on the passes if paths are sampled: few paths carry most of the variance, which is hard to
 measure itself."""
 
-FEWEST_PASSES = 32
-"""Fewest passes of each side: intervals come from pairs of passes."""
-
 RESAMPLES = 2000
 """Resamples of the bootstrap."""
-
-
-class Factor(Record):
-    """How many times sooner a step reaches the same noise, with a 95 % interval; 1 for no step."""
-
-    name: str
-    value: float
-    low: float
-    high: float
 
 
 class Verification(Record, kw_only=True):
@@ -74,15 +55,11 @@ class Verification(Record, kw_only=True):
         Root mean square over the pixels of the standard error of one pass.
     gain
         ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
-        planned reference reaches the same noise.
-    factors
-        The steps, whose product is the gain: sampler, integrator, pruning; and the gain itself,
-        with its interval.
+        planned reference reaches the same noise, with an interval from pairs of passes.
     planning_s
         Time of planning, tables included.
     saved_s
-        Time that the plan saves at the noise of all its passes: the time of everything for that
-        noise, less the plan's.
+        Time that the plan saves at the noise of all its passes.
     """
 
     scene: str
@@ -97,8 +74,7 @@ class Verification(Record, kw_only=True):
     everything_s: float
     planned_noise: float
     everything_noise: float
-    gain: float
-    factors: tuple[Factor, ...]
+    gain: Estimated
     planning_s: float
     saved_s: float
     record_version: int = VERSION
@@ -109,177 +85,94 @@ def verify(
     options: Options | None = None,
     progress: Progress | None = None,
     level: float = LEVEL,
-    steps: bool = True,
 ) -> Verification:
     """Render a scene as planned and with everything, and compare both.
 
-    Parameters
-    ----------
-    source, options, progress
-        See :func:`comparisons.compare.compare`. Given samples apply to everything; if omitted, the
-        plan's are used.
-    level
-        Chance that any pixel is marked though nothing differs.
-    steps
-        Whether to measure each step; otherwise only the two ends are rendered.
-
-    Returns
-    -------
-    Verification
+    Given samples apply to everything; if omitted, the plan's are used. ``level`` is the chance that
+    any pixel is marked though nothing differs.
     """
     options = options or Options()
-    sides = [prepare(source, replace(options, everything=choice)) for choice in (False, True)]
+    planned, everything = sides = [
+        prepare(source, options.changed(everything=choice)) for choice in (False, True)
+    ]
     count = max(side.passes for side in sides)
-    if sides[0].plan.max_depth != 2:
-        count *= PASSES_WITH_PATHS
-    count = max(count, FEWEST_PASSES if steps else 0)
-    stages = _stages(*sides) if steps else [sides[1].reference, sides[0].reference]
-    width, height = image_size(sides[0].scene)
-    counted = gbuffer(sides[0].scene, width, height).hit
-    measured = {renderer: _Measured(renderer, counted) for renderer in stages}
-    # The other side has other seeds: equal ones would hide shared noise.
-    others = passes(stages[:1], options.seed, count, stream=Stream.OTHER_SIDE)
-    distinct, apart = list(measured), DifferenceSums(counted)
-    own = passes(distinct[1:], options.seed, count, progress=progress, stage="verifying")
-    for other, one in zip(others, own, strict=True):
-        images = dict(zip(distinct, (*other.images, *one.images), strict=True))
-        for renderer, image in images.items():
-            measured[renderer].add(image)
-        everything, planned = (mi.TensorXd(images[stages[place]]) for place in (0, -1))
-        apart.add(planned - everything)
-    found, difference = [measured[renderer] for renderer in stages], apart.estimate()
+    count = max(count, 2) * (1 if planned.plan.max_depth == 2 else PASSES_WITH_PATHS)
+    width, height = image_size(planned.scene)
+    counted = gbuffer(planned.scene, width, height).hit
+    # The sides have different seeds: equal ones would hide shared noise.
+    streams = (
+        passes([planned.reference], options.seed, count, progress=progress, stage="verifying"),
+        passes([everything.reference], options.seed, count, stream=Stream.OTHER_SIDE),
+    )
+    total, apart = Accumulator(), DifferenceSums(counted)
+    images: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    variances: tuple[list[float], list[float]] = ([], [])
+    for both in zip(*streams, strict=True):
+        tensors = [mi.TensorXd(one.images[0]) for one in both]
+        total.add(tensors[0])
+        apart.add(tensors[1] - tensors[0])
+        for tensor, before, own in zip(tensors, images, variances, strict=True):
+            before.append(np.array(tensor)[counted])
+            if len(before) == 2:  # each pair of passes gives an independent estimate
+                own.append(_variance(*before))
+                before.clear()
+    difference = apart.estimate()
     distance = leading_distance(options.viewing)
-    marked = marks.find(difference, found[-1].total.mean(), counted, distance, level=level)
-    return _summarise(
-        source.name,
-        sides,
-        found,
-        counted,
-        heuristic_largest=_kernel_difference(sides, options.seed),
-        largest=float(np.abs(difference.mean).max()),
+    marked = marks.find(difference, total.mean(), counted, distance, level=level)
+    seconds = [side.reference.pass_times().median_s for side in sides]
+    gain = _gain(sides[0].reference, sides[1].reference, variances)
+    return Verification(
+        scene=source.name,
+        planned=_words(planned.plan),
+        everything=_words(everything.plan),
+        resolution=(width, height),
         significant=int((marked == marks.MARKED).sum()),
+        pixels=int(counted.sum()),
+        largest=float(np.abs(difference.mean).max()),
+        heuristic_largest=_kernel_difference(sides, options.seed),
+        planned_s=seconds[0],
+        everything_s=seconds[1],
+        planned_noise=float(np.sqrt(np.mean(variances[0]))),
+        everything_noise=float(np.sqrt(np.mean(variances[1]))),
+        gain=gain,
+        planning_s=planned.planning_seconds,
+        saved_s=seconds[0] * planned.passes * (gain.value - 1),
     )
 
 
-def _stages(planned: Prepared, everything: Prepared) -> list[Renderer]:
-    """Return the renderers from everything to the plan; equal ones are the same.
-
-    The second has the plan's sampler, the third also its integrator, with nothing left out.
-    """
-    plan, scene, spp = planned.plan, planned.scene, planned.reference.spp
-    whole = plan
-    if plan.integrator == "direct_all":
-        whole = replace(plan, shadows=True, max_depth=plan.scene_depth, tabulate_environment=False)
-    found = [planned.reference]
-    for before, after in ((whole, plan), (everything.plan, whole)):
-        if before.simulated == after.simulated:
-            found.append(found[-1])
-            continue
-        integrator = physical_integrator(before, scene, planned.pair.hide_emitters)
-        found.append(Renderer(scene, integrator, spp, "image of a step"))
-    return [everything.reference, *reversed(found)]
+def _variance(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the variance of a pass, from two; a plan without noise would divide by zero."""
+    return max(float(np.mean((one - other) ** 2) / 2 if one.size else 0.0), 1e-14)
 
 
-class _Measured:
-    """The passes of one renderer: their sum, their times, and the variance of a pass.
-
-    Each pair of passes gives an independent estimate of the variance.
-    """
-
-    def __init__(self, renderer: Renderer, counted: np.ndarray) -> None:
-        self.renderer, self.counted, self.total = renderer, counted, Accumulator()
-        self.variances: list[float] = []
-        self._before: np.ndarray | None = None
-
-    def add(self, image: Array) -> None:
-        self.total.add(image)
-        image = np.array(image, float)[self.counted]
-        if self._before is None:
-            self._before = image
-            return
-        spread = np.mean((image - self._before) ** 2) / 2 if image.size else 0.0
-        # A plan without noise would divide by zero; noise below rounding does not matter.
-        self.variances.append(max(float(spread), 1e-14))
-        self._before = None
-
-    def seconds(self) -> float:
-        return self.renderer.pass_times().median
-
-    def noise(self) -> float:
-        return float(np.sqrt(np.mean(self.variances)))
-
-    def cost(self) -> float:
-        return self.seconds() * self.noise() ** 2
-
-    def resampled(self, rng: np.random.Generator) -> np.ndarray:
-        """Return costs resampled by a bootstrap over pairs, and over times."""
-        times = np.array(self.renderer.times[1:] or self.renderer.times)
-        shape = RESAMPLES, len(self.variances)
-        variances = rng.choice(self.variances, shape).mean(axis=1)
-        return variances * np.median(rng.choice(times, (RESAMPLES, len(times))), axis=1)
-
-
-def _factor(name: str, slow: _Measured, fast: _Measured, rng: np.random.Generator) -> Factor:
-    if slow is fast:
-        return Factor(name=name, value=1.0, low=1.0, high=1.0)
-    ratios = slow.resampled(rng) / fast.resampled(rng)
-    low, high = np.quantile(ratios, (0.025, 0.975))
-    return Factor(name=name, value=slow.cost() / fast.cost(), low=float(low), high=float(high))
-
-
-def _factors(measured: list[_Measured]) -> tuple[Factor, ...]:
-    """Return the factors of the three steps, if measured, and of all."""
+def _gain(
+    planned: Renderer, everything: Renderer, variances: tuple[list[float], list[float]]
+) -> Estimated:
+    """Return the ratio of costs, with a bootstrap over pairs of passes and over times."""
     rng = np.random.default_rng(0)
-    names = ("sampler", "integrator", "pruning") if len(measured) > 2 else ()
-    steps = zip(names, measured, measured[1:], strict=False)
-    found = [_factor(name, slow, fast, rng) for name, slow, fast in steps]
-    return (*found, _factor("all", measured[0], measured[-1], rng))
+    costs, resampled = [], []
+    for renderer, own in zip((planned, everything), variances, strict=True):
+        times = np.array(renderer.times[1:] or renderer.times)
+        costs.append(renderer.pass_times().median_s * np.mean(own))
+        chosen = rng.choice(own, (RESAMPLES, len(own))).mean(axis=1)
+        resampled.append(chosen * np.median(rng.choice(times, (RESAMPLES, len(times))), axis=1))
+    low, high = np.quantile(resampled[1] / resampled[0], (0.025, 0.975))
+    return Estimated(value=float(costs[1] / costs[0]), low=float(low), high=float(high))
 
 
-def _kernel_difference(sides: list[Prepared], seed: int) -> float:
+def _kernel_difference(sides: list, seed: int) -> float:
     """Return the largest effect of the terms left out of the kernel, with equal rays."""
     sampler, spp = sides[0].plan.sampler, sides[0].heuristic.spp
     images = []
     for side in sides:
         scene = with_sampler(side.pair.heuristic, sampler).instantiate()
-        images.append(
-            np.array(Renderer(scene, None, spp, "heuristic image").render(pass_seed(seed, 0)))
-        )
+        renderer = Renderer(scene, None, spp, "heuristic image")
+        images.append(np.array(renderer.render(pass_seed(seed, 0))))
     return float(np.abs(images[0] - images[1]).max())
 
 
-def _summarise(
-    name: str,
-    sides: list[Prepared],
-    measured: list[_Measured],
-    counted: np.ndarray,
-    **found: Any,
-) -> Verification:
-    everything, planned = measured[0], measured[-1]
-    factors = _factors(measured)
-    gain = factors[-1].value
-    height, width = counted.shape
-    return Verification(
-        scene=name,
-        planned=_word(sides[0].plan),
-        everything=_word(sides[1].plan),
-        resolution=(width, height),
-        pixels=int(counted.sum()),
-        planned_s=planned.seconds(),
-        everything_s=everything.seconds(),
-        planned_noise=planned.noise(),
-        everything_noise=everything.noise(),
-        gain=gain,
-        factors=factors,
-        planning_s=sides[0].planning_seconds,
-        saved_s=planned.seconds() * sides[0].passes * (gain - 1),
-        **found,
-    )
-
-
-def _word(plan: Plan) -> str:
+def _words(plan: Plan) -> str:
     depth = "" if plan.max_depth == 2 else f" {plan.max_depth}"
     extra = "" if plan.shadows else ", no shadow rays"
-    extra += ", tabulated environment" if plan.tabulate_environment else ""
-    extra += f", {plan.light_samples} lights per sample" if plan.light_samples else ""
+    extra += ", tabulated environment" if plan.tabulated_environment else ""
     return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

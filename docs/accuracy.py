@@ -10,15 +10,16 @@ from statistics import median
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Measured
-from comparisons.cost.effort import Effort
 from comparisons.cost.front import ERRORS, cheapest
-from comparisons.cost.rungs import FULL_PLAN, STAND_INS
+from comparisons.cost.measure import Effort
+from comparisons.cost.methods import FULL_PLAN, STAND_INS
 from comparisons.gallery.builtin import SCENES
-from reports.terminal.printing import number, parameter, seconds
+from comparisons.options import Options
 from reports.terminal.tables import markdown
+from reports.terminal.words import number, parameter, seconds
 from tests.benchmarks import prediction
 
 LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
@@ -37,7 +38,7 @@ def measured(
     """Study what accuracy costs on each scene, in turn."""
     found = []
     for name in names:
-        case = open_case(name, Request(resolution=size))
+        case = open_case(name, Options(resolution=size))
         found.append(cost(case.source, case.options, effort).record)
         print(name, flush=True)
     return found
@@ -65,9 +66,9 @@ def fronts(records: Sequence[Cost]) -> Iterator[str]:
     yield f"At {width} by {height} pixels, {first.rounds} rounds."
     yield ""
     rows = [
-        (record.scene, point.rung, str(point.spp), _time(point), number(point.error))
+        (record.scene, point.method, str(point.spp), _time(point), number(point.error.mean))
         for record in records
-        for point in sorted(record.points, key=lambda point: point.seconds.median)
+        for point in sorted(record.points, key=lambda point: point.seconds.value)
         if point.pareto
     ]
     head = "Scene", "Method", "Samples per pixel", "Time", "Mean ΔE2000"
@@ -111,14 +112,14 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
     yield from markdown([head, *rows], right=0)
 
 
-def prices(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield each effect's price: the scenes where it matters, and its medians there."""
+def attribution(records: Sequence[Cost]) -> Iterator[str]:
+    """Yield what each effect removes and adds: the scenes where it matters, and medians there."""
     worth: dict[str, list[tuple[float, float]]] = {}
     for record in records:
-        for price in record.prices.effects:
-            if price.removes.low > 0:
-                removed = price.removes.value, price.adds_s.value / record.prices.reference_s
-                worth.setdefault(price.effect, []).append(removed)
+        for one in record.attribution.effects:
+            if one.removes.low > 0:
+                removed = one.removes.value, one.adds_s.value / record.attribution.reference_s
+                worth.setdefault(one.effect, []).append(removed)
     rows = [
         (
             effect,
@@ -146,10 +147,10 @@ def _within(records, limit):
     for record in records:
         chosen = cheapest(record.points, limit)
         full = cheapest(_points(record, FULL_PLAN.name), limit)
-        if chosen and _family(record, chosen.rung) == "kernel":
+        if chosen and _family(record, chosen.method) == "kernel":
             enough.append(record.scene)
             if full:
-                saved.append(full.seconds.median / chosen.seconds.median)
+                saved.append(full.seconds.value / chosen.seconds.value)
     said = (
         f"Within a mean ΔE2000 of {parameter(limit)}, a kernel without paths is the cheapest way in"
         f" {len(enough)} of {len(records)} scenes"
@@ -161,9 +162,9 @@ def _worth_most(records):
     """Return which effects are worth most, and in how many scenes."""
     first = Counter()
     for record in records:
-        sure = [price for price in record.prices.effects if price.removes.low > 0]
+        sure = [one for one in record.attribution.effects if one.removes.low > 0]
         if sure:
-            first[max(sure, key=lambda price: price.removes.value).effect] += 1
+            first[max(sure, key=lambda one: one.removes.value).effect] += 1
     if not first:
         return "No effect surely removes anything."
     ranked = ", then ".join(f"{effect} ({count})" for effect, count in first.most_common(3))
@@ -172,21 +173,25 @@ def _worth_most(records):
 
 def _stand_ins(records):
     """Return which stand-ins are on a Pareto front, and in how many scenes."""
-    names = [rung.name for rung in STAND_INS]
+    names = [method.name for method in STAND_INS]
     on_front = Counter(
         name
         for record in records
-        for name in {point.rung for point in record.points if point.pareto}.intersection(names)
+        for name in {point.method for point in record.points if point.pareto}.intersection(names)
     )
     never = [name for name in names if not on_front[name]]
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
+    left += (
+        " Measured in version 0.2, lost in all scenes and gone since: spherical harmonics; ambient"
+        " occlusion; ambient occlusion from the depth image."
+    )
     return f"Stand-ins on the Pareto front, by the number of scenes: {said}.{left}"
 
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:
     """Return the points of a method, even if a scene has merged it with another."""
-    return record.points_of(next(rung.name for rung in record.rungs if name in rung.names))
+    return record.points_of(next(method.name for method in record.methods if name in method.names))
 
 
 def _first(record, name):
@@ -194,11 +199,11 @@ def _first(record, name):
 
 
 def _family(record, name):
-    return next(rung.family for rung in record.rungs if rung.name == name)
+    return next(method.family for method in record.methods if method.name == name)
 
 
 def _cell(point):
-    return f"{number(point.error)} in {_time(point)}"
+    return f"{number(point.error.mean)} in {_time(point)}"
 
 
 def _time(point):
@@ -207,4 +212,4 @@ def _time(point):
 
 
 def _named(point):
-    return f"{point.rung}, {point.spp} spp: {_cell(point)}" if point else "none"
+    return f"{point.method}, {point.spp} spp: {_cell(point)}" if point else "none"

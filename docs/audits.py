@@ -1,17 +1,17 @@
-"""The content of docs/audit.md: audits of shaders, of three.js, and of some Mitsuba BSDFs."""
+"""The content of docs/audit.md: audits of shaders and of some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
-from comparisons.audit.audit import audit
 from comparisons.audit.audit_record import Audit, Checked
-from reports.terminal.printing import number
+from comparisons.audit.checks import audit
 from reports.terminal.tables import markdown
+from reports.terminal.words import number
 
 SHADERS = Path(__file__).parent / "shaders"
-PICTURED, THREE = "phong", "three:phong"
+PICTURED = "phong"
 SHADED = ("cook_torrance", "oren_nayar", "toon", "wrapped")
 ENGINES = {
     "three.js, MeshPhong": "mesh_phong.py",
@@ -34,7 +34,7 @@ BSDFS = (
 
 def audits() -> dict[str, Audit]:
     """Return all audits, by their names in the table."""
-    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn", THREE)}
+    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn")}
     for name in SHADED:
         link = f"[{name.replace('_', ' ')}](shaders/{name}.py)"
         found[link] = audit("heuristic", str(SHADERS / f"{name}.py"), {})

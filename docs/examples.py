@@ -9,10 +9,11 @@ import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impo
 import numpy as np
 
 from comparisons.audit import diagnosis
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
 from comparisons.compare import compare
+from comparisons.comparison import Comparison
 from comparisons.departure.metrics import LEADING
-from comparisons.record import Comparison
+from comparisons.options import Options
 from heuristic.errors import InputError
 from reports.terminal.tables import markdown
 from tests.wrong_shaders import WRONG, Wrong
@@ -44,22 +45,22 @@ def pictures(found: dict[tuple[str, str], Comparison]) -> dict[str, np.ndarray]:
 def mistakes() -> Iterator[str]:
     """Yield the table of shaders that are wrong on purpose, with the message for each."""
     rows = [
-        (wrong.name, wrong.language, f"`{wrong.wrong.strip()}`", _told(wrong)) for wrong in WRONG
+        (wrong.name, wrong.language, f"`{wrong.wrong.strip()}`", _message(wrong)) for wrong in WRONG
     ]
     yield from markdown([("Mistake", "In", "Written as", "Message"), *rows], right=4)
 
 
-def _told(wrong: Wrong) -> str:
+def _message(wrong: Wrong) -> str:
     with TemporaryDirectory() as folder:
         path = wrong.write(Path(folder))
         try:
-            return " ".join(diagnosis.told(str(path)))
+            return " ".join(diagnosis.describe(str(path)))
         except InputError as error:
             return f"Rejected: {str(error).replace(str(path), path.name)}"
 
 
 def _compared(name: str, scene: str) -> Comparison:
-    asked = Request(heuristic=str(SHADERS / f"{name}.py"), resolution=(SIDE, SIDE), spp=SAMPLES)
+    asked = Options(heuristic=str(SHADERS / f"{name}.py"), resolution=(SIDE, SIDE), spp=SAMPLES)
     case = open_case(scene, asked)
     return compare(case.source, case.options)
 

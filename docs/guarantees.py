@@ -21,7 +21,7 @@ AREAS = {
     "plans": "Plans",
     "marks": "Marks of significance",
     "means": "Means and floors",
-    "prices": "Prices and parts",
+    "attribution": "Attribution and parts",
     "checks": "Regression checks",
     "runs": "Runs and files",
 }

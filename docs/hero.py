@@ -15,13 +15,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
-from comparisons.case import Request
 from comparisons.departure.metrics import LEADING
+from comparisons.options import Options
 from reports import verdict
 from reports.charts import figures
-from reports.files.sheets import webp
-from reports.run import single
-from reports.terminal.printing import number
+from reports.files.images import webp
+from reports.run import batch, scene
+from reports.terminal.words import number
 
 SCENE = "cornell-box"
 GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"
@@ -49,11 +49,11 @@ class Hero:
     command: str
 
 
-def made(request: Request | None = None) -> Hero:
+def made(request: Options | None = None) -> Hero:
     """Compare the scene as the command does."""
-    wanted = single.Wanted(request or Request(), with_cost=True)
+    job = batch.Job(request or Options(), with_cost=True)
     with TemporaryDirectory() as folder:
-        view, _ = single.compare(SCENE, Path(folder), SCENE, wanted, lambda *_: None)
+        view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
     study = view.cost.record if view.cost else None

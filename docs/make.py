@@ -2,14 +2,11 @@
 
 ``./run docs --site`` only builds the site.
 
-Pictures and tables come from renderings with fixed seeds. The index of equations comes from the
-docstrings, and a test keeps the page equal to it. Marked parts of pages are replaced; the rest is
-written by hand.
+Pictures and tables come from renderings with fixed seeds. Marked parts of pages are replaced; the
+rest is written by hand.
 """
 
-import re
 import sys
-from itertools import groupby
 from pathlib import Path
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
@@ -18,17 +15,18 @@ import nbformat
 from nbclient import NotebookClient
 
 from comparisons import atomic
-from comparisons.compare import Options, compare
+from comparisons.compare import compare
 from comparisons.gallery.builtin import builtin
-from heuristic import equations, plugins
+from comparisons.options import Options
+from heuristic import plugins
 from heuristic.interpolation import Interpolation
-from reference.planning.plan import RULES
+from reference.planning.rules import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant
-from reports.charts import figures, term_figure, vega
-from reports.charts.audit_charts import albedo_chart
-from reports.charts.error_over_time import error_over_time
+from reports.charts import figures, vega
+from reports.charts.cost_charts import titled
 from reports.files import images
+from reports.run import audit_files
 from reports.terminal import tables
 from tests.witnesses import page
 
@@ -44,9 +42,6 @@ SHEETS = {
 }
 """Pictures of docs/models.md: heuristic, reference and difference below each other."""
 
-LOBES = {"sharp": (31, 88), "dull": (157, 94)}
-"""Pixels in the highlights of the first and the last of the plastic spheres."""
-
 POLYGONS = (
     ("fig-6-10", Interpolation.FLAT),
     ("fig-6-10", Interpolation.GOURAUD),
@@ -58,6 +53,8 @@ POLYGONS = (
 
 def main(words):
     """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
+    if not set(words) <= {"--all", "--accuracy", "--site"}:
+        sys.exit(__doc__)
     if words == ["--site"]:
         return _site()
     set_variant("llvm_ad_rgb")
@@ -66,12 +63,10 @@ def main(words):
     if words == ["--all"]:
         _measurements()
         _accuracy()
-    replace("models.md", "equations", equation_table())
     _guarantees()
     replace("plans.md", "rules", rules())
     _hero()
     _models()
-    _lobes()
     _architecture()
     _example()
     _witnesses()
@@ -96,15 +91,6 @@ def marks(part):
     return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
 
 
-def equation_table():
-    """Yield the index of equations in Markdown; equal neighbours share a row."""
-    rows = []
-    for (home, meaning), entries in groupby(equations.index(), lambda e: (e.home, e.meaning)):
-        numbers = [entry.number for entry in entries]
-        rows.append((_span(numbers), _link(home), re.sub(r"``(.*?)``", r"`\1`", meaning)))
-    return tables.markdown([("Equation", "Home", "What it says"), *rows], right=0)
-
-
 def rules():
     """Yield the rules of pruning: what each omits, its proof, and its premises."""
     for rule in RULES:
@@ -114,17 +100,6 @@ def rules():
         yield from (f"- {premise.sentence}" for premise in rule.premises)
         if rule is not RULES[-1]:
             yield ""
-
-
-def _span(numbers):
-    return numbers[0] if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
-
-
-def _link(home):
-    if home is None:
-        return "none"
-    room, module, name = home.split(".", 2)
-    return f"[`{module}.{name}`](../{room}/{module}.py)"
 
 
 def _images(name, interpolation=None):
@@ -169,14 +144,6 @@ def _hero():
     replace("../README.md", "hero", hero.caption(found))
 
 
-def _lobes():
-    """Draw the vectors and lobes in the highlights of two plastic spheres."""
-    options = Options(spp=SAMPLES, resolution=(SIDE, SIDE))
-    grid = compare(builtin("plastic-spheres").source(), options).terms
-    for name, place in LOBES.items():
-        atomic.write(DOCS / f"models-lobes-{name}.svg", term_figure.svg(grid.at(*place)) + "\n")
-
-
 def _site():
     """Build the site from what is there, in out/site."""
     from website import build  # next to this script
@@ -193,7 +160,7 @@ def _measurements():
 
     for measure in (measured.baselines, measured.fits, measured.findings):
         measure()
-    replace("../README.md", "cost", measured.prices())
+    replace("../README.md", "cost", measured.attribution())
     replace("plans.md", "gains", measured.gains())
     replace("speed.md", "speed", measured.speed())
 
@@ -203,12 +170,12 @@ def _accuracy():
     import accuracy  # next to this script
 
     records = accuracy.measured()
-    for part in ("setting", "findings", "methods", "prices", "pictures"):
+    for part in ("setting", "findings", "methods", "attribution", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))
     replace("accuracy.md", "fronts", accuracy.fronts(accuracy.at_full_size()))
     replace("accuracy.md", "predictions", accuracy.predictions())
     for record, path in accuracy.charts(records):
-        atomic.write(DOCS / path, vega.paper(error_over_time(record)))
+        atomic.write(DOCS / path, vega.paper(titled(record)))
 
 
 def _guarantees():
@@ -251,7 +218,7 @@ def _audits():
     plugins.register()
     found = audits.audits()
     replace("audit.md", "audits", audits.table(found))
-    atomic.write(DOCS / "audit.svg", vega.paper(albedo_chart(found[audits.PICTURED])))
+    atomic.write(DOCS / "audit.svg", vega.paper(audit_files.lobes(found[audits.PICTURED])))
     replace("audit.md", "engines", audits.argued(audits.engines()))
 
 

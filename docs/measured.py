@@ -8,20 +8,25 @@ import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
+import msgspec
 import numpy as np
 
 from comparisons import atomic
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Measured
-from comparisons.verification import Factor, verify
+from comparisons.fit.fit_record import FitRecord
+from comparisons.options import Options
+from comparisons.study import dataset, design
+from comparisons.verification import verify
 from reports.charts import vega
-from reports.charts.error_over_time import error_over_time
+from reports.charts.cost_charts import titled
 from reports.terminal.tables import markdown
-from tests.benchmarks import kernel, lights
+from tests.benchmarks import kernel
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -45,91 +50,93 @@ def baselines() -> None:
 
 def fits() -> None:
     """Fit the figures of chapter 8."""
-    _run("reports", "fit", *CHAPTER_8, "--markdown", "docs/fit-figures.md")
+    import fits  # next to this script
+
+    words = ("-P", "-m", "reports", "fit", *CHAPTER_8, "--json")
+    done = subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
+    records = msgspec.json.decode(done.stdout, type=list[FitRecord])
+    atomic.write(DOCS / "fit-figures.md", "\n".join(fits.page(records)) + "\n")
 
 
 def findings() -> None:
-    """Study Phong against roughplastic."""
-    _run("reports", "study", "studies/phong-roughplastic.toml", "--findings", "docs/findings.md")
+    """Study Phong against roughplastic, and write its dataset, its figures and their page."""
+    import findings  # next to this script
+
+    file = ROOT / "studies/phong-roughplastic.toml"
+    with TemporaryDirectory() as folder:
+        _run("reports", "study", str(file), "-o", folder)
+        made = Path(folder, "study", file.stem)
+        table = dataset.read(made / f"{file.stem}.parquet")
+        atomic.write(file.with_suffix(".parquet"), dataset.file_of(table))
+        for figure in (made / "figures").glob("*.svg"):
+            atomic.write(DOCS / "findings" / figure.name, figure.read_bytes())
+    atomic.write(DOCS / "findings.md", findings.page(design.read(file), table))
 
 
-def prices() -> Iterator[str]:
+def attribution() -> Iterator[str]:
     """Study the cost of accuracy, draw its chart, and yield the README's sentence."""
-    case = open_case(COST_SCENE, Request())
+    case = open_case(COST_SCENE, Options())
     record = cost(case.source, case.options).record
-    atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(error_over_time(record)))
-    rung = partial(_points, record)
-    kernel_point, shadows = rung("Phong kernel")[-1], rung("kernel with shadows")[-1]
-    first, *_, last = rung("full plan")
-    worth = {price.effect: price.removes for price in record.prices.effects}
+    atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(titled(record)))
+    points = partial(_points, record)
+    kernel, shadows = points("Phong kernel")[-1], points("kernel with shadows")[-1]
+    first, *_, last = points("full plan")
+    worth = {one.effect: one.removes for one in record.attribution.effects}
     by_worth = sorted(worth, key=lambda effect: -worth[effect].value)
-    prices = ", ".join(
+    removed = ", ".join(
         f"{effect} {worth[effect].value:.3g} ({worth[effect].low:.3g} to {worth[effect].high:.3g})"
         for effect in by_worth
     )
     closure = record.closure
     yield (
-        f"The textbook kernel is {kernel_point.error:.1f} away from the reference (mean ΔE2000)"
-        f" after {_time(kernel_point)}, and more samples do not bring it nearer; the full plan is"
-        f" {first.error:.1f} away after {_time(first)} and {last.error:.1f} after {_time(last)}."
-        f" Adding shadows alone gives {shadows.error:.1f}, because the light between surfaces"
+        f"The textbook kernel is {kernel.error.mean:.1f} away from the reference (mean ΔE2000)"
+        f" after {_time(kernel)}, and more samples do not bring it nearer; the full plan is"
+        f" {first.error.mean:.1f} away after {_time(first)} and {last.error.mean:.1f} after"
+        f" {_time(last)}."
+        f" Adding shadows alone gives {shadows.error.mean:.1f}, because the light between surfaces"
         " that would fill them is missing. Averaged over all orders of adding them, the effects"
-        f" remove the following from {record.prices.departure:.1f} (95 % intervals): {prices}. With"
-        f" all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
+        f" remove from {record.attribution.departure:.1f} (95 % intervals): {removed}."
+        f" With all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
     )
 
 
 def gains() -> Iterator[str]:
     """Verify plans, and yield the table of their savings."""
-    names = ("sampler", "integrator", "pruning", "all")
     rows = []
     for scene in VERIFIED:
-        case = open_case(scene, Request())
-        factors = {factor.name: factor for factor in verify(case.source, case.options).factors}
-        rows.append((scene, *(_factor(factors[name]) for name in names)))
-    yield from markdown([("Scene", *names), *rows], right=1)
-
-
-def _factor(factor: Factor) -> str:
-    if factor.low == factor.high:
-        return "no change"
-    return f"{factor.value:.3g} ({factor.low:.3g} to {factor.high:.3g})"
+        case = open_case(scene, Options())
+        gain = verify(case.source, case.options).gain
+        rows.append((scene, f"{gain.value:.3g} ({gain.low:.3g} to {gain.high:.3g})"))
+    yield from markdown([("Scene", "times sooner"), *rows], right=1)
 
 
 def speed() -> Iterator[str]:
     """Yield the table of the kernel's speed, and a sentence on many lights."""
-    data, many = kernel.run(ROUNDS), lights.run(ROUNDS)
+    data = kernel.run(ROUNDS)
     times, ratios = data["times"], data["ratios"]
-
-    def row(label: str, name: str, comment: str) -> tuple[str, str, str]:
-        return label, f"{times[name]['median_ms']:.1f} ms", comment
-
-    copies = [name for name in times if name.startswith("memory copy")]
-    fastest = min(copies, key=lambda name: times[name]["median_ms"])
+    copy = min(times[name] for name in times if name.startswith("memory copy"))
     yield from markdown(
         [
             ("", "Time", "The kernel is"),
-            row("Dr.Jit kernel", "Dr.Jit", ""),
-            row(
+            ("Dr.Jit kernel", f"{times['Dr.Jit']:.1f} ms", ""),
+            (
                 "memory copy of the bytes that it reads and writes",
-                fastest,
+                f"{copy:.1f} ms",
                 f"{ratios['memory copy']:.1f} times that",
             ),
-            row(
-                "Numba, parallel, three lights unrolled",
-                "Numba, three lights",
-                f"{ratios['Numba, three lights']:.1f} times as fast",
+            *(
+                (label, f"{times[name]:.1f} ms", f"{ratios[name]:.{digits}f} times as fast")
+                for label, name, digits in (
+                    ("Numba, parallel, three lights unrolled", "Numba, three lights", 1),
+                    ("Numba, parallel, any number of lights", "Numba", 0),
+                    ("NumPy", "NumPy", 0),
+                )
             ),
-            row(
-                "Numba, parallel, any number of lights",
-                "Numba",
-                f"{ratios['Numba']:.0f} times as fast",
-            ),
-            row("NumPy", "NumPy", f"{ratios['NumPy']:.0f} times as fast"),
         ],
         right=1,
     )
-    each = [row["ns_per_light_and_point"] for row in many if row["lights"] >= 1_000]
+    many = data["lights"]
+    each = [row["ns"] for row in many if row["lights"] >= 1_000]
     unrolled = np.median([row["unrolled_ns"] for row in many])
     yield ""
     yield (
@@ -141,12 +148,12 @@ def speed() -> Iterator[str]:
 
 def _points(record: Cost, name: str) -> tuple[Measured, ...]:
     """Return the points of a method, even if a scene has merged it with another."""
-    (rung,) = [rung.name for rung in record.rungs if name in rung.names]
-    return record.points_of(rung)
+    (method,) = [method.name for method in record.methods if name in method.names]
+    return record.points_of(method)
 
 
 def _time(point: Measured) -> str:
-    return f"{1e3 * point.seconds.median:.0f} ms"
+    return f"{1e3 * point.seconds.value:.0f} ms"
 
 
 def _run(module: str, *words: str) -> None:

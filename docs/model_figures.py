@@ -13,15 +13,20 @@ from matplotlib.patches import Arc
 from numpy.typing import NDArray
 from PIL import Image
 
+from comparisons.comparison import Images
 from comparisons.departure.metrics import LEADING
-from comparisons.record import Images
-from reports.charts import figures, term_figure
-from reports.charts.term_figure import COLOURS
+from reports.charts import figures
 from reports.files import images
 
 GROUND, FAINT = "#fcfcfb", "#8a8a8a"
 EXPONENTS = {3: "#b97b00", 9: "#0067a8", 81: "#00795a"}
 """Colours of lobes by exponent; the figures of chapter 8 have 3 and 9."""
+
+COLOURS = {"N": "#1c1e21", "L": "#b97b00", "R": "#0067a8", "V": "#00795a"}
+"""Colours of vectors."""
+
+VIEWS = np.arange(-90, 91, 1.5)
+"""Degrees from the normal at which lobes are drawn."""
 
 INCIDENCE = 50.0
 """Degrees between `N` and `L` in the figures."""
@@ -78,16 +83,16 @@ def lobes() -> Figure:
 
 
 def seen(incidence: float, **material: float | str) -> NDArray[np.float64]:
-    """Return the kernel's value at each of :data:`reports.charts.term_figure.VIEWS`.
+    """Return the kernel's value at each of :data:`VIEWS`.
 
     ``incidence`` is in degrees; the light has intensity 1.
     """
-    view = Array3f(*(np.float32(part) for part in _at(term_figure.VIEWS)), 0)
+    view = Array3f(*(np.float32(part) for part in _at(VIEWS)), 0)
     toward = _at(-incidence)
     light = heuristic.DirectionalLight(direction=(-toward[0], -toward[1], 0), intensity=1.0)
     made = heuristic.Material(**material)
     value = heuristic.shade(Array3f(0), Array3f(0, 1, 0), view, made, [light])
-    return np.broadcast_to(np.array(value, np.float64), term_figure.VIEWS.shape)
+    return np.broadcast_to(np.array(value, np.float64), VIEWS.shape)
 
 
 def compared(titles: Sequence[str], found: Sequence[Images]) -> Figure:
@@ -149,7 +154,7 @@ def _surface(axes: Axes) -> None:
 
 
 def _lobe(axes: Axes, radius: NDArray[np.float64], colour: str, label: str) -> None:
-    x, y = _at(term_figure.VIEWS, radius)
+    x, y = _at(VIEWS, radius)
     axes.fill(x, y, facecolor=colour + "22", edgecolor=colour, linewidth=1.4, label=label)
 
 

@@ -8,10 +8,13 @@ from tempfile import TemporaryDirectory
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
+from engines import three_js  # next to this script
 
-from comparisons.case import Case, Request, open_case
-from comparisons.compare import compare, leading_distance
-from comparisons.exports.exported import exported
+from comparisons.case import Case, open_case
+from comparisons.compare import compare
+from comparisons.departure.metrics import leading_distance
+from comparisons.options import Options
+from comparisons.plain_scene import plain_scene
 from reports.terminal.tables import markdown
 from tests.witnesses import povray, povray_scenes
 
@@ -52,14 +55,14 @@ def _cell(one: Rendered, renderer: str) -> str:
 
 
 def _rendered(name: str) -> Rendered:
-    asked = Request(resolution=(SIDE, SIDE), spp=SAMPLES)
+    asked = Options(resolution=(SIDE, SIDE), spp=SAMPLES)
     case = open_case(name, asked)
     kernel = compare(case.source, case.options).images
-    three = open_case(name, Request(**asked.stated() | {"heuristic": "three:phong"}))
+    fine = case.changed(tessellation=three_js.TESSELLATION)
     images = {
         KERNEL: kernel.heuristic,
         POVRAY: _povray(case),
-        THREE: compare(three.source, three.options).images.heuristic,
+        THREE: three_js.drawn(plain_scene(fine.source, fine.options)),
         MITSUBA: kernel.reference,
     }
     departure = leading_distance(case.options.viewing)
@@ -77,8 +80,8 @@ def _rendered(name: str) -> Rendered:
 
 
 def _povray(case: Case) -> np.ndarray:
-    fine = case.asking(tessellation=48)
+    fine = case.changed(tessellation=48)
     with TemporaryDirectory() as folder:
-        text = povray_scenes.translated(exported(fine.source, fine.options))
+        text = povray_scenes.translated(plain_scene(fine.source, fine.options))
         picture = povray.drawn(text, FINER * SIDE, Path(folder))
     return picture.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))

@@ -3,16 +3,16 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from heuristic import backend
+from heuristic import llvm
 from heuristic.version import __version__
 
 if TYPE_CHECKING:
     from heuristic.heuristics import Heuristic, Parameter, Range
+    from heuristic.kernel import shade
     from heuristic.lights import DirectionalLight, PointLight, SpotLight
     from heuristic.materials import Material
-    from heuristic.shading import shade
 
-backend.configure()  # Dr.Jit looks for LLVM once, at its first import
+llvm.configure()  # Dr.Jit looks for LLVM once, at its first import
 
 HOMES = {
     "DirectionalLight": "heuristic.lights",
@@ -22,7 +22,7 @@ HOMES = {
     "PointLight": "heuristic.lights",
     "SpotLight": "heuristic.lights",
     "Range": "heuristic.heuristics",
-    "shade": "heuristic.shading",
+    "shade": "heuristic.kernel",
 }
 """Where names come from when they are asked for: errors and options need no Dr.Jit."""
 

@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from heuristic.arrays import Colour
+from heuristic.convention import Colour
 from heuristic.errors import InputError
 
 
@@ -16,11 +16,6 @@ def checked(name: str, value: Any) -> Any:
 
     Numbers and sequences must be finite and not negative. Dr.Jit arrays are not checked, because
     that would evaluate them.
-
-    Raises
-    ------
-    InputError
-        For a negative, infinite or NaN value, or one that is not a number.
     """
     if dr.is_array_v(value) and dr.is_jit_v(value):
         return value
@@ -68,11 +63,6 @@ def common_wavelength_count(values: Mapping[str, Any]) -> int:
     """Return the number of components that all ``values`` share; single ones fit any.
 
     ``values`` maps names to checked values.
-
-    Raises
-    ------
-    InputError
-        If two values have different numbers of components, neither of them 1.
     """
     counts = {name: wavelength_count(value) for name, value in values.items()}
     several = {name: count for name, count in counts.items() if count > 1}

@@ -1,15 +1,16 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are here, those of engines in :mod:`heuristic.stand_ins`. Users write a function in a file
-(:mod:`heuristic.shading_files`, :mod:`heuristic.glsl`); a program calls :func:`declare`; a package
-has an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud
-shading are not heuristics: they interpolate any heuristic (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.approximations`. Users write a function in a
+file (:mod:`heuristic.user_shaders`, :mod:`heuristic.glsl`); a program calls :func:`declare`; a
+package has an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and
+Gouraud shading are not heuristics: they interpolate any heuristic (:mod:`heuristic.interpolation`).
 """
 
+import pkgutil
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 from numbers import Real
@@ -17,19 +18,24 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from heuristic import user_code
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.materials import check_form
-from heuristic.points import INPUTS, Array, Given, Point
+from heuristic.points import INPUTS, Array, Point, ShadingArguments
 
 GROUP = "fotismos.heuristics"
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic`` itself; heuristics must use other names."""
 
+LOADERS = {
+    ".py": "heuristic.user_shaders:from_file",
+    ".glsl": "heuristic.glsl.shader_files:from_file",
+}
+"""Functions that read a user's file by its suffix, imported when a name has it."""
 
-THREE = "three:"
-"""Prefix of the names of three.js' heuristics."""
+_FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -42,22 +48,11 @@ class Range:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that tunes a heuristic.
+    """A number that tunes a heuristic, in the heuristic's own unit; both bounds are allowed.
 
-    Parameters
-    ----------
-    name
-        A Python name, for the attribute in ``point.parameters`` and the integrator's parameter.
-    default, low, high
-        In the heuristic's own unit; both bounds are allowed.
-    prepared
-        Whether ``prepare`` depends on it. It then gets the value as a plain keyword argument, and
-        is called again when the value changes.
-
-    Raises
-    ------
-    InputError
-        If the default is out of bounds, or the name cannot be used.
+    ``name`` is the attribute in ``point.parameters`` and the integrator's parameter. If ``prepare``
+    depends on it, it is ``prepared``: ``prepare`` gets its value as a plain keyword argument, and
+    is called again when the value changes.
     """
 
     name: str
@@ -92,7 +87,7 @@ class Heuristic:
     ----------
     name
         Used in commands, records and messages: lower case, digits and hyphens; or
-        ``FILE.py:function`` or ``FILE.glsl`` for one in a file, or ``three:KIND`` for three.js.
+        ``FILE.py:function`` or ``FILE.glsl`` for one in a file.
     shade
         ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
         viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called per
@@ -114,19 +109,14 @@ class Heuristic:
     form
         Form of the specular lobe for all materials; None for each material's own.
     reads
-        What it read on trial (:func:`heuristic.trial.examine`), such as ``material.k_d``.
-    code
-        Digest of its files, if known.
+        What it read on trial (:func:`heuristic.user_shaders.examine`), such as ``material.k_d``.
+    files, code
+        The user's files that it depends on, and a digest of their content.
     traced
         Whether Dr.Jit can record ``shade``. A function that evaluates its arrays is called in
         evaluated loops, and has no derivatives.
     remarks
         Warnings that every record of it carries.
-
-    Raises
-    ------
-    InputError
-        For an invalid name, unknown needs or form, or two parameters of one name.
     """
 
     name: str
@@ -138,13 +128,13 @@ class Heuristic:
     form: str | None = None
     refuse: Callable[[Any], str] | None = None
     reads: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
     code: str = ""
     traced: bool = True
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        word = self.name.removeprefix(THREE).replace("-", "")
-        is_word = word.isalnum() and self.name == self.name.lower()
+        is_word = self.name.replace("-", "").isalnum() and self.name == self.name.lower()
         if not is_word and not in_file(self.name):
             raise InputError(
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
@@ -161,13 +151,7 @@ class Heuristic:
         object.__setattr__(self, "label", self.label or self.name)
 
     def prepared(self, scene: Any, values: dict[str, float]) -> Any:
-        """Prepare for a scene, with the values of all parameters, and return the result.
-
-        Raises
-        ------
-        InputError
-            With the reason why it cannot shade the scene.
-        """
+        """Prepare for a scene, with the values of all parameters, and return the result."""
         if self.refuse is not None and (reason := self.refuse(scene)):
             raise InputError(
                 f"heuristic {self.name} cannot shade this scene: {reason}. Choose another one."
@@ -180,30 +164,20 @@ class Heuristic:
             return self.code
         modules = {function.__module__ for function in (self.shade, self.prepare) if function}
         files = [getattr(sys.modules[module], "__file__", None) for module in sorted(modules)]
-        return sha256(b"".join(Path(file).read_bytes() for file in files if file)).hexdigest()
+        return content_digest(Path(file) for file in files if file)
 
     def evaluate(
         self,
-        given: Given,
+        arguments: ShadingArguments,
         uv: Array,
         parameters: dict[str, Array],
         prepared: Any,
         wavelengths: Array = (),
     ) -> Array:
-        """Return the colour at points; :class:`Point` passes the arguments on.
-
-        Raises
-        ------
-        InputError
-            If a user's heuristic fails, or does not return a colour.
-        """
+        """Return the colour at points; InputError if a user's heuristic fails or returns none."""
         tuned = SimpleNamespace(**parameters)
-        point = Point(self.needs, given, uv, tuned, prepared, wavelengths)
-        if self.is_own:
-            return self.shade(point)
-        from heuristic import trial  # built-in heuristics do not need it
-
-        return trial.shaded(self, point)
+        point = Point(self.needs, arguments, uv, tuned, prepared, wavelengths)
+        return self.shade(point) if self.is_own else user_code.shaded(self.name, self.shade, point)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -216,7 +190,16 @@ class Heuristic:
         return HEURISTICS.is_own(self)
 
 
-HEURISTICS: Declared[Heuristic] = Declared("heuristic", GROUP, home="heuristic.stand_ins")
+HEURISTICS: Declared[Heuristic] = Declared(
+    "heuristic",
+    GROUP,
+    phong="heuristic.heuristics:PHONG",
+    blinn="heuristic.heuristics:BLINN",
+    shadow_map="heuristic.approximations.shadow_maps:HARD",
+    soft_shadow_map="heuristic.approximations.shadow_maps:SOFT",
+    mean_ambient="heuristic.approximations.ambient:MEAN",
+    hemisphere_ambient="heuristic.approximations.ambient:HEMISPHERE",
+)
 """All heuristics, by name."""
 
 declare = HEURISTICS.declare
@@ -224,25 +207,9 @@ declare = HEURISTICS.declare
 
 
 def named(name: str) -> Heuristic:
-    """Return a declared heuristic.
-
-    Raises
-    ------
-    InputError
-        If none has the name, an entry point cannot be loaded, or a file cannot be used.
-    """
-    if name.endswith(GLSL):
-        from heuristic.glsl import shader_files
-
-        return shader_files.opened(name)
-    if name.startswith(THREE):
-        from heuristic.three_js import three_heuristics
-
-        return three_heuristics.opened(name)
-    if in_file(name):
-        from heuristic import shading_files
-
-        return shading_files.opened(name)
+    """Return a declared heuristic, or the one in a user's file."""
+    if file := in_file(name):
+        return pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
@@ -253,25 +220,17 @@ def named(name: str) -> Heuristic:
     return HEURISTICS[name]
 
 
-def known_as(given: "str | Heuristic | Callable[[Point], Array]") -> str:
+def known_as(heuristic: "str | Heuristic | Callable[[Point], Array]") -> str:
     """Return the name of a heuristic; declare one that is given as an object or a function.
 
     A function defined in a notebook or program is known only in its process.
     """
-    if isinstance(given, str):
-        return given
-    if not isinstance(given, Heuristic):
-        name = getattr(given, "__name__", "shade").lower().replace("_", "-").strip("-")
-        from heuristic.functions import heuristic_of
-
-        given = heuristic_of(given, name)
-    return declare(given).name
-
-
-GLSL = ".glsl"
-"""Suffix of the names of heuristics in GLSL."""
-
-_WORDS = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
+    if isinstance(heuristic, str):
+        return heuristic
+    if not isinstance(heuristic, Heuristic):
+        name = getattr(heuristic, "__name__", "shade").lower().replace("_", "-").strip("-")
+        heuristic = pkgutil.resolve_name("heuristic.user_shaders:of_function")(heuristic, name)
+    return declare(heuristic).name
 
 
 def in_file(name: str) -> tuple[str, str] | None:
@@ -279,10 +238,27 @@ def in_file(name: str) -> tuple[str, str] | None:
 
     The function is empty if the name has none, such as ``FILE.glsl``.
     """
-    found = _WORDS.fullmatch(name)
-    return found and (found[1] or found[3], found[2] or "")
+    match = _FILE.fullmatch(name)
+    return match and (match[1] or match[3], match[2] or "")
+
+
+def files_of(name: str) -> tuple[Path, ...]:
+    """Return the user's files that a heuristic depends on: its file, and modules that it imports.
+
+    Empty for one that the package, another package or a program declares.
+    """
+    return named(name).files
+
+
+def content_digest(files: Iterable[Path]) -> str:
+    """Return a digest of the content of files; a missing file counts, too."""
+    whole = sha256()
+    for file in sorted(files):
+        content = file.read_bytes() if file.is_file() else b"gone"
+        whole.update(f"{len(content)} ".encode() + content)
+    return whole.hexdigest()
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}
-PHONG = HEURISTICS.own(Heuristic("phong", Point.textbook, "Phong", _READ))
-BLINN = HEURISTICS.own(Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn"))
+PHONG = Heuristic("phong", Point.textbook, "Phong", _READ)
+BLINN = Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn")

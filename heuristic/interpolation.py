@@ -6,18 +6,38 @@ same as weighting the three vertices by barycentric coordinates, for every direc
 line. Renderers use the latter, on the surface itself; the chapter's scan lines lie in the image,
 where perspective would need a correction.
 
-This module holds the equations. :mod:`heuristic.mesh_shading` applies them to Mitsuba's meshes.
+:func:`shade_mesh` evaluates the model once per vertex (Gouraud) or face (flat), and stores the
+values as attributes of a mesh. :func:`stored_shade` reads them where a ray hits, interpolated by
+Mitsuba. Stored values hold for one viewer, one set of lights and one of wavelengths.
+
+:class:`MeshCorners` is Gouraud shading without storage: three evaluations per ray, at the vertices
+of the face that it hits. It is for spectral variants, whose wavelengths change from ray to ray.
+
+Phong shading does not need either: Mitsuba interpolates and normalises the vertex normals.
 """
 
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 import drjit as dr
+import mitsuba as mi
 
-from heuristic import vectors
-from heuristic.arrays import Colour, Direction, Number, Position, Vector
-
-FINEST = 512
-"""Finest tessellation: a sphere then has four million triangles, half a gigabyte."""
+from heuristic import meshes, normals, vectors
+from heuristic.convention import (
+    Colour,
+    Direction,
+    Interaction,
+    Mask,
+    Mesh,
+    Number,
+    Position,
+    Scene,
+    Vector,
+)
+from heuristic.errors import InputError
+from heuristic.kernel import shade
+from heuristic.lights import Light
+from heuristic.materials import Material
 
 
 class Interpolation(Enum):
@@ -78,8 +98,6 @@ def barycentric_coordinates(
     A point outside the triangle's plane is projected onto it. For a triangle without area the
     weights are ``1, 0, 0``.
     """
-    from heuristic import normals  # only flat and Gouraud shading need it
-
     # Over the largest component: the fourth power of a length would leave the type's range.
     (edge_1, _, back), largest = normals.scaled_edges(p0, p1, p2)
     edge_2 = -back
@@ -96,3 +114,201 @@ def _between(value_a, value_b, place_a, place_b, place):
     length = place_b - place_a
     fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
     return value_a * (1 - fraction) + value_b * fraction
+
+
+BLOCK = 3
+"""Components of one attribute: Mitsuba 3.9.1 reads 1 or 3, and any other number as zero."""
+
+
+def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
+    """Return the points of a mesh at which flat or Gouraud shading evaluates the model.
+
+    GOURAUD are the vertices with their normals, or those of 6.34 if it has none; FLAT the faces'
+    centroids with theirs. They are in the order of the vertices or faces, as far as textures need
+    it: ``p``, ``n``, ``sh_frame.n``, ``uv``, ``shape`` and ``prim_index``. PHONG has no such
+    points, nor has GOURAUD on a mesh with ``face_normals``.
+    """
+    if interpolation is Interpolation.PHONG:
+        raise InputError(
+            "interpolation phong evaluates the model at every point, not at those of the mesh: call"
+            " shade with si.sh_frame.n."
+        )
+    corners, points = meshes.faces(mesh), meshes.positions(mesh)
+    uv = meshes.texture_coordinates(mesh)
+    face = dr.arange(mi.UInt32, mesh.face_count())
+    si = dr.zeros(mi.SurfaceInteraction3f, mesh.vertex_count())
+    if interpolation is Interpolation.FLAT:
+        si = dr.zeros(mi.SurfaceInteraction3f, mesh.face_count())
+        si.p = mi.Point3f(_mean(points, corners))
+        si.n = meshes.face_normals(mesh)
+        si.uv = _mean(uv, corners) if uv is not None else si.uv
+        si.prim_index = face
+    else:
+        _refuse_face_normals(mesh)
+        si.p = mi.Point3f(points)
+        si.n = meshes.normals(mesh)
+        si.uv = uv if uv is not None else si.uv
+        for corner in range(3):  # any of the faces around a vertex will do
+            dr.scatter(si.prim_index, face, corners[corner])
+    si.sh_frame.n = si.n
+    si.shape = mi.ShapePtr(mesh)
+    si.t = mi.Float(0)
+    return si
+
+
+def shade_mesh(
+    mesh: Mesh,
+    interpolation: Interpolation,
+    viewer: Position,
+    material: Material,
+    lights: Sequence[Light],
+    ambient: Colour = 0,
+    visible: Callable[..., Mask] | None = None,
+    twosided: bool | Mask = False,
+    model: Callable[..., Colour] = shade,
+) -> int:
+    """Evaluate the model (8.10) at a mesh's vertices or faces, and store the values in the mesh.
+
+    The values are as seen by a ``viewer`` ``P_V``: three numbers, or a Dr.Jit point. ``twosided``
+    also stores those of the back, with reversed normals. ``model`` has the arguments of
+    :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face. Returns the
+    number of components stored, which :func:`stored_shade` needs: 3 for single numbers.
+    """
+    si = shading_points(mesh, interpolation)
+    position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
+    view = mi.Vector3f(viewer) - position
+    components = 0
+    for back in (False, True)[: 1 + twosided]:
+        facing = -normal if back else normal
+        colour = model(position, facing, view, material, lights, ambient, visible)
+        components = _store(mesh, interpolation, colour, back, dr.width(position))
+    return components
+
+
+def stored_shade(
+    si: Interaction,
+    interpolation: Interpolation,
+    components: int = BLOCK,
+    twosided: bool | Mask = False,
+    active: Mask = True,
+) -> Colour:
+    """Read what :func:`shade_mesh` stored, at the surface interactions of rays, by component.
+
+    A face shows its front if the ray hits the side from which its vertices are anticlockwise,
+    whatever its vertex normals say. Its back is black, or with ``twosided`` has its stored value.
+    Shapes without stored values read as black.
+    """
+    is_front = dr.dot(si.n, si.to_world(si.wi)) > 0
+    values = []
+    for block in range(-(-components // BLOCK)):
+        front = _name(interpolation, False, block)
+        value = si.shape.eval_attribute_3(front, si, active & is_front)
+        if twosided:
+            back = _name(interpolation, True, block)
+            reverse = si.shape.eval_attribute_3(back, si, active & ~is_front)
+            value = dr.select(is_front, value, reverse)
+        values += list(dr.select(is_front | twosided, value, 0))
+    return values[:components]
+
+
+class MeshCorners:
+    """The vertices of all faces of a scene's meshes, to shade at those of the face hit.
+
+    Meshes are treated as in :func:`shading_points`, except that with ``face_normals`` each face has
+    its own normal at its vertices.
+    """
+
+    def __init__(self, scene: Scene):
+        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face belongs to no mesh
+        for shape in scene.shapes():
+            if shape.is_mesh():
+                starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
+                parts.append(_corner_arrays(shape))
+                count += shape.face_count()
+        largest = max(starts, default=0)
+        self.starts = mi.UInt32([starts.get(index, 0) for index in range(largest + 1)])
+        self.positions, self.normals, self.uv = (
+            _joined(arrays) for arrays in zip(*parts, strict=True)
+        )
+
+    def at(self, si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
+        """Return three pairs of a weight and an interaction, one per vertex of the face hit.
+
+        The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
+        :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are not
+        meshes all weights are zero.
+        """
+        index = dr.reinterpret_array(mi.UInt32, si.shape)
+        is_known = active & (index < dr.width(self.starts))
+        start = dr.gather(mi.UInt32, self.starts, index, is_known)
+        is_mesh = is_known & (start > 0)
+        place = 3 * (start + si.prim_index)
+        points = [dr.gather(mi.Vector3f, self.positions, place + i, is_mesh) for i in range(3)]
+        weights = barycentric_coordinates(mi.Vector3f(si.p), *points)
+        corners = []
+        for i, (weight, point) in enumerate(zip(weights, points, strict=True)):
+            corner = mi.SurfaceInteraction3f(si)
+            corner.p = mi.Point3f(point)
+            normal = dr.gather(mi.Vector3f, self.normals, place + i, is_mesh)
+            corner.n = corner.sh_frame.n = mi.Normal3f(normal)
+            corner.uv = dr.gather(mi.Point2f, self.uv, place + i, is_mesh)
+            corners.append((dr.select(is_mesh, weight, 0), corner))
+        return corners
+
+
+def _corner_arrays(mesh):
+    """Return positions, normals and texture coordinates, three entries per face."""
+    if mesh is None:
+        return dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Point2f, 3)
+    if mesh.has_face_normals():
+        mesh = meshes.split_faces(mesh)
+    corners = dr.ravel(meshes.faces(mesh))
+    uv = meshes.texture_coordinates(mesh)
+    return (
+        dr.gather(mi.Vector3f, meshes.positions(mesh), corners),
+        dr.gather(mi.Vector3f, meshes.normals(mesh), corners),
+        dr.zeros(mi.Point2f, dr.width(corners))
+        if uv is None
+        else dr.gather(mi.Point2f, uv, corners),
+    )
+
+
+def _joined(arrays):
+    """Join vectors end to end; Dr.Jit's function takes only arrays of one component."""
+    components = range(len(arrays[0]))
+    return type(arrays[0])(*(dr.concat([array[i] for array in arrays]) for i in components))
+
+
+def _mean(values, corners):
+    return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
+
+
+def _refuse_face_normals(mesh):
+    if mesh.has_face_normals():
+        raise InputError(
+            f"mesh {mesh.id()!r} has face_normals, so several normals at a vertex. Gouraud"
+            " shading needs one: pass it through heuristic.meshes.split_faces, or take face_normals"
+            " off."
+        )
+
+
+def _store(mesh, interpolation, colour, back, count):
+    """Store a float or a colour in attributes of three components, the last filled with zeros."""
+    is_colour = dr.depth_v(colour) > 1
+    values = [mi.Float(component) for component in colour] if is_colour else [mi.Float(colour)] * 3
+    components = len(values)
+    values += [mi.Float(0)] * (-components % BLOCK)
+    # Terms that do not depend on the position are a single number until spread out.
+    triples = {
+        _name(interpolation, back, block): mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)])
+        + dr.zeros(mi.Float, count)
+        for block in range(len(values) // BLOCK)
+    }
+    meshes.store(mesh, triples)
+    return components
+
+
+def _name(interpolation, back, block):
+    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and suffixes."""
+    element = "face" if interpolation is Interpolation.FLAT else "vertex"
+    return f"{element}_heuristic" + ("_back" if back else "") + (f"_{block}" if block else "")

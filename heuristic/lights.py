@@ -1,42 +1,103 @@
-"""Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3): one class per kind."""
+"""Point, directional and spot lights (chapter 6, sections 6.3.1-6.3.3): one class per kind.
+
+A light answers one question, ``illuminate(position)``: from which direction ``L``, with what
+intensity and over what distance does its light arrive? Occlusion is handled elsewhere. A light also
+states which of its values determine the kernel's instructions, so lights of one structure can share
+a kernel.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import inf
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from math import inf, isfinite
+from numbers import Real
+from typing import Any, ClassVar, NamedTuple, Self
 
 import drjit as dr
+import numpy as np
 
 from heuristic import colours, numerics, terms, vectors
-from heuristic.arrays import Colour, Direction, Number, Position, Vector
-from heuristic.light import Arrival, Light
+from heuristic.convention import Colour, Direction, Number, Position, Vector
+from heuristic.errors import InputError
 from heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)
 
 
-def is_unattenuated(coefficients: Sequence) -> bool:
-    """Return whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
-    return all(map(is_number, coefficients, UNATTENUATED))
+class Arrival(NamedTuple):
+    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays.
+
+    ``d`` ends at the shell of a lamp that has one: shadow rays go no further.
+    """
+
+    toward: Direction
+    intensity: Colour
+    distance: Number
+
+
+class Light:
+    """A kind of light, as the kernel sees it; each subclass is a frozen dataclass.
+
+    ``plugin`` is its emitter in a Mitsuba scene. Fields of the same name mean the same in all
+    kinds; :data:`CHECKS` checks them.
+    """
+
+    plugin: ClassVar[str]
+    intensity: Colour
+
+    def __post_init__(self) -> None:
+        for name, check in CHECKS.items():
+            if hasattr(self, name):
+                object.__setattr__(self, name, check(getattr(self, name)))
+
+    def illuminate(self, position: Position) -> Arrival:
+        """Return the light that arrives at positions, Dr.Jit arrays of three components."""
+        raise NotImplementedError
+
+    def wide_toward(self, position: Position) -> tuple[Vector, Number]:
+        """Return ``L`` in double precision, as a vector and its inverse length."""
+        raise NotImplementedError
+
+    def compiled(self) -> dict[str, Any]:
+        """Return the fields that are part of the kernel's code, with their values."""
+        return {}
+
+    def structure(self) -> tuple:
+        """Return what determines the light's instructions, apart from its numbers; hashable."""
+        return type(self), colours.wavelength_count(self.intensity), *self.compiled().items()
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the fields that are numbers, or tuples of them, and not compiled in."""
+        light: Any = self  # a dataclass, as each kind is
+        values = {field.name: getattr(self, field.name) for field in fields(light)}
+        return {
+            name: value
+            for name, value in values.items()
+            if name not in self.compiled()
+            and all(isinstance(v, Real) for v in (value if isinstance(value, tuple) else (value,)))
+        }
+
+    def with_numbers(self, fetch: Callable[[Any], Any], vector_type: type) -> Self:
+        """Return the light with its :meth:`numbers` replaced by the Dr.Jit values of ``fetch``."""
+        fetched = {name: fetch(value) for name, value in self.numbers().items()}
+        for name in {"position", "direction"} & fetched.keys():
+            fetched[name] = vector_type(fetched[name])
+        if "intensity" in fetched:
+            fetched["intensity"] = colours.as_array(fetched["intensity"], vector_type)
+        light: Any = self
+        return replace(light, **fetched)
 
 
 @dataclass(frozen=True)
-class DirectionalLight(Light, plugin="heuristic_directional"):
+class DirectionalLight(Light):
     """Parallel rays of constant intensity: the limit of a point light at infinity.
 
-    Parameters
-    ----------
-    direction
-        Direction in which the light travels; any length but zero.
-    intensity
-        ``I_p``, display-linear: a number, RGB, one value per wavelength, or a Dr.Jit array.
-
-    Raises
-    ------
-    InputError
-        For a zero or non-finite direction, or a negative or non-finite intensity.
+    ``direction`` is that in which the light travels, of any length but zero. ``intensity`` is
+    ``I_p``, display-linear: a number, RGB, one value per wavelength, or a Dr.Jit array.
     """
+
+    plugin: ClassVar[str] = "heuristic_directional"
 
     direction: Direction
     intensity: Colour
@@ -59,6 +120,24 @@ class _LightFromPoint(Light):
     clamped: bool
     shell: Number
 
+    def illuminate(self, position: Position) -> Arrival:
+        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), within the cone of a spot (6.3)."""
+        vector_type = type(position)
+        toward, distance = vectors.light_vector(vector_type(self.position), position)
+        intensity = colours.as_array(self.intensity, vector_type) * self.cone(toward)
+        if not is_unattenuated(self.attenuation):
+            law: Callable[..., Colour]
+            law = terms.clamped_attenuation if self.clamped else terms.attenuation
+            inverse = vectors.inverse_distance(vector_type(self.position), position)
+            intensity = law(distance, *self.attenuation, intensity, inverse)
+        if not is_number(self.shell, 0):
+            distance = dr.maximum(distance - self.shell, 0)
+        return Arrival(toward, intensity, distance)
+
+    def cone(self, toward: Direction) -> Number:
+        """Return the factor on the intensity towards a light; 1 unless it is a spot."""
+        return 1
+
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return vectors.wide_light_vector(type(position)(self.position), position)
 
@@ -67,45 +146,19 @@ class _LightFromPoint(Light):
         bare = {"shell": 0} if is_number(self.shell, 0) else {}
         return {"clamped": self.clamped} | even | bare
 
-    def _attenuated(
-        self, toward: Direction, intensity: Colour, distance: Number, position: Position
-    ) -> Arrival:
-        if not is_unattenuated(self.attenuation):
-            law: Callable[..., Colour]
-            law = terms.clamped_attenuation if self.clamped else terms.attenuation
-            if not self.clamped and terms.is_tame(self.attenuation, self.intensity):
-                law = terms.tame_attenuation
-            inverse = vectors.inverse_distance(type(position)(self.position), position)
-            intensity = law(distance, *self.attenuation, intensity, inverse)
-        if not is_number(self.shell, 0):
-            distance = dr.maximum(distance - self.shell, 0)
-        return Arrival(toward, intensity, distance)
-
 
 @dataclass(frozen=True)
-class PointLight(_LightFromPoint, plugin="heuristic_point"):
+class PointLight(_LightFromPoint):
     """A point that shines equally in all directions (6.1).
 
-    Parameters
-    ----------
-    position
-        ``P_L``, in world space.
-    intensity
-        ``I_0`` (chapter 8: ``I_p0``), display-linear.
-    attenuation
-        ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0. ``(1, 0, 0)`` is no attenuation,
-        ``(0, 0, 1)`` the inverse square of 8.6.
-    clamped
-        Use the other form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``.
-    shell
-        Radius about the position in which nothing casts a shadow: the body of the lamp.
-
-    Raises
-    ------
-    InputError
-        For a non-finite position, a negative or non-finite intensity, or coefficients that are
-        negative, non-finite or all zero.
+    ``position`` is ``P_L`` in world space, ``intensity`` ``I_0`` (chapter 8: ``I_p0``),
+    display-linear. ``attenuation`` is ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0: ``(1,
+    0, 0)`` is no attenuation, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
+    form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``. Within the radius ``shell`` about the
+    position, the body of the lamp, nothing casts a shadow.
     """
+
+    plugin: ClassVar[str] = "heuristic_point"
 
     position: Position
     intensity: Colour
@@ -113,36 +166,17 @@ class PointLight(_LightFromPoint, plugin="heuristic_point"):
     clamped: bool = False
     shell: Number = 0
 
-    def illuminate(self, position: Position) -> Arrival:
-        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6)."""
-        vector_type = type(position)
-        toward, distance = vectors.light_vector(vector_type(self.position), position)
-        intensity = colours.as_array(self.intensity, vector_type)
-        return self._attenuated(toward, intensity, distance, position)
-
 
 @dataclass(frozen=True)
-class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
+class SpotLight(_LightFromPoint):
     """A point that shines into a cone about an axis (6.2-6.4).
 
-    Parameters
-    ----------
-    position, intensity, attenuation, clamped, shell
-        See :class:`PointLight`.
-    direction
-        ``v_L``, the axis, in the direction of travel; any length but zero.
-    cutoff
-        ``omega_L``, the angle between the axis and the edge of the cone, in degrees, within (0,
-        180).
-    exponent
-        ``m`` of 6.4, 0 or more; 0 is an even cone.
-
-    Raises
-    ------
-    InputError
-        Same as :class:`PointLight`, and for a zero direction, a cutoff outside (0, 180) or a
-        negative exponent.
+    The axis ``v_L`` is ``direction``, that of travel, of any length but zero; ``cutoff`` is
+    ``omega_L``, the angle between axis and edge in degrees, within (0, 180); ``exponent`` is ``m``
+    of 6.4, 0 for an even cone. The others are those of :class:`PointLight`.
     """
+
+    plugin: ClassVar[str] = "heuristic_spot"
 
     position: Position
     direction: Direction
@@ -153,22 +187,92 @@ class SpotLight(_LightFromPoint, plugin="heuristic_spot"):
     clamped: bool = False
     shell: Number = 0
 
+    def cone(self, toward: Direction) -> Number:
+        """Equation 6.3: 1 within the cone, else 0; times the fall-off of 6.4 where ``m > 0``."""
+        axis = vectors.normalise(type(toward)(self.direction))
+        cos_axis = vectors.chord_cosine(axis, -toward)
+        cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
+        if is_number(self.exponent, 0):
+            return cone
+        cosine = cos_axis.value if numerics.is_moderate(self.exponent) else cos_axis
+        return cone * terms.spot_falloff(cosine, self.exponent)
+
     def compiled(self) -> dict[str, Any]:
         even = {"exponent": 0} if is_number(self.exponent, 0) else {}
         return super().compiled() | even
 
-    def illuminate(self, position: Position) -> Arrival:
-        """Equation 6.3: ``I_0 f_att`` within the cone; times the fall-off of 6.4 where ``m > 0``.
 
-        Returns an :class:`heuristic.light.Arrival`.
-        """
-        vector_type = type(position)
-        toward, distance = vectors.light_vector(vector_type(self.position), position)
-        axis = vectors.normalise(vector_type(self.direction))
-        cos_axis = vectors.chord_cosine(axis, -toward)
-        cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
-        if not is_number(self.exponent, 0):
-            cosine = cos_axis.value if numerics.is_moderate(self.exponent) else cos_axis
-            cone *= terms.spot_falloff(cosine, self.exponent)
-        intensity = colours.as_array(self.intensity, vector_type)
-        return self._attenuated(toward, intensity * cone, distance, position)
+KINDS: tuple[type[Light], ...] = (DirectionalLight, PointLight, SpotLight)
+PLUGINS: dict[str, type[Light]] = {kind.plugin: kind for kind in KINDS}
+"""The kinds of light, by their emitter plugin in a Mitsuba scene."""
+
+
+def is_unattenuated(coefficients: Sequence) -> bool:
+    """Return whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
+    return all(map(is_number, coefficients, UNATTENUATED))
+
+
+def _triple(name: str, value: Any) -> Any:
+    """Return three finite floats, or the Dr.Jit array that was given."""
+    if dr.is_array_v(value) and dr.is_jit_v(value):
+        if dr.depth_v(value) == 2 and dr.size_v(value) == 3:
+            return value
+        raise InputError(f"{name}: {type(value).__name__} is not allowed: give three components.")
+    try:
+        triple = tuple(float(component) for component in value)
+    except (TypeError, ValueError, OverflowError):
+        triple = ()
+    if len(triple) != 3 or not all(map(isfinite, triple)):
+        raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
+    return triple
+
+
+def _direction(value: Any) -> Any:
+    direction = _triple("direction", value)
+    if isinstance(direction, tuple) and not any(direction):
+        raise InputError("direction = (0, 0, 0) points nowhere: give a vector of any other length.")
+    return direction
+
+
+def _attenuation(value: Any) -> tuple:
+    """Return three checked numbers; if one is a Dr.Jit value, none is checked."""
+    coefficients = tuple(value) if isinstance(value, Sequence) else ()
+    if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
+        return coefficients
+    are_numbers = all(isinstance(c, Real) and isfinite(c) and float(c) >= 0 for c in coefficients)
+    if len(coefficients) != 3 or not are_numbers or not any(coefficients):
+        raise InputError(
+            f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
+            " more, and not all 0."
+        )
+    return coefficients
+
+
+def _number(name: str, is_allowed: Callable[[Any], bool], allowed: str, value: Any) -> Any:
+    number = numerics.plain(value)
+    if number is None or (isinstance(number, Real) and not is_allowed(number)):
+        raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
+    return number
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
+    return bool(value)
+
+
+CHECKS: dict[str, Callable[[Any], Any]] = {
+    "position": partial(_triple, "position"),
+    "direction": _direction,
+    "intensity": partial(colours.checked, "intensity"),
+    "cutoff": partial(
+        _number,
+        "cutoff",
+        lambda degrees: 0 < degrees < 180,
+        "an angle between 0 and 180 degrees, both excluded",
+    ),
+    "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
+    "attenuation": _attenuation,
+    "shell": partial(_number, "shell", lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
+    "clamped": partial(_flag, "clamped"),
+}

@@ -5,7 +5,7 @@ from math import inf
 from numbers import Real
 
 from heuristic import colours, numerics
-from heuristic.arrays import Colour
+from heuristic.convention import Colour
 from heuristic.errors import InputError, unknown
 
 FORMS = ("phong", "blinn")
@@ -20,34 +20,19 @@ PHYSICAL = ("base_color", "alpha", "ior", "metallic")
 class Material:
     """Reflection coefficients of a surface (8.10, 6.11).
 
-    Parameters
-    ----------
-    k_i
-        Emission (8.1), display-linear, 0 or more.
-    k_a, k_d, k_s
-        Ambient, diffuse and specular reflection coefficients (8.2, 8.5, 8.8), physically in 0..1.
-        Each is a number, RGB, one value per wavelength, or a Dr.Jit array.
-    n
-        Phong's exponent, 0 or more. A plain number is compiled into the kernel, an integer up to
-        :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a
-        run-time value.
-    form
-        ``phong`` for the chapters' ``(R.V)^n`` (8.9), ``blinn`` for ``(N.H)^n`` of Blinn (1977),
-        which OpenGL's fixed pipeline and most engines use.
-    normalised
-        Scale the lobe by :func:`heuristic.terms.normalisation`; ``k_s`` is then its albedo at
-        normal incidence. The chapters' model does not.
-    n_is_moderate
-        Whether a Dr.Jit ``n`` is known to lie within :data:`heuristic.numerics.MODERATE_EXPONENTS`,
-        where the kernel may do without double precision. It is inferred for plain numbers.
+    ``k_i`` is its emission (8.1), display-linear. ``k_a``, ``k_d`` and ``k_s`` are the ambient,
+    diffuse and specular coefficients (8.2, 8.5, 8.8), physically in 0..1. Each is 0 or more: a
+    number, RGB, one value per wavelength, or a Dr.Jit array. ``n`` is Phong's exponent, 0 or more:
+    a plain number is compiled into the kernel, an integer up to
+    :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a run-time
+    value, and ``n_is_moderate`` says whether it is known to lie within
+    :data:`heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double precision.
 
-    Raises
-    ------
-    InputError
-        For negative, infinite or NaN values, or an unknown form.
+    ``form`` is ``phong`` for the chapters' ``(R.V)^n`` (8.9), or ``blinn`` for ``(N.H)^n`` of Blinn
+    (1977), which OpenGL's fixed pipeline and most engines use. ``normalised`` scales the lobe by
+    :func:`heuristic.terms.normalisation`; ``k_s`` is then its albedo at normal incidence, which the
+    chapters' model does not have.
 
-    Examples
-    --------
     >>> Material(k_d=(0.5, 0.4, 0.3), k_s=0.7, n=9).k_d
     (0.5, 0.4, 0.3)
     >>> Material(k_d=-0.5)
@@ -83,17 +68,11 @@ class Material:
 class PairedMaterial(Material):
     """A material with the parameters of its physical partner, as engines have them.
 
-    Parameters
-    ----------
-    base_color
-        Reflectance of the diffuse base, 0..1; for metals, of the surface at normal incidence.
-    alpha
-        Root mean square slope of the microfacets, as in Beckmann's distribution and GGX: the square
-        of what engines call roughness. 1e-4 to 1; 1 for a surface without an interface.
-    ior
-        Index of refraction, inside over outside; 1 for a surface without an interface.
-    metallic
-        1 for metals, 0 for all other materials; ``principled`` has its own, 0..1.
+    ``base_color`` is the reflectance of the diffuse base, 0..1; for metals, of the surface at
+    normal incidence. ``alpha`` is the root mean square slope of the microfacets, as in Beckmann's
+    distribution and GGX: the square of what engines call roughness, 1e-4 to 1. ``ior`` is the index
+    of refraction, inside over outside. A surface without an interface has 1 for both. ``metallic``
+    is 1 for metals and 0 for all other materials; ``principled`` has its own, 0..1.
     """
 
     base_color: Colour = 0

@@ -1,21 +1,25 @@
 """Meshes for flat, Gouraud and Phong shading: made from other shapes, given normals, taken apart.
 
-Every function returns a new ``mitsuba.Mesh`` in world space, with the BSDF of the original and no
-emitter; the original is unchanged. A flipped orientation (``flip_normals``) becomes the order of
-the vertices. Call it after ``mitsuba.set_variant``.
+Every function that returns a mesh returns a new ``mitsuba.Mesh`` in world space, with the BSDF of
+the original and no emitter; the original is unchanged. A flipped orientation (``flip_normals``)
+becomes the order of the vertices. Call it after ``mitsuba.set_variant``.
+
+Nothing else reads or writes the arrays of Mitsuba's meshes.
 """
+
+from collections.abc import Mapping
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from heuristic import mesh_arrays
-from heuristic.arrays import Array, Direction, Mesh, Position, Shape
-from heuristic.errors import InputError
-from heuristic.interpolation import FINEST
-from heuristic.normals import triangle_normal
-from heuristic.vertex_normals import Weighting, vertex_normals
+from heuristic.convention import Array, Direction, Mesh, Position, Shape, Vector
+from heuristic.errors import InputError, InstallationError
+from heuristic.normals import triangle_normal, vertex_normals
 
 RESOLUTION = 16
+FINEST = 512
+"""Finest tessellation: a sphere then has four million triangles, half a gigabyte."""
 
 
 def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
@@ -36,12 +40,6 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
 
     Vertices lie on the shape, so the mesh of a sphere lies inside it. Meshes, including the cube,
     are returned unchanged.
-
-    Raises
-    ------
-    InputError
-        For other types of shape, or a resolution that is not a whole number from 1 to
-        :data:`heuristic.interpolation.FINEST`.
     """
     if not isinstance(resolution, int) or not 1 <= resolution <= FINEST:
         raise InputError(
@@ -59,14 +57,8 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
     return _tessellated(shape, kind, *_cells(resolution)[kind])
 
 
-def with_vertex_normals(mesh: Mesh, weighting: "str | Weighting" = Weighting.ANGLE) -> Mesh:
-    """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, replacing any that it has.
-
-    Raises
-    ------
-    InputError
-        If the faces at a vertex oppose each other, which leaves it without a normal.
-    """
+def with_vertex_normals(mesh: Mesh, weighting: str = "angle") -> Mesh:
+    """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, replacing any that it has."""
     computed = _checked_normals(mesh, weighting)
     return _build(mesh, positions(mesh), computed, texture_coordinates(mesh), faces(mesh))
 
@@ -87,19 +79,20 @@ def split_faces(mesh: Mesh) -> Mesh:
 
 def positions(mesh: Mesh) -> Position:
     """Return the positions of a mesh's vertices, as vectors."""
-    return mesh_arrays.vectors(mesh, mesh_arrays.POSITIONS)
+    return dr.unravel(mi.Vector3f, mesh.vertex_positions_buffer())
 
 
 def faces(mesh: Mesh) -> Array:
     """Return the vertex numbers of a mesh's faces, anticlockwise as seen from the outside."""
-    corners = mesh_arrays.vectors(mesh, mesh_arrays.FACES)
+    corners = dr.unravel(mi.Vector3u, mesh.faces_buffer())
     return corners.xzy if mesh.has_flipped_normals() else corners
 
 
 def texture_coordinates(mesh: Mesh) -> Array | None:
     """Return a mesh's texture coordinates, None if it has none."""
-    part = mesh_arrays.TEXCOORDS
-    return mesh_arrays.vectors(mesh, part) if mesh_arrays.has(mesh, part) else None
+    if not mesh.has_vertex_texcoords():
+        return None
+    return dr.unravel(mi.Point2f, mesh.vertex_texcoords_buffer())
 
 
 def face_normals(mesh: Mesh) -> Direction:
@@ -108,16 +101,10 @@ def face_normals(mesh: Mesh) -> Direction:
 
 
 def normals(mesh: Mesh) -> Direction:
-    """Return a mesh's vertex normals: its own, or by 6.34 if it has none.
-
-    Raises
-    ------
-    InputError
-        If it has none, and the faces at a vertex oppose each other.
-    """
-    if not mesh_arrays.has(mesh, mesh_arrays.NORMALS):
-        return _checked_normals(mesh, Weighting.ANGLE)
-    own = mesh_arrays.vectors(mesh, mesh_arrays.NORMALS)
+    """Return a mesh's vertex normals: its own, or by 6.34 if it has none."""
+    if not mesh.has_vertex_normals():
+        return _checked_normals(mesh, "angle")
+    own = dr.unravel(mi.Vector3f, mesh.vertex_normals_buffer())
     return -own if mesh.has_flipped_normals() else own
 
 
@@ -217,8 +204,82 @@ def _closed(kind, uv):
 
 
 def _build(original, points, vertex_normals, uv, corners):
-    """Make a mesh from its arrays."""
-    mesh = mesh_arrays.made(original.id(), points, corners, vertex_normals, uv)
+    """Make a mesh from its arrays, with the name and BSDF of an original."""
+    mesh = new_mesh(original.id(), points, corners, vertex_normals, uv)
     mesh.set_id(original.id())
     mesh.set_bsdf(original.bsdf())
     return mesh
+
+
+POSITIONS, NORMALS = "vertex_positions", "vertex_normals"
+TEXCOORDS, FACES = "vertex_texcoords", "faces"
+"""The arrays of a mesh, by their names in ``mitsuba.traverse``."""
+
+
+def rows(mesh: Mesh, part: str) -> Array:
+    """Return an array, one row per vertex or face; None if the mesh does not have it.
+
+    Without Dr.Jit, which takes milliseconds: plans read thousands of meshes.
+    """
+    if part in (NORMALS, TEXCOORDS) and not getattr(mesh, f"has_{part}")():
+        return None
+    flat = np.array(getattr(mesh, f"{part}_buffer")())
+    return flat.reshape(-1, 2 if part == TEXCOORDS else 3)
+
+
+def new_mesh(
+    name: str,
+    positions: Position,
+    corners: Array,
+    normals: Direction | None = None,
+    uv: Array | None = None,
+) -> Mesh:
+    """Return a new mesh of vertices, and of three vertex numbers per face.
+
+    They are anticlockwise as seen from the outside. Without normals, the mesh has those of its
+    faces.
+    """
+    mesh = mi.Mesh(
+        name,
+        dr.width(positions),
+        dr.width(corners),
+        has_vertex_normals=normals is not None,
+        has_vertex_texcoords=uv is not None,
+    )
+    parameters = mi.traverse(mesh)
+    for part, values in ((POSITIONS, positions), (FACES, corners), (NORMALS, normals),
+                         (TEXCOORDS, uv)):  # fmt: skip
+        if values is not None:
+            parameters[part] = dr.ravel(values)
+    parameters.update()
+    return mesh
+
+
+def store(mesh: Mesh, attributes: Mapping[str, Vector]) -> None:
+    """Write attributes of three components per vertex or face; new names are added."""
+    for name, values in attributes.items():
+        if not mesh.has_attribute(name):
+            # Zeros, because this copies one by one; all, because Mitsuba does not check the length.
+            mesh.add_attribute(name, 3, [0.0] * (3 * dr.width(values)))
+    parameters = mi.traverse(mesh)
+    for name, values in attributes.items():
+        parameters[name] = dr.ravel(values)
+    parameters.update()
+
+
+def require_readable() -> None:
+    """Make a mesh and read it back; InstallationError if this Mitsuba's meshes are different."""
+    corner, uv = mi.Vector3f([0, 1, 0], [0, 0, 1], [2, 2, 3]), mi.Point2f([0, 1, 0], [0, 0, 1])
+    given = {POSITIONS: corner, FACES: mi.Vector3u(0, 1, 2), NORMALS: corner + 1, TEXCOORDS: uv}
+    try:
+        mesh = new_mesh("tried", *given.values())
+        store(mesh, {"vertex_tried": corner})
+        wrong = [
+            part
+            for part, values in given.items()
+            if not np.array_equal(rows(mesh, part), np.array(values).T)
+        ]
+    except Exception as error:  # whatever a changed interface raises
+        raise InstallationError(f"{type(error).__name__}: {error}") from error
+    if wrong:
+        raise InstallationError(f"{', '.join(wrong)} of a mesh are read differently than written")

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from heuristic.arrays import Array, Cosines, Direction, Number, Vector
+from heuristic.convention import Array, Cosines, Direction, Number, Vector
 
 LARGEST_LITERAL_EXPONENT = 64
 """Up to here an integer exponent is multiplied out: at most 11 products and an error of ``n``
@@ -70,14 +70,9 @@ def cosine_of_degrees(angle: Number) -> Cosine:
 def power(cosine: Cosines, n: Number) -> Number:
     """Return ``c ** n`` where the cosine is positive, and 0 elsewhere, also for ``n = 0``.
 
-    Parameters
-    ----------
-    cosine
-        A float, or a :class:`Cosine` whose complement is more accurate than ``1 - c``.
-    n
-        0 or more: a plain number, compiled in, or a Dr.Jit float. A Python integer up to
-        :data:`LARGEST_LITERAL_EXPONENT` becomes products, three times faster than the general
-        power.
+    The cosine is a float, or a :class:`Cosine` whose complement is more accurate than ``1 - c``.
+    ``n`` is 0 or more: a plain number, compiled in, or a Dr.Jit float. A Python integer up to
+    :data:`LARGEST_LITERAL_EXPONENT` becomes products, three times faster than the general power.
     """
     if not isinstance(cosine, Cosine):
         cosine = Cosine(cosine, 1 - cosine)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from heuristic import shading, terms, vectors
+from heuristic import kernel, terms, vectors
 from heuristic.errors import InputError
 from heuristic.materials import Material
 
@@ -19,7 +19,7 @@ Array = Any
 """A Dr.Jit array of the current variant, one entry per point; a plain number if all are equal."""
 
 
-class Given(NamedTuple):
+class ShadingArguments(NamedTuple):
     """The arguments of :func:`heuristic.shade`."""
 
     position: Array
@@ -35,16 +35,11 @@ class Given(NamedTuple):
 class LightAtPoint:
     """A light as it arrives at a point.
 
-    Attributes
-    ----------
-    toward
-        Unit vector from the point towards the light, in world space; zero on the light itself.
-    distance
-        To the light, in units of the scene; infinite for parallel light.
-    intensity
-        ``I_p``, display-linear, with attenuation and cone: a white diffuse surface that faces the
-        light has this value. If the integrator has ``occlusion``, and the heuristic does not need
-        ``visible``, it is 0 at points that the light does not reach.
+    ``toward`` is the unit vector from the point towards the light, in world space; zero on the
+    light itself. ``distance`` is in units of the scene; infinite for parallel light. ``intensity``
+    is ``I_p``, display-linear, with attenuation and cone: a white diffuse surface that faces the
+    light has this value. If the integrator has ``occlusion``, and the heuristic does not need
+    ``visible``, it is 0 at points that the light does not reach.
     """
 
     toward: Array
@@ -55,7 +50,7 @@ class LightAtPoint:
     def visible(self) -> Array:
         """Return the mask of points that the light reaches, by a shadow ray (a need)."""
         self._point.require("visible")
-        ray: Any = self._point.given.visible  # there is one, since it was declared
+        ray: Any = self._point.arguments.visible  # there is one, since it was declared
         return ray(self.toward, self.distance)
 
 
@@ -73,23 +68,13 @@ def _input(read: Callable[["Point"], Any]) -> cached_property:
 class Point:
     """The points to shade, all at once, as read by a heuristic.
 
-    Attributes
-    ----------
-    parameters
-        The heuristic's parameters, as attributes.
-    prepared
-        Result of the heuristic's ``prepare`` for the scene; None without it.
-    wavelengths
-        Wavelengths of colours, in nm: four in spectral variants, otherwise none.
-
-    Raises
-    ------
-    InputError
-        If the heuristic reads something that is not among its needs.
+    ``parameters`` has the heuristic's as attributes, ``prepared`` is the result of its ``prepare``
+    for the scene. ``wavelengths`` are those of colours in nm: four in spectral variants, otherwise
+    none. Reading what is not among the heuristic's ``needs`` raises InputError.
     """
 
     needs: frozenset[str]
-    given: Given
+    arguments: ShadingArguments
     _uv: Array
     parameters: SimpleNamespace
     prepared: Any = None
@@ -98,17 +83,17 @@ class Point:
     @_input
     def position(self) -> Array:
         """Position in world space, in units of the scene."""
-        return self.given.position
+        return self.arguments.position
 
     @_input
     def normal(self) -> Array:
         """Unit shading normal in world space, towards the viewer's side of two-sided surfaces."""
-        return vectors.normalise(self.given.normal)
+        return vectors.normalise(self.arguments.normal)
 
     @_input
     def view(self) -> Array:
         """Unit vector towards the viewer, in world space."""
-        return vectors.normalise(self.given.view)
+        return vectors.normalise(self.arguments.view)
 
     @_input
     def uv(self) -> Array:
@@ -122,7 +107,7 @@ class Point:
         ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
         ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
         """
-        material = self.given.material
+        material = self.arguments.material
         if not material.normalised:
             return material
         k_s = material.k_s * terms.normalisation(material.form, material.n)
@@ -131,24 +116,24 @@ class Point:
     @_input
     def ambient(self) -> Array:
         """``I_a``, display-linear."""
-        return self.given.ambient
+        return self.arguments.ambient
 
     @_input
     def lights(self) -> tuple[LightAtPoint, ...]:
         """The scene's lights at the points, in the order of the scene."""
-        return tuple(map(self._light, self.given.lights))
+        return tuple(map(self._light, self.arguments.lights))
 
     def textbook(self, **instead: Any) -> Array:
         """Return the chapters' model at the points, :func:`heuristic.shade`.
 
         Named arguments replace those given there, such as ``ambient=0``.
         """
-        return shading.shade(*self.given._replace(**instead))
+        return kernel.shade(*self.arguments._replace(**instead))
 
     def _light(self, light: Any) -> LightAtPoint:
-        toward, intensity, distance = light.illuminate(self.given.position)
-        if self.given.visible is not None and "visible" not in self.needs:
-            intensity = dr.select(self.given.visible(toward, distance), intensity, 0)
+        toward, intensity, distance = light.illuminate(self.arguments.position)
+        if self.arguments.visible is not None and "visible" not in self.needs:
+            intensity = dr.select(self.arguments.visible(toward, distance), intensity, 0)
         return LightAtPoint(toward, distance, intensity, self)
 
     def require(self, name: str) -> None:

@@ -4,16 +4,15 @@ Equation numbers 8.x are of the chapter *Illumination* (sections 8.2.1-8.2.5), 6
 *Lighting models*. Intensities and coefficients are display-linear (see
 :mod:`heuristic.convention`); they are numbers, Dr.Jit floats, or colours with one component per
 wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The same functions serve the
-kernel (:mod:`heuristic.shading`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
+kernel (:mod:`heuristic.kernel`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
 """
 
-from collections.abc import Sequence
 from numbers import Real
 
 import drjit as dr
 
 from heuristic import numerics
-from heuristic.arrays import Colour, Cosines, Number
+from heuristic.convention import Colour, Cosines, Number
 from heuristic.numerics import power
 
 
@@ -99,32 +98,6 @@ def attenuation(
     """
     root = _representable(attenuation_root(distance, k0, k1, k2, inverse))
     return _representable(intensity * root * root)
-
-
-def is_tame(coefficients: Sequence[Number], intensity: Colour) -> bool:
-    """Return whether :func:`tame_attenuation` will do: all are plain numbers of moderate size.
-
-    With ``k0 >= 1e-30`` the denominator is never 0, and small products do not count next to it;
-    with ``k1, k2 <= 1`` its parts are finite, and where the whole is not, an intensity of 4 or less
-    leaves less than the smallest normal float, which counts as zero.
-    """
-    numbers = (*coefficients, *(intensity if isinstance(intensity, tuple) else (intensity,)))
-    if not all(isinstance(number, Real) for number in numbers):
-        return False
-    k0, k1, k2 = coefficients
-    return 1e-30 <= k0 <= 1e30 and max(k1, k2) <= 1 and max(numbers[3:]) <= 4
-
-
-def tame_attenuation(
-    distance: Number,
-    k0: Number,
-    k1: Number,
-    k2: Number,
-    intensity: Colour,
-    inverse: Number | None = None,
-) -> Colour:
-    """Equation 6.1 as printed, where :func:`is_tame`: a quarter of the work of the general form."""
-    return intensity * dr.rcp(dr.fma(distance, dr.fma(distance, k2, k1), k0))
 
 
 def clamped_attenuation(

@@ -2,15 +2,23 @@
 
 import inspect
 import os
+import site
 import sys
+import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from heuristic.errors import suggestion
-from heuristic.opened import is_users, noted
+import drjit as dr
+import numpy as np
+
+from heuristic.errors import FotismosError, InputError, suggestion
+from heuristic.points import Point
+from heuristic.version import ROOMS, ROOT
 
 CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 """What a user's code calls the objects of these classes."""
@@ -20,15 +28,51 @@ CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 def contained(path: Path) -> Iterator[set[Path]]:
     """Let a file's code run in the block, with its folder first in the search path.
 
-    Its changes to the process are undone: folder, umask, environment, arguments and path. Yields a
-    set that holds, after the block, the files that it read (:func:`heuristic.opened.noted`).
+    Its changes to the process are undone: folder, umask, environment, arguments, path, and imported
+    modules, since other code may mean another file by the same name. Yields a set that holds, after
+    the block, the files of those modules. A process that the code forks ends here instead of
+    continuing alongside its parent.
     """
-    with _put_back(), noted() as read:
+    pid, folder, environment = os.getpid(), os.getcwd(), dict(os.environ)
+    arguments, places, modules = list(sys.argv), list(sys.path), set(sys.modules)
+    umask = os.umask(0o022)
+    os.umask(umask)
+    files: set[Path] = set()
+    try:
         sys.path.insert(0, str(path.resolve().parent))
-        yield read
+        yield files
+    finally:
+        if os.getpid() != pid:
+            os._exit(0)
+        os.chdir(folder)
+        os.umask(umask)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.argv[:], sys.path[:] = arguments, places
+        for name in set(sys.modules) - modules:
+            module = sys.modules[name]
+            file = getattr(module, "__file__", None)
+            own = [file] if isinstance(file, str) else list(getattr(module, "__path__", ()))
+            if own and all(is_users(Path(place)) for place in own):
+                files |= {Path(place).resolve() for place in own if Path(place).is_file()}
+                del sys.modules[name]
 
 
-def told(error: BaseException) -> str:
+def is_users(path: Path) -> bool:
+    """Return whether a file is outside Python, installed packages and the project."""
+    return not any(path.is_relative_to(folder) for folder in _left_out())
+
+
+@cache
+def _left_out() -> tuple[str, ...]:
+    installed = sysconfig.get_paths()
+    names = ("stdlib", "platstdlib", "purelib", "platlib")
+    own = [str(ROOT / room) for room in (*ROOMS, "fotismos.py")]
+    places = [installed[name] for name in names] + site.getsitepackages() + own
+    return (*places, *map(os.path.realpath, places), site.getusersitepackages())
+
+
+def error_text(error: BaseException) -> str:
     """Return what went wrong, after the user's file and line if known."""
     place = _place(error)
     where = f"{place[0]}, line {place[1]}: " if place else ""
@@ -36,14 +80,13 @@ def told(error: BaseException) -> str:
     first = _first(error)
     if isinstance(first, AttributeError) and first.name:
         names = [each for each in dir(first.obj) if each[0] != "_"]
-        known = CALLED.get(type(first.obj).__name__)
-        if known:
-            message = f"a {known} has no {first.name!r}, but {', '.join(names)}"
+        if kind := CALLED.get(type(first.obj).__name__):
+            message = f"a {kind} has no {first.name!r}, but {', '.join(names)}"
         message += suggestion(first.name, names)
     return f"{where}{type(first).__name__}: {message}".strip().rstrip(":.")
 
 
-def defined(function: Callable[..., Any]) -> str:
+def place_of(function: Callable[..., Any]) -> str:
     """Return a function's file and line; its name if they are not known."""
     code = getattr(inspect.unwrap(function), "__code__", None)
     if code is None:
@@ -55,18 +98,11 @@ def _place(error: BaseException) -> tuple[str, int] | None:
     """Return the innermost line of a user's code that led to an error."""
     if isinstance(error, SyntaxError) and error.filename:
         return _shown(error.filename), error.lineno or 1
-    frames = traceback.extract_tb(_first(error).__traceback__)
-    if not any(map(_is_users, frames)):
-        frames = traceback.extract_tb(error.__traceback__)
-    for frame in reversed(frames):
-        if _is_users(frame):
-            return _shown(frame.filename), frame.lineno or 1
+    for each in (_first(error), error):
+        for frame in reversed(traceback.extract_tb(each.__traceback__)):
+            if not frame.filename.startswith("<") and is_users(Path(frame.filename)):
+                return _shown(frame.filename), frame.lineno or 1
     return None
-
-
-def _is_users(frame: traceback.FrameSummary) -> bool:
-    is_file = not frame.filename.startswith("<")
-    return is_file and is_users(Path(frame.filename))
 
 
 def _first(error: BaseException) -> BaseException:
@@ -82,23 +118,57 @@ def _shown(file: str) -> str:
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
 
 
-@contextmanager
-def _put_back() -> Iterator[None]:
-    """Undo a script's changes to its process: folder, umask, environment, arguments and path.
+def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
+    """Return the colour that a user's function gives at points, as a spectrum of the variant.
 
-    A process that it forks ends here instead of continuing alongside its parent.
+    InputError names file and line if it fails or does not return a colour.
     """
-    pid, folder, environment = os.getpid(), os.getcwd(), dict(os.environ)
-    arguments, path = list(sys.argv), list(sys.path)
-    umask = os.umask(0o022)
-    os.umask(umask)
+    import mitsuba as mi  # errors of scripts are told without it
+
     try:
-        yield
-    finally:
-        if os.getpid() != pid:
-            os._exit(0)
-        os.chdir(folder)
-        os.umask(umask)
-        os.environ.clear()
-        os.environ.update(environment)
-        sys.argv[:], sys.path[:] = arguments, path
+        value = shade(point)
+    except FotismosError as error:
+        where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
+        raise type(error)(f"{where if line else ''}{error}") from error
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return mi.Spectrum(value)
+    components = dr.size_v(mi.Spectrum)
+    returned = f"{place_of(shade)}: heuristic {name} returned"
+    expected = (
+        f"return one colour per point, as a Dr.Jit array: a mitsuba.Spectrum of {components}"
+        " components, or a mitsuba.Float"
+    )
+    is_array = dr.is_array_v(value) and dr.is_jit_v(value) and dr.is_float_v(value)
+    depth = dr.depth_v(value) if is_array else 0
+    if not (depth == 1 or (depth == 2 and dr.size_v(value) == components)):
+        raise InputError(f"{returned} {_kind(value)}; {expected}.")
+    if not dr.flag(dr.JitFlag.SymbolicScope):
+        width, points = dr.width(value), dr.width(point.arguments.position)
+        if width not in (1, points):
+            raise InputError(f"{returned} {width} values for {points} points; {expected}.")
+    return mi.Spectrum(value)
+
+
+def _kind(value: Any) -> str:
+    kind = f"{type(value).__module__}.{type(value).__qualname__}".replace("builtins.", "")
+    if isinstance(value, (list, tuple)):
+        return f"a {kind} of {len(value)}"
+    if isinstance(value, np.ndarray):
+        return f"a {kind} of shape {value.shape}"
+    return "None" if value is None else f"a {kind}"
+
+
+def _advice(error: BaseException) -> str:
+    """Return advice for the most frequent mistakes: a branch on an array, and NumPy."""
+    text = f"{error} {_first(error)}"
+    if "not aligned" in text:  # NumPy's words
+        return " For arrays of Dr.Jit use drjit.dot in place of numpy.dot."
+    if "bool" in text:
+        return (
+            " All points are shaded at once: in place of `if` use drjit.select(condition, a, b),"
+            " in place of `and`, `or` and `not` the operators &, | and ~, in place of max()"
+            " drjit.maximum()."
+        )
+    return ""

@@ -7,7 +7,7 @@ Lengths may have any size within the type's range; below its smallest normal flo
 import drjit as dr
 
 from heuristic import numerics
-from heuristic.arrays import Cosines, Direction, Number, Position, Vector
+from heuristic.convention import Cosines, Direction, Number, Position, Vector
 
 
 def normalise(vector: Vector) -> Direction:

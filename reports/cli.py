@@ -17,11 +17,12 @@ import click
 
 import reports.commands
 from comparisons.processes import interruption
-from heuristic import backend
-from heuristic.errors import FotismosError, suggestion
+from heuristic import llvm
+from heuristic.errors import FotismosError, InputError, suggestion
 from heuristic.program import program
 from heuristic.version import __version__
 from reports.commands.completion import VARIABLE
+from reports.terminal import verbosity
 
 
 class Commands(Mapping[str, click.Command]):
@@ -73,7 +74,22 @@ def cli() -> None:
 
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
-    backend.require_libraries()
+    llvm.require_libraries()
+    _require_environment()
+
+
+def _require_environment() -> None:
+    """Reject surroundings that break a command after its work is done."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise InputError(f"the current folder: {error.strerror}. Enter one that exists.") from error
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not epoch.isdecimal():  # Matplotlib dates pictures by it
+        raise InputError(
+            f"SOURCE_DATE_EPOCH={epoch!r} is not a number of seconds. Unset the variable, or set"
+            " it to one."
+        )
 
 
 def main() -> None:
@@ -94,13 +110,14 @@ def main() -> None:
         error.show()
         sys.exit(2)
     except FotismosError as error:
-        click.echo(f"fotismos: error: {error}", err=True)
+        verbosity.echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
     except BrokenPipeError:  # the reader of the output closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
     except OSError as error:  # standard output on a full disk, above all
-        click.echo(f"fotismos: error: {error.filename or 'output'}: {error.strerror}.", err=True)
+        place = error.filename or "output"
+        verbosity.echo(f"fotismos: error: {place}: {error.strerror}.", err=True)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(2)
     else:

@@ -81,7 +81,7 @@ COSTS: Terms = {
     ("error against time",): (
         "Each point is a method with a number of samples. Further left is faster, lower is better."
     ),
-    ("price of an effect", "removes"): (
+    ("what each effect removes", "what each effect removes and adds", "removes"): (
         "The mean ΔE2000 that simulating the effect removes: a Shapley value, the mean over all"
         " orders of adding the effects."
     ),
@@ -89,7 +89,7 @@ COSTS: Terms = {
     ("first",): "ΔE2000 removed if the effect is added before all others.",
     ("last",): "ΔE2000 removed if the effect is added after all others.",
     ("left", "left with all"): (
-        "ΔE2000 that remains with all effects: 0 apart from noise, or some effect has no price."
+        "ΔE2000 that remains with all effects: 0 apart from noise, or some effect is missing."
     ),
     ("part",): "A step from the textbook image to the reference; the steps add up.",
     ("per pass, median",): "A pass is one image with a part of the samples.",
@@ -129,13 +129,9 @@ METHODS: Terms = {
     ("shadow map", "filtered shadow map"): (
         "Shadows from a depth image as each light sees it; filtered: with soft edges."
     ),
-    ("constant ambient", "hemisphere ambient", "spherical harmonics"): (
-        "Ambient light that stands in for light between surfaces: one colour, two colours for up"
-        " and down, or nine terms over all directions."
-    ),
-    ("ambient occlusion", "ambient occlusion, depth image"): (
-        "Ambient light, darker where near surfaces hide the surroundings: by rays, or as far as a"
-        " depth image shows."
+    ("constant ambient", "hemisphere ambient"): (
+        "Ambient light that stands in for light between surfaces: one colour, or two colours for up"
+        " and down."
     ),
     ("phong BSDF, full transport",): "Textbook materials under all light transport.",
     ("direct",): "Physical materials under the light that comes straight from lights.",

@@ -9,32 +9,32 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 import click
 from click.shell_completion import CompletionItem
+from msgspec import inspect
 
+from comparisons.options import Options
 from comparisons.processes.pool import Pool, cores
-from heuristic import backend, program
-from heuristic.backend import VARIANTS
+from heuristic import llvm, program
 from heuristic.errors import InputError, suggestion
 from reports.terminal import verbosity
-
-if TYPE_CHECKING:
-    from comparisons.case import Request
-
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Decorator: TypeAlias = Callable[[Any], Any]
 
 
 def resolution(text: str) -> tuple[int, int]:
-    """Parse ``WIDTHxHEIGHT``, two positive integers."""
+    """Parse ``WIDTHxHEIGHT``, two integers of at least 1."""
     width, separator, height = text.lower().partition("x")
     if not (separator and width.isdecimal() and height.isdecimal()):
         raise click.BadParameter(f"{text!r} is not a resolution; write it like 512x512.")
+    if not (int(width) and int(height)):
+        raise click.BadParameter(f"{text!r} is not a resolution: width and height are at least 1.")
     return int(width), int(height)
 
 
@@ -58,13 +58,7 @@ def complete_scene(
 
 
 def require_known(names: Iterable[str]) -> None:
-    """Ensure, before anything is loaded, that these files, folders or built-in scenes exist.
-
-    Raises
-    ------
-    InputError
-        With a suggestion.
-    """
+    """Ensure, before anything is loaded, that these files, folders or built-in scenes exist."""
     from comparisons.gallery.builtin import builtin
 
     for name in names:
@@ -75,20 +69,13 @@ def require_known(names: Iterable[str]) -> None:
         except OSError as error:
             raise InputError(f"{name[:60]!r}: {error.strerror}. Give a scene.") from error
         if path.suffix in (".xml", ".py") or path.parent.name:
-            siblings = {str(path.with_name(one)) for one in _names_in(path.parent)}
+            siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
             raise InputError(
                 f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
                 " (.xml), a Python file that makes one (.py), a folder of scenes, or a built-in"
                 f" scene; `{program.command('scenes')}` lists them."
             )
         builtin(name)
-
-
-def _names_in(folder: Path) -> list[str]:
-    try:
-        return os.listdir(folder)
-    except OSError:
-        return []
 
 
 scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
@@ -120,66 +107,6 @@ fresh_option = click.option(
 )
 
 
-def rendering_options(command: Command) -> Command:
-    """Add the options of all commands that render."""
-    return _with(
-        command,
-        click.option("--variant", type=click.Choice(VARIANTS),
-                     help="Mitsuba variant. [default: llvm_ad_rgb, or llvm_ad_spectral for a scene"
-                     " with tabulated spectra]"),
-        click.option("--heuristic-variant", type=click.Choice(VARIANTS),
-                     help="Variant of the heuristic half, such as RGB shading against a spectral"
-                     " reference. [default: the scene's own, else --variant]"),
-        click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
-                     help="Seed of the run, from which each pass derives its own."),
-        click.option("--spp", type=click.IntRange(min=2),
-                     help="Samples per pixel, over all passes. [default: the plan's]"),
-        click.option("--resolution", type=resolution, metavar="WxH",
-                     help="Width and height. [default: the film's]"),
-        click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl|three:phong",
-                     help="The heuristic: phong, blinn, one that engines use (such as"
-                     " mean-ambient), one that a package declares, or a function shade(point) in a"
-                     " file. [default: phong]"),
-        click.option("--interpolation", type=click.Choice(["flat", "gouraud", "phong"]),
-                     help="Shading of polygons in the heuristic half. [default: the scene's own,"
-                     " else phong]"),
-        click.option("--tessellation", type=click.IntRange(min=1), metavar="N",
-                     help="Mesh the shapes of the heuristic half: N edges per quarter turn or"
-                     " straight side. [default: the scene's own, else 16 for flat and gouraud]"),
-        click.option("--everything", is_flag=True,
-                     help="Switch off all pruning: simulate every effect."),
-        click.option("--pairing", default="matched", show_default=True,
-                     type=click.Choice(["literal", "matched"]),
-                     help="How roughplastic and phong are paired."),
-        click.option("--pixels-per-degree", type=Within(min=1, max=1000), metavar="N",
-                     help="FLIP: pixels per degree of vision. [default: 67]"),
-        click.option("--allow-empty", is_flag=True,
-                     help="Accept pictures in which no pixel sees a surface."),
-    )  # fmt: skip
-
-
-def scene_options(command: Command) -> Command:
-    """Add the options for scene files."""
-    return _with(
-        command,
-        click.option("-D", "define", type=_definition, multiple=True, metavar="NAME=VALUE",
-                     help="Value for a placeholder $NAME of a scene file; may be repeated."),
-        click.option("--sensor", type=click.IntRange(min=0), metavar="N",
-                     help="Which sensor of the scene, from 0. [default: the first]"),
-    )  # fmt: skip
-
-
-def _with(command: Command, *options: Decorator) -> Command:
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-scripts_option = click.option(
-    "--scripts", is_flag=True, help="Run the Python files in folders, too; they are code."
-)
-
-
 class Within(click.FloatRange):
     """A number in an interval; NaN is in none."""
 
@@ -194,6 +121,81 @@ class Within(click.FloatRange):
         return number
 
 
+def with_options(*options: Decorator) -> Decorator:
+    """Return a decorator that adds options to a command."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+FIELDS = cast(inspect.StructType, inspect.type_info(Options)).fields
+
+METAVARS = {
+    "heuristic": "NAME|FILE.py[:FUNCTION]|FILE.glsl", "noise": "DE", "tessellation": "N",
+    "pixels_per_degree": "N", "resolution": "WxH", "define": "NAME=VALUE", "sensor": "N",
+    "image": "FILE",
+}  # fmt: skip
+
+
+def option(name: str) -> Decorator:
+    """Return the command line's form of a field of :class:`comparisons.options.Options`."""
+    field = next(each for each in FIELDS if each.name == name)
+    assert isinstance(field.type, inspect.Metadata), "each field has its help"
+    description = (field.type.extra_json_schema or {})["description"]
+    default = (field.type.extra or {}).get("default")
+    is_stated = default is None and isinstance(field.default, (int, str))
+    return click.option(
+        *(("-D", name) if name == "define" else (f"--{name.replace('_', '-')}",)),
+        **_kind(name, field.type.type),
+        default=field.default if is_stated else None,
+        show_default=is_stated and not isinstance(field.default, bool),
+        metavar=METAVARS.get(name),
+        help=description + (f" [default: {default}]" if default else ""),
+    )
+
+
+def _kind(name: str, kind: Any) -> dict[str, Any]:
+    """Return what click needs to know of an option's type."""
+    match kind.types[0] if isinstance(kind, inspect.UnionType) else kind:
+        case inspect.LiteralType(values):
+            return {"type": click.Choice(sorted(values))}
+        case inspect.IntType(ge=low, le=high):
+            return {"type": click.IntRange(low, high)}
+        case inspect.FloatType(gt=above, ge=low, le=high):
+            smallest = low if above is None else above
+            return {"type": Within(smallest, high, min_open=above is not None)}
+        case inspect.BoolType():
+            return {"is_flag": True}
+        case inspect.TupleType():
+            return {"type": resolution}
+        case inspect.DictType():
+            return {"type": _definition, "multiple": True}
+        case inspect.VarTupleType():
+            return {"multiple": True}
+    return {}
+
+
+rendering_options = with_options(
+    *map(
+        option,
+        (
+            "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic",
+            "interpolation", "tessellation", "everything", "pairing", "pixels_per_degree",
+            "allow_empty",
+        ),
+    )
+)  # fmt: skip
+scene_options = with_options(option("define"), option("sensor"))
+
+scripts_option = click.option(
+    "--scripts", is_flag=True, help="Run the Python files in folders, too; they are code."
+)
+
+
 timeout_option = click.option(
     "--timeout",
     default=1800.0,
@@ -204,22 +206,30 @@ timeout_option = click.option(
 )
 
 
-def _workers(default: int | None, shown: str | bool = True) -> Decorator:
-    return click.option(
-        "--workers",
-        default=default,
-        show_default=shown,
-        type=click.IntRange(min=1),
-        metavar="N",
-        help="Processes that render at the same time, each with its share of the cores.",
-    )
-
-
-workers_option = _workers(1)
-all_workers_option = _workers(None, "one per core")
+workers_option = click.option(
+    "--workers",
+    show_default="one per core",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes that render at the same time, each with its share of the cores, and at most one"
+    " per scene.",
+)
 
 IN_PROCESSES = True
 """Whether scenes are read and rendered in separate processes; tests use their own process."""
+
+
+open_option = click.option(
+    "--open", "is_opened", is_flag=True, help="Open the page in a browser as soon as it exists."
+)
+
+
+def open_page(page: Path) -> None:
+    """Open a page in the user's browser."""
+    import webbrowser  # takes as long to import as a short command
+
+    if not webbrowser.open(page.resolve().as_uri()):
+        click.echo(f"fotismos: no browser was found to open {page}. Open it yourself.", err=True)
 
 
 scheduler_option = click.option(
@@ -229,22 +239,17 @@ scheduler_option = click.option(
 )
 
 
-def pool(timeout: float, workers: int | None = 1, scheduler: str | None = None) -> Pool:
+def pool(
+    timeout: float, tasks: int = 1, workers: int | None = None, scheduler: str | None = None
+) -> Pool:
     """Return processes or a cluster in which scenes are read and rendered.
 
-    They are separate, since a scene may run its own code, and native code may crash or hang.
-
-    Parameters
-    ----------
-    timeout
-        Seconds that a task may take without any progress; a Dask cluster has its own limits.
-    workers
-        Processes at the same time; None for one per core.
-    scheduler
-        Address of a Dask cluster that replaces processes here. Its workers need the same folders.
+    They are separate, since a scene may run its own code, and native code may crash or hang. There
+    are at most as many as ``tasks``, ``workers`` or else cores. ``timeout`` is in seconds without
+    any progress; a Dask cluster, by its scheduler's address, has its own limits.
     """
     if scheduler is None:
-        workers = workers or cores()
+        workers = min(workers or cores(), max(1, tasks))
         return Pool(workers if IN_PROCESSES else 0, Ready.among(workers), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
@@ -256,18 +261,9 @@ def pool(timeout: float, workers: int | None = 1, scheduler: str | None = None) 
 
 @dataclass(frozen=True)
 class Ready:
-    """Gets a process ready to render.
+    """Gets a process ready to render, as verbose as this one; a `folder` becomes its own.
 
-    Attributes
-    ----------
-    level
-        Verbosity; at 1, verbose, Mitsuba's messages are printed.
-    threads
-        Dr.Jit's threads; if omitted, one per core.
-    folder
-        Folder to which file names are relative; if omitted, the process's.
-    program
-        Beginning of printed commands; if omitted, the way the process was started.
+    ``threads`` are Dr.Jit's, by default one per core; ``program`` begins printed commands.
     """
 
     level: int
@@ -278,7 +274,7 @@ class Ready:
     @classmethod
     def among(cls, workers: int) -> Ready:
         """Return the preparation of one of this many processes of this machine."""
-        return cls(verbosity.level(), cores() // workers if workers > 1 else None)
+        return cls(verbosity.level(), max(1, cores() // workers) if workers > 1 else None)
 
     @classmethod
     def far_away(cls) -> Ready:
@@ -286,47 +282,28 @@ class Ready:
         return cls(verbosity.level(), None, os.getcwd(), shlex.join(program.program()))
 
     def __call__(self) -> None:
-        """Get this process ready.
-
-        Raises
-        ------
-        InputError
-            If the folder does not exist.
-        InstallationError
-            If there is no usable LLVM.
-        """
+        """Get this process ready."""
         if self.program is not None:
             os.environ[program.VARIABLE] = self.program
         if self.folder is not None:
-            _enter(self.folder)
-        backend.check()
-        backend.use_threads(self.threads)
+            try:
+                os.chdir(self.folder)
+            except OSError as error:
+                raise InputError(
+                    f"{self.folder}: {error.strerror}, on a worker of the cluster. Workers need the"
+                    " same folders as this machine."
+                ) from error
+        llvm.check()
+        llvm.use_threads(self.threads)
         from reference.scene import messages
 
-        messages.divert(_print if self.level > 0 else _pass_over)
+        # Unless verbose, a message is ignored: the record has the warnings that concern it.
+        messages.divert(partial(verbosity.echo, err=True) if self.level > 0 else lambda _: None)
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up
 
         gc.freeze()  # modules stay: garbage collections need not look at them
-
-
-def _enter(folder: str) -> None:
-    try:
-        os.chdir(folder)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: {error.strerror}, on a worker of the cluster. Workers need the same"
-            " folders as this machine."
-        ) from error
-
-
-def _print(text: str) -> None:
-    click.echo(text, err=True)
-
-
-def _pass_over(text: str) -> None:
-    """Ignore a message: the record has the warnings that concern it."""
 
 
 def command_line() -> str:
@@ -338,11 +315,6 @@ def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
     """Return the names of scenes, each folder replaced by the scenes in it.
 
     A folder's scripts are included only ``with_scripts``; a named script always is.
-
-    Raises
-    ------
-    InputError
-        For a folder without a scene.
     """
     return [scene for name in names for scene in _within(Path(name), with_scripts) or [name]]
 
@@ -351,31 +323,25 @@ def _within(folder: Path, with_scripts: bool) -> list[str]:
     """Return the scenes in a folder; none if the path is not a folder."""
     if not folder.is_dir():
         return []
-    from reference.scene.folders import scenes_in
+    from reference.scene.files import scenes_in
 
-    found = scenes_in(folder)
+    written, scripts = scenes_in(folder)
     if with_scripts:
-        return list(map(str, sorted((*found.written, *found.scripts))))
-    if found.scripts:
-        scripts = ", ".join(str(path.relative_to(folder)) for path in found.scripts)
-        told = f"{folder}: {scripts}: scripts are code, run only with --scripts"
-        if not found.written:
-            raise InputError(f"{told}. The folder has no other scene.")
-        click.echo(f"fotismos: {told}.", err=True)
-    return list(map(str, found.written))
+        return list(map(str, sorted((*written, *scripts))))
+    if scripts:
+        names = ", ".join(str(path.relative_to(folder)) for path in scripts)
+        note = f"{folder}: {names}: scripts are code, run only with --scripts"
+        if not written:
+            raise InputError(f"{note}. The folder has no other scene.")
+        verbosity.echo(f"fotismos: {note}.", err=True)
+    return list(map(str, written))
 
 
-def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
-    """Return the request for each scene: with values only for the placeholders that it has.
-
-    Raises
-    ------
-    InputError
-        For a value whose placeholder no scene has.
-    """
+def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
+    """Return the request for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
-    from reference.scene.reading import placeholders
+    from reference.scene.files import placeholders
 
     known = (placeholders(Path(scene)) for scene in scenes)
     own = [{key: value for key, value in whole.define.items() if key in names} for names in known]
@@ -384,11 +350,9 @@ def requests(whole: Request, scenes: Sequence[str]) -> list[Request]:
             f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
             " scene file, or leave the option out."
         )
-    return [replace(whole, define=define) for define in own]
+    return [whole.changed(define=define) for define in own]
 
 
-def request(words: Mapping[str, Any]) -> Request:
+def request(words: Mapping[str, Any]) -> Options:
     """Return the rendering request of a command's options."""
-    from comparisons.case import Request
-
-    return Request.of({**words, "define": dict(words.get("define") or ())})
+    return Options.of({**words, "define": dict(words.get("define") or ())})

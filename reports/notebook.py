@@ -1,30 +1,51 @@
-"""Comparisons in a notebook, shown as on the page.
+"""The commands in Python; a notebook shows a comparison as the page does.
 
 ::
 
-    from reports.notebook import compare
+    import fotismos
 
-    compare(mitsuba.cornell_box(), spp=64, resolution=(128, 128))
+    fotismos.compare(mitsuba.cornell_box(), spp=64, resolution=(128, 128))
+
+Programs use the same functions, which return records.
 """
 
-import heuristic  # noqa: F401  isort: skip  finds LLVM before Mitsuba is imported
-
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from msgspec import structs
-
 import comparisons.compare
-from comparisons.case import Request, Scene, open_case
-from comparisons.record import Comparison
-from comparisons.terms.term_grid import PixelTerms
+from comparisons.audit.audit_record import Audit
+from comparisons.audit.checks import Kind
+from comparisons.audit.checks import audit as examined
+from comparisons.case import RGB, Scene, open_case
+from comparisons.check.moved import LEVEL
+from comparisons.comparison import Comparison
+from comparisons.cost.cost import cost as study
+from comparisons.cost.cost_record import Cost, Method
+from comparisons.cost.methods import declare as declare_method
+from comparisons.departure.metrics import Metric
+from comparisons.departure.metrics import declare as declare_metric
+from comparisons.fit.fit import FitOptions
+from comparisons.fit.fit import fit as fit_parameters
+from comparisons.fit.fit_record import FitRecord
+from comparisons.options import Options
+from comparisons.pixel_terms import PixelTerms
+from comparisons.prepared import prepare
 from heuristic.errors import InputError
-from reports.charts import figures, term_figure
+from heuristic.heuristics import Heuristic
+from heuristic.heuristics import declare as declare_heuristic
+from heuristic.plugins import register
+from reference.scene.graph import set_variant
+from reports import verdict
+from reports.charts import figures
+from reports.ci import baselines, checks
+from reports.ci.checks import CheckRecord
 from reports.page import page
-from reports.run import output
+from reports.run.scene import view_of
+from reports.terminal.tables import PlanReport, plan_report
+from reports.terminal.words import number
 
 HEIGHT = 900
 """Height of the frame in pixels: the viewer with its controls fits a wide notebook."""
@@ -43,6 +64,10 @@ class Shown:
     comparison: Comparison = field(repr=False)
     page: str = field(repr=False)
 
+    def __repr__(self) -> str:
+        """Return the finding, for consoles and notebooks that show text alone."""
+        return " ".join(verdict.sentences([verdict.finding(self.comparison.record)]))
+
     def _repr_html_(self) -> str:
         """Show the page in a frame, which isolates its styles and scripts."""
         return (
@@ -55,19 +80,7 @@ class Shown:
         return figures.drawn(figures.strip(self.comparison), "png", DENSITY)
 
     def at(self, x: int, y: int) -> "ShownTerms":
-        """Return the terms of equation 8.10 at a pixel, or at the nearest one that has them.
-
-        Parameters
-        ----------
-        x, y
-            Column and row, from 0 at the upper left.
-
-        Raises
-        ------
-        InputError
-            For a pixel outside the image or on the background, and for a heuristic other than
-            equation 8.10.
-        """
+        """Return the terms of 8.10 at a column and row, or at the nearest that has them."""
         if self.comparison.terms is None:
             raise InputError(f"there are no terms. {self.comparison.no_terms}")
         found = self.comparison.terms.at(x, y)
@@ -80,7 +93,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class ShownTerms:
-    """The terms at a pixel, shown as a figure and a table.
+    """The terms at a pixel, shown as a table.
 
     `reference` is the physical reference at the pixel, `standard_error` its noisiest channel's.
     """
@@ -90,31 +103,101 @@ class ShownTerms:
     standard_error: float
 
     def _repr_html_(self) -> str:
-        return term_figure.html(self.terms, self.reference, self.standard_error)
+        error = f"physical reference, ± {number(self.standard_error)}"
+        rows = [*_rows(self.terms), (error, self.reference)]
+        body = "".join(
+            f"<tr><th>{escape(name)}</th>"
+            + "".join(f"<td>{number(each)}</td>" for each in values)
+            + "</tr>"
+            for name, values in rows
+        )
+        head = "<tr><th>Term</th><th>R</th><th>G</th><th>B</th></tr>"
+        x, y = self.terms.pixel
+        place = f"Pixel {x}, {y}: {escape(self.terms.material.name)}"
+        return f"<p>{place}</p><table>{head}{body}</table>"
+
+
+def _rows(point: PixelTerms) -> Iterator[tuple[str, tuple[float, ...]]]:
+    yield "emission k_i", point.emission
+    yield "ambient I_a k_a", point.ambient
+    for light in point.lights:
+        factors = f"{light.name}, f_att = {number(light.attenuation)}"
+        yield f"diffuse, {factors}, N·L = {number(light.cos_incidence)}", light.diffuse
+        yield f"specular, {factors}, R·V = {number(light.cos_reflection)}", light.specular
+    if any(point.others):
+        yield "other lights", point.others
+    yield "textbook, the sum", point.total
 
 
 def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
-    Parameters
-    ----------
-    scene
-        A dictionary for ``mitsuba.load_dict``, a function that returns one, a built-in name, or the
-        path of a scene.
-    name
-        Replaces the scene's name.
-    options
-        Those of the command line, such as ``spp=64`` or ``resolution=(128, 128)``.
-
-    Raises
-    ------
-    InputError
-        If the scene cannot be read or paired, or an option is unknown.
-    NonFiniteError
-        If a rendering contains a NaN or an infinity.
+    A scene is a built-in name, the path of one, a dictionary for ``mitsuba.load_dict``, or a
+    function that returns one; ``name`` replaces its name. ``options`` are those of the command
+    line, such as ``spp=64`` or ``resolution=(128, 128)``.
     """
-    case = open_case(scene, Request.of(options), name)
+    case = open_case(scene, Options.of(options), name)
     comparison = comparisons.compare.compare(case.source, case.options, command=case.command())
-    with TemporaryDirectory() as folder:
-        view = output.write_scene(Path(folder), "scene", comparison)
-    return Shown(comparison, page.render([structs.replace(view, files={})]))
+    return Shown(comparison, page.render([view_of(comparison)]))
+
+
+def plan(scene: Scene, name: str | None = None, **options: Any) -> PlanReport:
+    """Return which effects a scene calls for, and what will be simulated; see :func:`compare`."""
+    case = open_case(scene, Options.of(options), name)
+    return plan_report(case.name, prepare(case.source, case.options), case.variant)
+
+
+def cost(
+    scene: Scene,
+    name: str | None = None,
+    at: tuple[int, int] | None = None,
+    measure: bool = False,
+    **options: Any,
+) -> Cost:
+    """Return what each step of accuracy costs in time; see :func:`compare`.
+
+    ``at`` is a width and height to predict for, where ``measure`` also measures.
+    """
+    case = open_case(scene, Options.of(options), name)
+    command = case.command("cost")
+    return study(case.source, case.options, None, None, command, at, measure).record
+
+
+def fit(
+    scene: Scene,
+    name: str | None = None,
+    loss: str = "perceptual",
+    intensities: bool = False,
+    **options: Any,
+) -> FitRecord:
+    """Return the best heuristic parameters, and the error that remains; see :func:`compare`."""
+    case = open_case(scene, Options.of(options), name)
+    chosen = FitOptions(loss=loss, intensities=intensities)
+    return fit_parameters(case.source, case.options, chosen, None, case.command("fit")).record
+
+
+def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
+    """Return whether the scene of a baseline's file moved from what was measured before."""
+    file = baselines.read(Path(baseline))
+    made, _ = checks.examine(file, file.open(), significance)
+    return made
+
+
+def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:
+    """Return the checks of a heuristic, or of a type of BSDF, by itself."""
+    if (heuristic is None) == (bsdf is None):
+        raise InputError("audit needs one of heuristic and bsdf.")
+    set_variant(RGB)
+    register()
+    kind: Kind = "bsdf" if heuristic is None else "heuristic"
+    return examined(kind, str(heuristic or bsdf), parameters)
+
+
+def declare(entry: Heuristic | Metric | Method) -> Any:
+    """Declare a heuristic, a metric or a method of one's own for this process, and return it."""
+    registries: dict[type, Callable[[Any], Any]] = {
+        Heuristic: declare_heuristic,
+        Metric: declare_metric,
+        Method: declare_method,
+    }
+    return registries[type(entry)](entry)

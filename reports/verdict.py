@@ -1,7 +1,7 @@
 """A run's findings in sentences and bars: how many scenes look right, and what the others lack.
 
-A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. The prices
-of effects, from a study of cost, say what it lacks.
+A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. The
+attribution of a study of cost says what it lacks.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING
-from comparisons.effects.nearness import Nearest
-from reference.effects import EFFECTS
+from comparisons.hybrids.nearness import Nearest
+from heuristic.interpolation import Interpolation
+from reference.planning.effects import EFFECTS
 from reports.charts.theme import EFFECT_COLOURS
-from reports.terminal.nearest_lines import told
-from reports.terminal.printing import seconds
+from reports.terminal.words import nearest_sentence, seconds
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
@@ -41,6 +41,13 @@ NAMED = 3
 
 NO_REMEDY = "none at the small size of the study; `cost SCENE` tries more"
 """What stands in place of a method if none of the study's is within the tolerance."""
+
+KERNEL_NAMES = {
+    Interpolation.FLAT: "flat kernel",
+    Interpolation.GOURAUD: "Gouraud kernel",
+    Interpolation.PHONG: "Phong kernel",
+}
+"""The method that is judged, by its interpolation."""
 
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
@@ -76,7 +83,7 @@ def judged(record: ComparisonRecord) -> Judged:
 
 
 @dataclass(frozen=True)
-class Part:
+class BarPart:
     """One effect's part of a bar: ΔE2000, scaled to the scene's mean."""
 
     effect: str
@@ -88,11 +95,13 @@ class Part:
 class Remedy:
     """The cheapest method of a study whose mean error stays within a tolerance.
 
-    The kernel without shadows is none: it is what was judged.
+    ``is_judged`` tells that it is the judged method itself: its mean is within the tolerance,
+    though too many of its pixels are not.
     """
 
     method: str
     seconds: float
+    is_judged: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,11 +129,12 @@ class Finding:
     scene: str
     mean: float
     beyond: dict[float, float]
-    parts: tuple[Part, ...]
+    parts: tuple[BarPart, ...]
     remedies: dict[float, Remedy | None]
     is_exact: bool
     subject: str = "Textbook shading"
     nearest: Nearest | None = None
+    caution: str = ""
 
     def is_right(self, tolerance: float) -> bool:
         """Return whether the scene looks right at one of :data:`TOLERANCES`."""
@@ -148,29 +158,32 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
         is_exact=metric.high <= EXACT,
         subject=judged(record).subject,
         nearest=picture.nearest if picture else None,
+        caution=record.caution,
     )
 
 
-def _parts(mean: float, cost: Cost) -> tuple[Part, ...]:
-    """Scale the prices that are surely above 0 to the mean, which was measured at full size."""
-    sure = [price for price in cost.prices.effects if price.removes.low > 0]
-    total = sum(price.removes.value for price in sure)
-    ordered = sorted(sure, key=lambda price: -price.removes.value)
+def _parts(mean: float, cost: Cost) -> tuple[BarPart, ...]:
+    """Scale what effects surely remove to the mean, which was measured at full size."""
+    sure = [one for one in cost.attribution.effects if one.removes.low > 0]
+    total = sum(one.removes.value for one in sure)
+    ordered = sorted(sure, key=lambda one: -one.removes.value)
     return tuple(
-        Part(price.effect, EFFECT_COLOURS[price.effect], mean * price.removes.value / total)
-        for price in ordered
+        BarPart(one.effect, EFFECT_COLOURS[one.effect], mean * one.removes.value / total)
+        for one in ordered
     )
 
 
 def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
     from comparisons.cost.front import cheapest  # only with a study of cost
-    from comparisons.cost.rungs import KERNELS, Kernel
 
-    is_judged = {
-        rung.name for rung in KERNELS if isinstance(rung.method, Kernel) and not rung.method.shadows
-    }
-    best = cheapest((point for point in cost.points if point.rung not in is_judged), tolerance)
-    return Remedy(best.rung, best.seconds.median) if best else None
+    best = cheapest(cost.points, tolerance)
+    if best is None:
+        return None
+    names = next(method.names for method in cost.methods if method.name == best.method)
+    judged_name = KERNEL_NAMES[cost.interpolation]
+    # Another heuristic than Phong's stands behind a colon.
+    is_judged = any(name.partition(":")[0] == judged_name for name in names)
+    return Remedy(best.method, best.seconds.value, is_judged)
 
 
 def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
@@ -189,6 +202,9 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
         subjects = {found.subject for found in findings}
         subject = subjects.pop() if len(subjects) == 1 else "The first half"
         said = [f"{subject} looks right in {right} of {len(findings)} scenes."]
+    doubts = [(found.scene, found.caution) for found in findings if found.caution]
+    if doubts:
+        said[0] = " ".join([*(f"{scene}: {caution}" for scene, caution in doubts), said[0]])
     lacking = ranked([found for found in findings if not found.is_right(tolerance)])
     if lacking:
         said.append(f"What it lacks most is {', then '.join(map(_noun, lacking[:NAMED]))}.")
@@ -197,17 +213,21 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
 
 def about(found: Finding, tolerance: float = USUAL) -> str:
     """Return one scene's finding: how much is wrong, mostly why, and a remedy."""
+    if found.caution:
+        return found.caution
     if found.is_exact:
         return f"{found.subject} is exact here, as far as can be seen."
     share = found.beyond[tolerance]
     wrong = f"is visibly wrong in {100 * share:.0f} % of the pixels"
     said = [f"{found.subject} {'looks right here' if found.is_right(tolerance) else wrong}."]
     if found.nearest:
-        said.append(f"It {told(found.nearest)}.")
+        said.append(f"It {nearest_sentence(found.nearest)}.")
     if found.cause:
         said.append(f"It lacks mostly {_noun(found.cause)}.")
     remedy = found.remedies.get(tolerance)
-    if remedy and not found.is_right(tolerance):
+    if remedy and remedy.is_judged and not found.is_right(tolerance):
+        said.append(f"Its mean is within {LEADING.label} {tolerance:g} all the same.")
+    elif remedy and not found.is_right(tolerance):
         said.append(
             f"The cheapest method tried within a mean of {LEADING.label} {tolerance:g}:"
             f" {remedy.method}, {seconds(remedy.seconds)} at the small size of the study."
@@ -225,9 +245,15 @@ def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
             continue
         remedy = found.remedies[tolerance]
         cause = f"mostly {_noun(found.cause)}" if found.cause else "no cause is known"
-        way = f"{remedy.method} in {seconds(remedy.seconds)}" if remedy else NO_REMEDY
+        way = _way(remedy)
         lines.append(f"{found.scene}: {cause}; mean within {LEADING.label} {tolerance:g}: {way}")
     return lines
+
+
+def _way(remedy: Remedy | None) -> str:
+    if remedy is None:
+        return NO_REMEDY
+    return "as it is" if remedy.is_judged else f"{remedy.method} in {seconds(remedy.seconds)}"
 
 
 def _noun(label: str) -> str:

@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 import heuristic
-from heuristic import shading
+from heuristic import kernel
 from tests import oracle
 
 POINTS = 20_000
@@ -90,7 +90,7 @@ def check_kernel(vector_type, tolerance, coefficients="rgb", n=9, opaque_n=False
     values = COEFFICIENTS[coefficients]
     ambient = 0.5
     exponent = dr.opaque(dr.value_t(vector_type), n) if opaque_n else n
-    found = shading.shade(
+    found = kernel.shade(
         *(vector_type(vectors.T) for vectors in (points.position, points.normal, points.view)),
         heuristic.Material(**values, n=exponent),
         [kernel_light(light) for light in lights],

@@ -2,9 +2,9 @@
 
 import gc
 import shutil
-import sys
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import SimpleNamespace
 
 import heuristic  # noqa: F401  isort: skip
 
@@ -17,11 +17,12 @@ from reference.rendering import direct
 from reports import jobs
 from reports.commands.compare import compare
 from tests import small_baselines
+from tests.programs import command_line
 from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:
-    pytest_plugins = ["reports.ci.pytest_plugin"]
+    pytest_plugins = ["reports.ci.plugin"]
 
 
 @pytest.fixture
@@ -42,31 +43,22 @@ def spectral():
     yield from in_variant("llvm_ad_spectral")
 
 
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    """Let commands render in this process, which has loaded all that they need."""
-    monkeypatch.setattr(jobs, "IN_PROCESSES", False)
-
-
 WHY = next(option for option in compare.params if option.name == "with_cost")
 """Whether `compare` finds causes, which takes nine tenths of a small run."""
-BY_DEFAULT = WHY.default
 
-
-@pytest.fixture(autouse=True)
-def no_causes(monkeypatch):
-    """Let `compare` leave out the causes unless `--why` is given."""
-    monkeypatch.setattr(WHY, "default", False)
+# In tests, commands render in this process, which has loaded all that they need, without causes.
+jobs.IN_PROCESSES = False
+BY_DEFAULT, WHY.default = WHY.default, False
 
 
 @pytest.fixture
-def causes(monkeypatch, no_causes):
+def causes(monkeypatch):
     """Let `compare` find causes by default, as it does for its users."""
     monkeypatch.setattr(WHY, "default", BY_DEFAULT)
 
 
 @pytest.fixture
-def apart(monkeypatch, in_this_process):
+def apart(monkeypatch):
     """Let commands render in a process apart, as they do for their users."""
     monkeypatch.setattr(jobs, "IN_PROCESSES", True)
 
@@ -79,21 +71,19 @@ def frozen():
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
+def run():
     """Run the command line, all in this process; returns exit code, output and messages."""
+    return command_line
 
-    from reports.cli import main
 
-    def command(*words):
-        monkeypatch.setattr(sys, "argv", ["fotismos", *map(str, words)])
-        code = 0
-        try:
-            main()
-        except SystemExit as leaving:
-            code = leaving.code
-        return code, *capsys.readouterr()
-
-    return command
+@pytest.fixture(scope="session")
+def two_scenes(tmp_path_factory):
+    """What a comparison of two small scenes wrote, one of them without noise, and printed."""
+    folder = tmp_path_factory.mktemp("two")
+    names = ["--resolution", "24x16", "--spp", 16, "--max-mean", 1, "--max-visible", "0%"]
+    files = ["-o", folder / "out", "--junit", folder / "j.xml", "--summary", folder / "s.md"]
+    code, printed, _ = command_line("compare", "lambert-sphere", "fig-8-9", *names, *files)
+    return SimpleNamespace(folder=folder, out=folder / "out", code=code, printed=printed)
 
 
 @pytest.fixture
@@ -116,11 +106,10 @@ def written(tmp_path, monkeypatch):
     return write
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def no_service(monkeypatch):
-    """No CI service."""
-    for name in small_baselines.SERVICES:
-        monkeypatch.delenv(name, raising=False)
+    """No CI service: the tests may themselves run in one."""
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
 
 
 @pytest.fixture(scope="session")
@@ -132,8 +121,8 @@ def made_baselines(tmp_path_factory):
 
 
 @pytest.fixture
-def baselines_folder(made_baselines, no_service, tmp_path):
-    """A copy of the two small baselines, outside of any CI service."""
+def baselines_folder(made_baselines, tmp_path):
+    """A copy of the two small baselines."""
     return Path(shutil.copytree(made_baselines, tmp_path / "baselines"))
 
 

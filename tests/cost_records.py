@@ -5,21 +5,22 @@ from msgspec import convert
 
 from comparisons.cost.cost import Study
 from comparisons.cost.cost_record import Cost
-from comparisons.records import VERSION
+from comparisons.hybrids.attribution import Causes
+from reference.records import VERSION
 from tests import records
 
 WIDTH, HEIGHT = 12, 8
 DETERMINISTIC = {"monte_carlo": False, "family": "kernel"}
 RANDOM = {"monte_carlo": True, "family": "physical"}
 EFFECTS = ("occlusion", "microfacets and Fresnel", "interreflection")
-CORNERS = {
+HYBRIDS = {
     (): (8.765, 0.0012),
     ("occlusion",): (5.432, 0.0234),
     ("interreflection",): (4.321, 0.0345),
     ("occlusion", "interreflection"): (0.271, 0.0456),
     EFFECTS: (-0.0123, 0.0557),
 }
-"""Error and seconds of the corners that were rendered, by the effects that are simulated."""
+"""Error and seconds of the hybrids that were rendered, by the effects that are simulated."""
 
 PARTS = ("implementation", "visibility", "BSDF form", "transport")
 
@@ -38,23 +39,29 @@ def study(scene="fig-8-9"):
     counted = np.ones((HEIGHT, WIDTH), bool)
     counted[0] = False
     parts = {name: (place - 1.5) * 0.1 * image for place, name in enumerate(PARTS)}
+    made = record(scene)
     return Study(
-        record=record(scene),
-        points={
-            (point.rung, point.spp): np.full_like(image, 0.2 * (place + 1))
-            for place, point in enumerate(record(scene).points)
+        record=made,
+        methods={
+            method.name: np.full_like(image, 0.2 * (place + 1))
+            for place, method in enumerate(made.methods)
         },
         parts=parts,
         difference=sum(parts.values()),
-        effects=effects,
-        error=sum(effects.values()),
-        left=np.zeros(image.shape[:2]),
+        causes=Causes(
+            attribution=made.attribution,
+            closure=made.closure,
+            maps=effects,
+            departure=sum(effects.values()),
+            left=np.zeros(image.shape[:2]),
+            previews={
+                each: np.full((2 * HEIGHT, 2 * WIDTH, 3), 0.1 * (place + 1))
+                for place, each in enumerate(HYBRIDS)
+            },
+            removed={},
+        ),
         reference=image,
         counted=counted,
-        previews={
-            each: np.full((2 * HEIGHT, 2 * WIDTH, 3), 0.1 * (place + 1))
-            for place, each in enumerate(CORNERS)
-        },
     )
 
 
@@ -74,6 +81,7 @@ def _record(scene):
         "seed": 7,
         "resolution": [WIDTH, HEIGHT],
         "rounds": 3,
+        "level": 0.75,
         "reference": {
             "integrator": "path",
             "max_depth": -1,
@@ -82,7 +90,7 @@ def _record(scene):
             "noise_floor": 0.1234,
             "mean_variance": 3.21e-6,
         },
-        "rungs": [
+        "methods": [
             {"name": "Phong kernel", "names": ["Phong kernel"]} | DETERMINISTIC,
             {"name": "full plan", "names": ["direct", "full plan"]} | RANDOM,
         ],
@@ -91,24 +99,17 @@ def _record(scene):
             point("full plan", 4, 0.0234, 2.345, True),
             point("full plan", 16, 0.0567, 1.234, False),
         ],
-        "equal_time": [
-            {"seconds": 0.0011, "best": None},
-            {
-                "seconds": 0.1,
-                "best": point("full plan", 16, 0.0567, 1.234, False),
-            },
-        ],
         "equal_error": [
             reached("Phong kernel", 5.0, None),
             reached("Phong kernel", 2.0, None),
             reached("full plan", 5.0, 0.0235, True),
             reached("full plan", 2.0, 0.0321),
         ],
-        "prices": {
+        "attribution": {
             "effects": [
-                price("occlusion", 3.141, 0.0111),
-                price("microfacets and Fresnel", -0.271, -0.0022),
-                price("interreflection", 5.895, 0.0456),
+                contribution("occlusion", 3.141, 0.0111),
+                contribution("microfacets and Fresnel", -0.271, -0.0022),
+                contribution("interreflection", 5.895, 0.0456),
             ],
             "departure": 8.765,
             "floor": 0.432,
@@ -117,9 +118,9 @@ def _record(scene):
             "spp": 16,
             "replicates": 4,
             "orders": 8,
-            "corners": [
+            "hybrids": [
                 {"effects": each, "error": error, "seconds": seconds}
-                for each, (error, seconds) in CORNERS.items()
+                for each, (error, seconds) in HYBRIDS.items()
             ],
         },
         "closure": {"mean": 0.0123, "low": -0.0145, "high": 0.0391},
@@ -136,26 +137,16 @@ def _record(scene):
     }
 
 
-def point(rung, spp, time, error, pareto):
-    """A rung at one sample count."""
+def point(method, spp, time, error, pareto):
+    """A method at one sample count."""
     return {
-        "rung": rung,
+        "method": method,
         "spp": spp,
+        "seconds": {"value": time, "low": 0.93 * time, "high": 1.09 * time},
+        "error": {"mean": error, "low": 0.97 * error, "high": 1.03 * error},
+        "mse": 0.0021 * error,
         "first_s": 11.1 * time,
         "compile_s": 7.7 * time,
-        "seconds": {
-            "median": time,
-            "p25": 0.97 * time,
-            "p75": 1.03 * time,
-            "low": 0.93 * time,
-            "high": 1.09 * time,
-            "level": 0.75,
-            "repeats": 3,
-        },
-        "error": error,
-        "error_stderr": 0.013 * error,
-        "mse": 0.0021 * error,
-        "mse_stderr": 0.0002 * error,
         "pareto": pareto,
     }
 
@@ -166,8 +157,8 @@ def reached(method, error, seconds, at_most=False):
     return {"method": method, "error": error, "seconds": time, "at_most": at_most}
 
 
-def price(effect, removes, adds):
-    """The price of an effect."""
+def contribution(effect, removes, adds):
+    """What an effect removes and adds."""
     return {
         "effect": effect,
         "removes": {"value": removes, "low": removes - 0.17, "high": removes + 0.19},

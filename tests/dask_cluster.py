@@ -22,23 +22,35 @@ def start(processes):
 def running():
     """Give the address of a cluster that is there while the block runs."""
     processes = []
-    try:
+    with ending(processes):
         yield start(processes)
+
+
+@contextmanager
+def ending(processes):
+    """End the processes in a list after the block."""
+    try:
+        yield
     finally:
         for process in reversed(processes):
             process.kill()
             process.wait()
 
 
+def command(*words):
+    """Start a command of fotismos, whose output and messages are read later."""
+    return _python("-m", "reports", *words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
 def _started(*words):
-    command = [sys.executable, "-c", "from dask.__main__ import main; main()", *map(str, words)]
-    return subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    null = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return _python("-c", "from dask.__main__ import main; main()", *words, **null)
+
+
+def _python(*words, **streams):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    program = [sys.executable, *map(str, words)]
+    return subprocess.Popen(program, cwd=ROOT, env=environment, text=True, **streams)
 
 
 def _free_port():

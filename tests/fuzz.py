@@ -160,30 +160,6 @@ def check_attenuation(rows, seed, clamped=False):
     return _judge(inputs, found, expected, 10 * STEP * expected, judged)
 
 
-def check_tame_attenuation(rows, seed):
-    """The form for plain coefficients, to the bound of the general one, for every distance."""
-    tallies = []
-    for coefficients in TAME:
-        distance = abs(Source(rows // len(TAME), seed).anything())
-        dr.eval(distance)
-        k0, k1, k2 = coefficients
-        d = Float64(distance)
-        for intensity in (4.0, 1e-20):
-            assert terms.is_tame(coefficients, intensity)
-            found = terms.tame_attenuation(distance, *coefficients, intensity)
-            expected = intensity / (k0 + d * (k1 + d * k2))
-            judged = expected > 4 * SMALLEST
-            tallies.append(_judge({"d": distance}, found, expected, 10 * STEP * expected, judged))
-            # What is not judged counts as zero: it may not be more than it should by any amount.
-            nothing = Float64(4 * SMALLEST) + 0 * d
-            _judge({"d": distance}, found, 0 * d, nothing, ~judged)
-    rows, judged, worst = zip(*((t.rows, t.judged, t.worst) for t in tallies), strict=True)
-    return Tally(sum(rows), sum(judged), max(worst))
-
-
-TAME = ((1.0, 0.09, 0.032), (1e-30, 1.0, 1.0), (1e30, 0.0, 1.0), (0.25, 1e-38, 1e-30))
-
-
 def check_cone(rows, seed):
     """Inside or outside, but for a millionth of a radian; cutoffs from 1e-4 to 179.99 degrees."""
     draw = Source(rows, seed)
@@ -261,7 +237,6 @@ CHECKS = {
     "light vector": check_light_vector,
     "attenuation": check_attenuation,
     "clamped attenuation": lambda rows, seed: check_attenuation(rows, seed, clamped=True),
-    "tame attenuation": check_tame_attenuation,
     "cone": check_cone,
     "shade": check_shade,
 }

@@ -2,13 +2,17 @@
 
 import mitsuba as mi
 
-from reference.planning.premises import Pruning, Ruling
-from reference.rendering.albedo_table import AlbedoTable
+from reference.planning.rules import PruningRule, RuleResult
+from reference.rendering.direct import AlbedoTable
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
 TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}
 BLACK = {"type": "diffuse", "reflectance": 0.0}
 SKY = {"type": "constant", "radiance": 1.0}
+
+
+def _blind(rule, facts):
+    return RuleResult(name=rule.name, applies=True, premise="", evidence=rule.absent)
 
 
 def prune_blindly(monkeypatch):
@@ -19,11 +23,11 @@ def prune_blindly(monkeypatch):
         self.has_back = False
         return at(self, mu)
 
-    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
+    monkeypatch.setattr(PruningRule, "check", _blind)
     monkeypatch.setattr(AlbedoTable, "at", at_the_front)
 
 
-def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", camera=None, **parts):
+def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", camera=None, size=32, **parts):
     """A scene seen from a point; ``camera`` has parameters of the sensor."""
     camera = {"type": "perspective"} | (camera or {})
     field = {"fov": 40.0} if camera["type"] in ("perspective", "thinlens") else {}
@@ -31,16 +35,33 @@ def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", camera=None, *
     to_world = mi.ScalarTransform4f().look_at(viewer, target, up)
     if camera["type"] == "orthographic":
         to_world = to_world.scale((3.0, 3.0, 1.0))
-    film = {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}}
+    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
     if camera["type"] == "radiancemeter":
         film |= {"width": 1, "height": 1}
     sensor = {"to_world": to_world, "film": film, **field, **camera}
-    return {"type": "scene", "integrator": {"type": integrator}, "sensor": sensor, **parts}
+    integrator = integrator if isinstance(integrator, dict) else {"type": integrator}
+    return {"type": "scene", "integrator": integrator, "sensor": sensor, **parts}
 
 
 def sphere(bsdf=DIFFUSE, **more):
     """A unit sphere."""
     return {"type": "sphere", "bsdf": bsdf, **more}
+
+
+def octahedron(path, faces=8, height=1.0):
+    """Write an octahedron to a PLY file without normals, whole or with faces missing.
+
+    Below 0 the height of its tip makes a dent.
+    """
+    points = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, height), (0, 0, -1)]
+    corners = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5)]
+    corners = [*corners, (0, 3, 5)][:faces]
+    lines = ["ply", "format ascii 1.0", "element vertex 6"]
+    lines += [f"property float {axis}" for axis in "xyz"]
+    lines += [f"element face {faces}", "property list uchar int vertex_indices", "end_header"]
+    lines += [" ".join(map(str, row)) for row in points] + [f"3 {a} {b} {c}" for a, b, c in corners]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    return path
 
 
 def lamp(position, intensity=1.0):

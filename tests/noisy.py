@@ -10,15 +10,15 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
-from comparisons.compare import leading_distance, prepare
 from comparisons.departure import marks
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.spaces import DEFAULT_VIEWING
+from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import LEADING, leading_distance
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
+from comparisons.prepared import prepare
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.moments import DifferenceSums
 from reference.rendering.passes import pass_seed
+from reference.rendering.sums import DifferenceSums
 from reference.scene.source import Source
 from tests.test_physics import look_at
 

@@ -3,12 +3,11 @@
 import msgspec
 import numpy as np
 
-from comparisons.comparison import ComparisonRecord
+from comparisons.comparison import Comparison, ComparisonRecord, Images
+from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import RATIO, drawn
-from comparisons.departure.spaces import Viewing
 from comparisons.departure.statistics import Summary
-from comparisons.record import Comparison, Images
-from comparisons.records import VERSION
+from reference.records import VERSION, plain
 from reports.page.scene_view import SceneView
 
 
@@ -96,6 +95,8 @@ def data():
             "tabulated_environment": False,
             "integrator": "path",
             "max_depth": -1,
+            "stock_integrator": "path",
+            "scene_depth": -1,
             "spp": 256,
             "passes": 16,
             "sampler": "multijitter",
@@ -110,7 +111,7 @@ def data():
                 "seconds": 0.0456,
             },
         },
-        "viewing": Viewing(exposure=0.5).record(),
+        "viewing": plain(Viewing(exposure=0.5)),
         "metrics": {
             "dE2000": metric(4.327),
             "dE_ITP": metric(12.91),

@@ -33,5 +33,5 @@ PLAIN = re.sub(r"  <emitter type=.constant.*\n", "", SCENE)
 PLAIN = re.sub(r'(?s)"roughplastic">.*?</bsdf>', '"diffuse"/>', PLAIN, count=1)
 PLAIN = PLAIN.replace('"max_depth" value="3"', '"max_depth" value="2"')
 """Diffuse, under the point alone, light reflected once: shadows are its one effect. So its study of
-cost has few methods and prices, for tests that are not about effects.
+cost has few methods and effects, for tests that are not about effects.
 """

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from comparisons.terms import polar
-from comparisons.terms.term_grid import GridLight, TermGrid, TermMaterial
+from comparisons.pixel_terms import GridLight, TermGrid, TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""
@@ -31,10 +30,8 @@ def grid(resolution):
 
 
 def _material(name, k_s, n):
-    cosines = np.cos(np.radians(polar.INCIDENCES))[:, None]
-    lobe = 0.4 * cosines + 2 * k_s * np.exp(-30 * polar.VIEWS**2)
     k_d = (0.6, 0.4, 0.2)
-    return TermMaterial(name, (0.0,) * 3, (0.3,) * 3, k_d, (k_s,) * 3, n, "phong", (0.1,) * 3, lobe)
+    return TermMaterial(name, (0.0,) * 3, (0.3,) * 3, k_d, (k_s,) * 3, n, "phong", (0.1,) * 3)
 
 
 def _light(name, intensity, angle, view, azimuth, n):

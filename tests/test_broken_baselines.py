@@ -3,24 +3,15 @@
 import copy
 import json
 import os
-import pickle
 import random
 from collections import Counter
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from comparisons.processes.pool import Pool
-from heuristic.errors import (
-    FotismosError,
-    InputError,
-    InstallationError,
-    LostProcessError,
-    NonFiniteError,
-)
-from reports.ci import baselines, checks, suite
+from heuristic.errors import InputError
+from reports.ci import baselines, checks
 from tests.small_baselines import FAST, change
 
 WHOLE = Path(__file__).parent / "baselines/cornell-box-llvm_ad_rgb.json"
@@ -68,12 +59,9 @@ def damaged(content, rng):
     return json.dumps(data).encode("utf-8", "surrogatepass")
 
 
-@pytest.mark.parametrize(
-    "count", [400, pytest.param(20_000, marks=pytest.mark.slow)], ids=["short", "long"]
-)
-def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(count, tmp_path):
+def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(tmp_path):
     path, whole, outcomes = tmp_path / "b.json", WHOLE.read_bytes(), Counter()
-    for seed in range(count):
+    for seed in range(300):
         path.write_bytes(damaged(whole, random.Random(seed)))
         try:
             found = baselines.read(path).baseline
@@ -86,9 +74,9 @@ def test_a_damaged_baseline_is_refused_or_holds_sane_numbers(count, tmp_path):
             assert "--update --scene" in message
             outcomes["refused"] += 1
             continue
-        quantities = list(found.measured().quantities())
-        errors = np.array([quantity.error for quantity in quantities])
-        assert np.isfinite([quantity.value for quantity in quantities]).all()
+        quantities = found.measured().quantities()
+        values, errors = np.array([(value, error) for *_, value, error in quantities]).T
+        assert np.isfinite(values).all()
         assert np.isfinite(errors**4).all()
         assert (errors >= 0).all()
         assert 2 <= found.passes <= 1024
@@ -132,7 +120,7 @@ def break_all(folder):
     os.mkfifo(folder / "fifo.json")
     (folder / "loop.json").symlink_to("loop.json")
     (folder / "gone.json").symlink_to("nowhere.json")
-    other(folder, "version", record_version=3)
+    other(folder, "version", record_version=9)
     other(folder, "passes", passes=10**9)
     other(folder, "scene", scene="fig-0")
     other(folder, "file", scene="../nowhere.xml")
@@ -156,108 +144,65 @@ def break_all(folder):
     "checks",
     "A baseline that cannot be judged is an error with exit code 2; the others are judged.",
 )
-def test_each_baseline_is_judged_alone(run, folder, tmp_path, monkeypatch):
+def test_each_baseline_is_judged_alone(run, folder, tmp_path):
     broken = break_all(folder)
-    monkeypatch.setenv("GITHUB_ACTIONS", "true")
-    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-    junit = tmp_path / "junit.xml"
-    code, printed, messages = run(
-        "check", folder, "-o", tmp_path / "out", "--json", "--junit", junit
-    )
+    code, printed, messages = run("check", folder, "-o", tmp_path / "out", "--json")
     assert code == 2
     statuses = {
         Path(check["baseline"]).stem: check["status"] for check in json.loads(printed)["checks"]
     }
-    expected = dict.fromkeys(broken, "error") | {"fig-8-6a": "passed", "fig-8-6b": "failed"}
-    assert statuses == expected
+    assert statuses == dict.fromkeys(broken, "error") | {
+        "fig-8-6a": "passed", "fig-8-6b": "failed",
+    }  # fmt: skip
     assert len(broken) > 20
-    told = {case.get("name"): [kind.tag for kind in case] for case in suite_of(junit)}
-    kinds = {"error": ["error"], "failed": ["failure"], "passed": []}
-    assert told == {name: kinds[status] for name, status in expected.items()}
     assert "Traceback" not in messages
     for name in ("options", "passes", "version", "nul", "deep", "digits", "bytes"):
         assert f"{folder / name}.json: " in messages
         with pytest.raises(InputError, match="--update --scene"):
             baselines.read(folder / f"{name}.json")
-    for name in broken:
-        assert f"title=fotismos check%3A {name} not checked::" in messages
-    assert "title=fotismos check%3A fig-8-6b::" in messages
-    assert (folder / "fifo.json").is_fifo()
-
-
-def suite_of(junit):
-    return ElementTree.parse(junit).getroot().find("testsuite")
-
-
-def test_an_update_destroys_nothing_that_is_not_a_baseline(run, folder):
-    os.mkfifo(folder / "fifo.json")
-    (folder / "folder.json").mkdir()
     for name in ("fifo", "folder"):
-        code, _, messages = run(
-            "check", folder / f"{name}.json", "--update", "--scene", "fig-8-6a", *FAST
-        )
-        assert code == 2
-        assert "not a regular file" in messages
+        words = ("check", folder / f"{name}.json", "--update", "--scene", "fig-8-6a", *FAST)
+        code, _, messages = run(*words)
+        assert (code, "not a regular file" in messages) == (2, True)
     assert (folder / "fifo.json").is_fifo()
-    assert (folder / "folder.json").is_dir()
 
 
-# --- Whatever goes wrong ---------------------------------------------------------------------
+def test_whatever_goes_wrong_is_the_error_of_one(tmp_path, monkeypatch):
+    for raised in (MemoryError(), RecursionError("too deep"), KeyError("x"), InputError("bad")):
 
-RAISED = (
-    TypeError("wrong"), MemoryError(), RecursionError("too deep"), OSError(28, "No space left"),
-    KeyError("x"), ZeroDivisionError("by nothing"), InputError("bad"), NonFiniteError("a NaN"),
-    LostProcessError("gone"), InstallationError("no LLVM"),
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("raised", RAISED, ids=lambda error: type(error).__name__)
-def test_whatever_goes_wrong_is_the_error_of_one(raised, run, folder, tmp_path, monkeypatch):
-    check_one = checks.examine
-
-    def examine(file, *words):
-        if file.path.stem == "fig-8-6a":
+        def read(path, raised=raised):
             raise raised
-        return check_one(file, *words)
 
-    monkeypatch.setattr(checks, "examine", examine)
-    code, printed, messages = run("check", folder, "-o", tmp_path / "out")
-    assert code == 2
-    assert "1 of 2 moved" in printed
-    assert "1 could not be checked" in printed
-    kind = "" if isinstance(raised, FotismosError) else f"{type(raised).__name__}: "
-    assert f"{kind}{raised}" in messages
-    assert "Traceback" not in messages
+        monkeypatch.setattr(baselines, "read", read)
+        made, view = checks.examine_one(tmp_path / "b.json", 0.01, None, tmp_path)
+        assert (made.status, made.exit_code, view) == ("error", 2, None)
+        assert str(raised) in made.message
+    for raised in (KeyboardInterrupt, SystemExit):
 
+        def leave(path, raised=raised):
+            raise raised
 
-@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
-def test_an_interruption_passes_through(raised, folder, tmp_path, monkeypatch):
-    def examine(*_):
-        raise raised
-
-    monkeypatch.setattr(checks, "examine", examine)
-    with pytest.raises(raised), Pool(0) as pool:
-        suite.examine(pool, folder, 0.01, None, tmp_path)
-
-
-def test_a_result_goes_from_one_process_to_another(folder, tmp_path):
-    for name, status in (("fig-8-6a", "passed"), ("fig-8-6b", "failed"), ("none", "error")):
-        result = suite.examine_one(folder / f"{name}.json", 0.01, None, tmp_path / name)
-        received = pickle.loads(pickle.dumps(result))
-        assert received.status == result.status == status
-        assert received.path == result.path
-        if result.check is not None:
-            assert received.check.moves == result.check.moves
+        monkeypatch.setattr(baselines, "read", leave)
+        with pytest.raises(raised):
+            checks.examine_one(tmp_path / "b.json", 0.01, None, tmp_path)
 
 
 def test_a_number_that_is_not_one_is_never_a_pass(folder, tmp_path, monkeypatch):
     from comparisons.check import moved
 
     monkeypatch.setattr(moved, "sidak", lambda p, tests: np.full(len(p), np.nan))
-    assert suite.examine_one(folder / "fig-8-6a.json", 0.01, None, tmp_path).status != "passed"
+    made, _ = checks.examine_one(folder / "fig-8-6a.json", 0.01, None, tmp_path / "out")
+    assert made.status != "passed"
 
 
-# --- Scenes in Python ------------------------------------------------------------------------
+def test_an_error_names_its_baseline_once():
+    path = Path("folder/b.json")
+    assert checks.failed(path, InputError("no scene")).message == "folder/b.json: no scene"
+    own = checks.failed(path, InputError("folder/b.json: cut short")).message
+    assert own == "folder/b.json: cut short"
+    other = checks.failed(path, ValueError("odd")).message
+    assert other == "folder/b.json: ValueError: odd"
+
 
 SCRIPT = """
 from colours import GREY
@@ -286,21 +231,8 @@ def test_a_scene_in_python_is_checked_as_one_in_xml(run, tmp_path, monkeypatch):
     (tmp_path / "deeper/down").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "deeper/down")
     assert run("check", folder, "-o", tmp_path / "out")[0] == 0
-    code, printed, _ = run(*words)
-    assert code == 0
-    assert "0 of 1 baselines written" in printed
     (scenes / "colours.py").write_text("GREY = 0.25\n# changed\n")
     assert run("check", folder, "-o", tmp_path / "out")[0] == 1
     (scenes / "colours.py").write_text("GREY = undefined\n")
     code, _, messages = run("check", folder, "-o", tmp_path / "out")
-    assert code == 2
-    assert "NameError" in messages
-
-
-def test_an_error_names_its_baseline_once():
-    path = Path("folder/b.json")
-    assert checks.failed(path, InputError("no scene")).message == "folder/b.json: no scene"
-    own = checks.failed(path, InputError("folder/b.json: cut short")).message
-    assert own == "folder/b.json: cut short"
-    other = checks.failed(path, ValueError("odd")).message
-    assert other == "folder/b.json: ValueError: odd"
+    assert (code, "NameError" in messages) == (2, True)

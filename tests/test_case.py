@@ -1,10 +1,16 @@
 """One door: whatever names a scene is read once, in the same way by all who open it."""
 
+import json
+
 import mitsuba as mi
+import numpy as np
 import pytest
 
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
+from comparisons.departure.colour import MOST_PIXELS
+from comparisons.options import LARGEST_SPP, Options
 from heuristic.errors import InputError
+from heuristic.meshes import FINEST
 from reference.scene import source
 from tests.small_scene import PLAIN, SCENE
 
@@ -48,7 +54,14 @@ def parses(monkeypatch):
     return read
 
 
-@pytest.mark.parametrize("command", ["compare", "plan", "cost", "fit"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "compare",
+        "plan",
+        *(pytest.param(each, marks=pytest.mark.thorough) for each in ("cost", "fit")),
+    ],
+)
 def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses, command):
     scene_file.write_text(PLAIN, encoding="utf-8")
     words = {"plan": (), "cost": ("--rounds", 2)}.get(command, ())
@@ -100,14 +113,63 @@ def test_every_file_is_named_where_mitsuba_finds_it(rgb, tmp_path, monkeypatch):
 
 def test_options_that_are_not_known_are_refused_with_those_that_are():
     with pytest.raises(InputError, match=r"unknown options samples: .*spp"):
-        Request.of({"samples": 4})
+        Options.of({"samples": 4})
     with pytest.raises(InputError, match=r"llvm_mono.*llvm_ad_rgb"):
-        Request(variant="llvm_mono")
+        Options(variant="llvm_mono")
+    with pytest.raises(InputError, match=r"pairing None .*literal, matched"):
+        Options(pairing=None)
 
 
-def test_a_command_repeats_what_was_asked_for(rgb):
-    case = open_case("fig-6-10", Request(resolution=(12, 10), define={"a": 1}))
+def test_a_command_repeats_what_was_given(rgb, tmp_path):
+    case = open_case("fig-6-10", Options(resolution=(12, 10)))
     assert case.command() == (
-        "fotismos compare fig-6-10 -D a=1 --variant llvm_ad_rgb --resolution 12x10"
-        " --interpolation flat --tessellation 4 --pairing matched"
+        "fotismos compare fig-6-10 --variant llvm_ad_rgb --resolution 12x10"
+        " --interpolation flat --tessellation 4"
     )
+    words = {"define": {"a": 1}, "image": ("a.png", "b.png"), "everything": True, "seed": 3}
+    assert Options(**words).command("cost", "s.xml", rounds=2) == (
+        "fotismos cost s.xml --seed 3 --everything -D a=1 --image a.png --image b.png --rounds 2"
+    )
+
+
+def test_values_for_placeholders_are_refused_where_there_are_none(rgb, tmp_path):
+    script = tmp_path / "s.py"
+    script.write_text(SCRIPT, encoding="utf-8")
+    for scene in ("fig-8-9", script, spectral_scene):
+        with pytest.raises(InputError, match=r"-D foo: only Mitsuba files"):
+            open_case(scene, Options(define={"foo": 1}))
+
+
+REFUSED = [
+    ({"spp": 99999999999999}, f"spp = .* to {LARGEST_SPP}"),
+    ({"spp": 2.5}, "spp = 2.5 .*whole number"),
+    ({"spp": True}, "spp = True .*whole number"),
+    ({"tessellation": 10**8}, f"tessellation = .* to {FINEST}"),
+    ({"tessellation": 0}, "tessellation = 0"),
+    ({"seed": -1}, "seed = -1"),
+    ({"noise": float("nan")}, "noise = nan"),
+    ({"noise": float("inf")}, "noise = inf"),
+    ({"noise": 0}, "noise = 0"),
+    ({"noise": "little"}, "noise = 'little'"),
+    ({"resolution": (0, 5)}, "resolution"),
+    ({"resolution": (5,)}, "resolution"),
+    ({"pixels_per_degree": 0.5}, f"from 1 to {MOST_PIXELS:g}"),
+    ({"allow_empty": 3}, "True or False"),
+    ({"transfer": 3}, "linear, srgb"),
+    ({"image": 3}, "image = 3"),
+]
+
+
+def test_options_beyond_their_bounds_are_refused():
+    for words, message in REFUSED:
+        with pytest.raises(InputError, match=message):
+            Options(**words)
+
+
+def test_stated_options_are_read_back():
+    words = {"heuristic": "blinn", "resolution": [np.int64(3), 4], "noise": 0.5, "image": None}
+    options = Options.of(words)
+    assert options.stated() == {
+        "heuristic": "blinn", "resolution": [3, 4], "noise": 0.5, "seed": 0, "pairing": "matched"
+    }  # fmt: skip
+    assert Options.of(json.loads(json.dumps(options.stated()))) == options

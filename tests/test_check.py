@@ -1,6 +1,6 @@
 """Checks of rendered scenes: unchanged ones pass, and small changes are caught."""
 
-from dataclasses import replace
+from functools import cache
 
 import mitsuba as mi
 import numpy as np
@@ -8,11 +8,9 @@ import pytest
 from scipy import stats
 
 from comparisons.case import open_case
-from comparisons.check import baseline, check
-from comparisons.check.measurement import measure
-from comparisons.check.moved import differences, moved
-from comparisons.compare import prepare
-from comparisons.departure.spaces import DEFAULT_VIEWING
+from comparisons.check import baseline
+from comparisons.check.measurement import made_small, measure_scene
+from comparisons.check.moved import check, differences, moved
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
@@ -43,8 +41,10 @@ def box(bounces=0):
     return scene
 
 
-def measured(make, seed=0, options=SMALL):
-    return check.measure_scene(Source("scene", make), replace(options, seed=seed)).measurement
+@cache
+def measured(make, seed=0, resolution=(64, 64), spp=None):
+    options = Options(seed=seed, resolution=resolution, spp=spp)
+    return measure_scene(Source("scene", make), options).measurement
 
 
 # --- Power -----------------------------------------------------------------------------------
@@ -58,7 +58,10 @@ CHANGES = {
 
 
 @pytest.mark.guarantee("checks", "A small change is caught, whatever the seed.")
-@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[] if " 2 %" in f" {n}" else pytest.mark.thorough) for n in CHANGES],
+)
 def test_a_small_change_is_caught_with_another_seed(rgb, name):
     """In the reference, whose noise could hide it; the heuristic half has next to none."""
     before, after = CHANGES[name]
@@ -75,33 +78,30 @@ def test_what_moved_is_where_the_change_is(rgb):
         scene["sphere-3"]["bsdf"]["diffuse_reflectance"] = {"type": "rgb", "value": value}
         return scene
 
-    options = replace(SMALL, spp=64)
-    result = check.check(
-        Source("spheres", lambda: third(1.05)), options, measured(lambda: third(1), 0, options)
-    )
+    before = measured(lambda: third(1), spp=64)
+    result = check(Source("spheres", lambda: third(1.05)), SMALL.changed(spp=64), before)
     assert not result.passed
     blocks = {move.block for move in result.moved if move.block}
     assert {(2, 4), (3, 4)} <= blocks
     assert not blocks & {(1, 1), (2, 1), (1, 4), (4, 1)}
-    p = result.p_values("reference")
-    assert p[1, 3] < 0.01 < p[1, 0]
-    assert result.change("reference")[1, 3].min() > 0
+    old, new = result.blocks("reference")
+    assert (new - old)[1, 3].min() > 0
+    assert "of 16 blocks, most in row" in " ".join(result.causes())
+    assert result.objects("reference", result.now.pictures["reference"] * 0)
 
 
 # --- False alarms ----------------------------------------------------------------------------
 
 
-def pairs_of_measurements(make, resolution, count, spp=64, passes=16):
-    """Differences of two independent measurements of a scene, made once, many times over."""
-    ready = prepare(Source("scene", make), Options(resolution=resolution, spp=spp))
-    for half in (ready.heuristic, ready.reference):
-        half.spp = spp // passes
+def pairs_of_measurements(make, resolution, count, spp=64):
+    """Differences of two independent measurements of a scene, many times over."""
+    source = Source("scene", make)
     for number in range(count):
         sides = [
-            measure(ready, 2 * number * passes + shift, passes, DEFAULT_VIEWING)[0]
-            for shift in (0, passes)
+            measure_scene(source, Options(resolution=resolution, spp=spp, seed=2 * number + side))
+            for side in (0, 1)
         ]
-        yield differences(*sides)
+        yield differences(*(side.measurement for side in sides))
 
 
 def check_alarms(make, resolution, count, levels):
@@ -119,8 +119,9 @@ def check_alarms(make, resolution, count, levels):
     assert 0.02 < small / noisy < 0.08
 
 
+@pytest.mark.thorough
 def test_an_unchanged_scene_alarms_no_more_than_stated(rgb):
-    check_alarms(SCENES["plastic-spheres"].make, (16, 16), 10, (0.05,))
+    check_alarms(SCENES["plastic-spheres"].make, (16, 16), 4, (0.05,))
 
 
 @pytest.mark.guarantee(
@@ -134,8 +135,8 @@ def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):
 
 
 def test_the_same_seed_gives_the_same_numbers(rgb):
-    options = replace(SMALL, spp=32, resolution=(16, 16))
-    result = check.check(Source("box", box), options, measured(box, 0, options))
+    options = SMALL.changed(spp=32, resolution=(16, 16))
+    result = check(Source("box", box), options, measured(box, 0, (16, 16), 32))
     assert result.passed
     assert all(move.p == 1 for move in result.moves)
 
@@ -146,7 +147,7 @@ def test_the_same_seed_gives_the_same_numbers(rgb):
 @pytest.fixture(scope="module")
 def text():
     mi.set_variant("llvm_ad_rgb")
-    found = measured(SCENES["fig-8-9"].make, 0, Options(resolution=(9, 3), spp=32))
+    found = measured(SCENES["fig-8-9"].make, 0, (9, 3), 32)
     options = {"variant": "llvm_ad_rgb", "seed": 0, "resolution": [9, 3]}
     return baseline.of("fig-8-9", options, found).text()
 
@@ -154,69 +155,66 @@ def text():
 def test_a_baseline_reads_as_it_was_written(text):
     again = baseline.parse(text, "x.json")
     assert again.text() == text
-    assert again.measured().colours["reference"].blocks.shape == (3, 4, 3)
+    assert again.measured().reference.means().shape == (3, 4, 3)
     assert len(text.splitlines()) < 90
     assert max(map(len, text.splitlines())) < 110
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ('{\n  "record', "", "not JSON"),
-        ('"record_version": 2', '"record_version": 3', "version 3"),
-        ('"record_version": 2', '"format": "fotismos baseline 0"', "of fotismos 0.1"),
-        ('"passes": 16', '"passes": 1', r"`int` >= 2 - at `\$.passes`"),
-        ('"rmse"', '"rms"', "'rms' is not a metric"),
-        ('"rmse": {', '"rmse": 1, "x": {', r"`object`, got `int` - at `\$.metrics"),
-        ('"dE2000"', '"dE_ITP"', "'dE2000' is missing"),
-        ('"mean": [', '"mean": ["x", ', "length 3, got 4"),
-        ('"error": [', '"error": [-', ">= 0.0"),
-        ('"value": ', '"value": NaN, "x": ', "unknown field `x`"),
-        ('"value": ', '"value": 1e999, "noise_floor": ', "not finite"),
-        ('"scene": "fig-8-9"', '"scene": 5', "got `int` - at"),
-        ('"blocks": [', '"blocks": [[],', "x.json"),
-    ],
+REFUSED = (
+    ('{\n  "record', "", "not JSON"),
+    ('"record_version": 3', '"record_version": 9', "version 9"),
+    ('"record_version": 3', '"format": "fotismos baseline 0"', "of fotismos 0.1"),
+    ('"passes": 16', '"passes": 1', r"`int` >= 2 - at `\$.passes`"),
+    ('"rmse"', '"rms"', "'rms' is not a metric"),
+    ('"rmse": {', '"rmse": 1, "x": {', r"`object`, got `int` - at `\$.metrics"),
+    ('"dE2000"', '"dE_ITP"', "'dE2000' is missing"),
+    ('"mean": [', '"mean": ["x", ', "length 3, got 4"),
+    ('"error": [', '"error": [-', ">= 0.0"),
+    ('"value": ', '"value": NaN, "x": ', "unknown field `x`"),
+    ('"value": ', '"value": 1e999, "noise_floor": ', "not finite"),
+    ('"scene": "fig-8-9"', '"scene": 5', "got `int` - at"),
+    ('"blocks": [', '"blocks": [[],', "x.json"),
 )
-def test_a_file_that_is_no_baseline_is_refused(text, old, new, expected):
-    assert old in text
-    with pytest.raises(InputError, match=expected) as refused:
-        baseline.parse(text.replace(old, new, 1), "x.json")
-    assert str(refused.value).startswith("x.json: ")
-    assert "--update" in str(refused.value)
+
+
+def test_a_file_that_is_no_baseline_is_refused(text):
+    for old, new, expected in REFUSED:
+        assert old in text
+        with pytest.raises(InputError, match=expected) as refused:
+            baseline.parse(text.replace(old, new, 1), "x.json")
+        assert str(refused.value).startswith("x.json: ")
+        assert "--update" in str(refused.value)
+    with pytest.raises(InputError, match="array"):
+        baseline.parse("[]", "x.json")
 
 
 def test_a_baseline_of_the_version_before_is_read(text):
-    old = text.replace('"record_version": 2', '"format": "fotismos baseline 1"')
+    old = text.replace('"record_version": 3', '"format": "fotismos baseline 1"')
     assert old != text
     assert baseline.parse(old, "x.json").text() == text
 
 
 def test_a_metric_that_was_declared_later_is_not_tested(rgb):
-    options = replace(SMALL, spp=32, resolution=(16, 16))
-    before = measured(box, 0, options)
+    options = SMALL.changed(spp=32, resolution=(16, 16))
+    before = measured(box, 0, (16, 16), 32)
     names = [name for name in before.metrics if name != "dE_ITP"]
     result, whole = (
-        check.check(Source("box", box), options, known) for known in (before.of(names), before)
+        check(Source("box", box), options, known) for known in (before.of(names), before)
     )
     assert result.passed
     assert len(result.moves) == len(whole.moves) - 1
-    assert "dE_ITP" in result.after.metrics
-
-
-def test_a_list_is_no_baseline():
-    with pytest.raises(InputError, match="array"):
-        baseline.parse("[]", "x.json")
+    assert "dE_ITP" in result.now.measurement.metrics
 
 
 def test_other_blocks_are_refused(rgb):
     options = Options(resolution=(3, 3), spp=32)
-    before = measured(SCENES["fig-8-9"].make, 0, options)
+    before = measured(SCENES["fig-8-9"].make, 0, (3, 3), 32)
     with pytest.raises(InputError, match="3 by 3 blocks, but the scene 4 by 4"):
-        check.check(SCENES["fig-8-9"].source(), replace(options, resolution=(8, 8)), before)
+        check(SCENES["fig-8-9"].source(), options.changed(resolution=(8, 8)), before)
 
 
 def test_a_small_film_keeps_its_size_and_a_large_one_its_proportions(rgb):
-    assert check.made_small(open_case("narrow-band-lamp")).options.resolution == (64, 20)
+    assert made_small(open_case("narrow-band-lamp")).options.resolution == (64, 20)
     film = {"type": "hdrfilm", "width": 30, "height": 50}
     scene = {"type": "scene", "sensor": {"type": "perspective", "film": film}}
-    assert check.made_small(open_case(scene, name="small")).options.resolution == (30, 50)
+    assert made_small(open_case(scene, name="small")).options.resolution == (30, 50)

@@ -11,22 +11,29 @@ from scipy import special, stats
 
 from comparisons.check import measurement as measuring
 from comparisons.check import moved as moving
-from comparisons.check.measurement import Colours, Measurement, Metric, measurement
+from comparisons.check.measurement import Block, Half, Measurement, MetricAmount, measurement
+from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import METRICS, RATIO
-from comparisons.departure.spaces import DEFAULT_VIEWING
 
 PASSES = 16
+
+
+def half(mean, error):
+    """Colours (51,) of a half: the whole image's, then those of 4 by 4 blocks."""
+    rows = np.stack([mean, error])[:, 3:].reshape(2, 4, 4, 3)
+    blocks = [[Block(mean=tuple(m), error=tuple(e)) for m, e in zip(*row, strict=True)]
+              for row in zip(*rows.tolist(), strict=True)]  # fmt: skip
+    return Half(mean=tuple(mean[:3]), error=tuple(error[:3]), blocks=tuple(map(tuple, blocks)))
 
 
 def measured(passes):
     """A measurement of drawn passes (n, 102), as if they were colours; metrics are 0."""
     mean, error = passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
-    halves = [
-        Colours(m[:3], e[:3], m[3:].reshape(4, 4, 3), e[3:].reshape(4, 4, 3))
-        for m, e in zip(mean.reshape(2, 51), error.reshape(2, 51), strict=True)
-    ]
-    metrics = {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
-    return Measurement(len(passes), metrics, dict(zip(measuring.HALVES, halves, strict=True)))
+    halves = [half(*one) for one in zip(mean.reshape(2, 51), error.reshape(2, 51), strict=True)]
+    nothing = MetricAmount(value=0.0, error=0.0, noise_floor=0.0)
+    metrics = dict.fromkeys((*METRICS, RATIO.name), nothing)
+    colours = dict(zip(measuring.HALVES, halves, strict=True))
+    return Measurement(passes=len(passes), metrics=metrics, **colours)
 
 
 def normal(rng):
@@ -80,13 +87,23 @@ def test_a_change_of_noise_alone_alarms_no_more_than_stated():
     assert sum(noisier) <= bounds(1000, 0.01)[1]
 
 
+def with_errors(side, factor):
+    """The same with all errors multiplied."""
+
+    def scaled(one):
+        return structs.replace(one, error=tuple(factor * error for error in one.error))
+
+    halves = {name: getattr(side, name) for name in measuring.HALVES}
+    return structs.replace(side, **{
+        name: structs.replace(scaled(one), blocks=tuple(tuple(map(scaled, row))
+                                                        for row in one.blocks))
+        for name, one in halves.items()
+    })  # fmt: skip
+
+
 def one_sided(before, after):
     """The baseline's own doubt forgotten."""
-    exact = Measurement(before.passes, before.metrics, {
-        half: Colours(c.whole, 0 * c.whole_error, c.blocks, 0 * c.blocks_error)
-        for half, c in before.colours.items()
-    })  # fmt: skip
-    return moving.differences(exact, after)
+    return moving.differences(with_errors(before, 0), after)
 
 
 def normal_not_t(before, after):
@@ -106,14 +123,7 @@ def uncorrected(before, after):
 
 def standard_deviations(before, after):
     """The spread of passes taken for the error of their mean: nothing is ever seen."""
-    wide = [
-        Measurement(side.passes, side.metrics, {
-            half: Colours(c.whole, 4 * c.whole_error, c.blocks, 4 * c.blocks_error)
-            for half, c in side.colours.items()
-        })
-        for side in (before, after)
-    ]  # fmt: skip
-    return moving.differences(*wide)
+    return moving.differences(with_errors(before, 4), with_errors(after, 4))
 
 
 @pytest.mark.parametrize(
@@ -177,10 +187,12 @@ def test_noise_on_one_side_alone_is_that_sides_test():
 
 
 def test_the_surest_of_the_widest_comes_first():
-    before, after = exact(1.0), exact(1.0)
-    after.colours["reference"].blocks[1, 2, 0] = 1.5
-    after.colours["reference"].whole[1] = 1.1
-    after.metrics["rmse"] = Metric(0.1, 0.0, 0.0)
+    before = exact(1.0)
+    mean = np.ones(51)
+    mean[[1, 3 + 3 * (1 * 4 + 2)]] = 1.1, 1.5  # green, and red of block 2,3
+    rmse = MetricAmount(value=0.1, error=0.0, noise_floor=0.0)
+    after = structs.replace(before, reference=half(mean, np.zeros(51)),
+                            metrics=before.metrics | {"rmse": rmse})  # fmt: skip
     names = [move.quantity for move in moving.moved(moving.differences(before, after))]
     assert names == ["rmse", "reference G", "reference R, block 2,3"]
 
@@ -191,8 +203,8 @@ def test_the_surest_of_the_widest_comes_first():
 def test_jackknife_errors_are_those_of_metrics_drawn_again():
     """The spread of a metric over independent measurements is the error that each reports."""
     rng = np.random.default_rng(6)
-    truth = rng.uniform(0.2, 0.6, (2, 16, 16, 3))
-    counted = np.ones((16, 16), bool)
+    truth = rng.uniform(0.2, 0.6, (2, 8, 8, 3))
+    counted = np.ones((8, 8), bool)
     drawn = [
         measurement(
             truth + 0.05 * rng.normal(size=(PASSES, *truth.shape)), counted, DEFAULT_VIEWING

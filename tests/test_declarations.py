@@ -20,16 +20,15 @@ from scipy.ndimage import uniform_filter
 
 from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences
-from comparisons.cost.rungs import RUNGS, Physical, Rung
-from comparisons.departure.metric import Metric, declare
-from comparisons.departure.metrics import BUILT_IN, METRICS
-from comparisons.departure.spaces import DEFAULT_VIEWING, Viewing
-from comparisons.fit.summary import departure
-from comparisons.study import columns
+from comparisons.cost import methods
+from comparisons.cost.cost_record import Method
+from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+from comparisons.departure.metrics import METRICS, Metric, declare
+from comparisons.fit.fit import departures
+from comparisons.study import dataset
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import HEURISTICS, Heuristic
-from reference.effects.obstacles import OCCLUSION
 from tests.schemas import schema
 from tests.small_scene import PLAIN
 
@@ -59,7 +58,7 @@ BLURRED = Metric(
 def metric():
     """The toy, declared."""
     yield declare(BLURRED)
-    METRICS._others.pop(BLURRED.name)
+    METRICS.added.pop(BLURRED.name)
 
 
 @pytest.fixture
@@ -115,7 +114,7 @@ def test_a_metric_from_outside_is_in_the_record_and_the_exr(results):
 
 def test_a_metric_from_outside_is_in_the_tables(results):
     rows = list(csv.DictReader(StringIO((results / "tables/metrics.csv").read_text("utf-8"))))
-    assert [row["metric"] for row in rows] == [*BUILT_IN, "blurred"]
+    assert [row["metric"] for row in rows] == [*METRICS.built_in, "blurred"]
     assert float(rows[-1]["mean"]) > 0
     assert float(rows[-1]["visible.0.25"]) >= 0
     assert "| Blurred <difference> |" in (results / "tables/metrics.md").read_text("utf-8")
@@ -128,12 +127,10 @@ def test_a_metric_from_outside_is_on_the_page_and_in_its_viewer(results):
     maps = {one["name"]: one for one in json.loads(data)["maps"]}
     assert maps["blurred"]["kind"] == "error"
     assert maps["blurred"]["top"] == 0.5
-    assert scene["keys"]["blurred"] > 0
     assert "blurred" in {plane["name"] for plane in scene["images"]["planes"]}
     label = "Blurred &lt;difference&gt;"
     for place in (
-        '<option value="blurred">',  # to sort by
-        f'data-sort="blurred">{label},<br>mean',  # the overview's column
+        '<option value="blurred">',  # the viewer's choice of maps
         f"<dt>{label}</dt>",  # how to read it
         "It is a toy.",
         f'<th scope="row">{label}</th>',  # the scene's numbers
@@ -151,23 +148,21 @@ def test_a_metric_from_outside_is_measured_by_checks_which_read_older_baselines(
     expected = blurred(*images.mean(axis=0), DEFAULT_VIEWING).mean()
     assert found.metrics["blurred"].value == pytest.approx(expected)
     assert found.metrics["blurred"].error > 0
-    (quantity,) = (one for one in found.quantities() if one.name == "blurred")
-    assert quantity.rounding == 0.125
-    older = found.of(BUILT_IN)
+    older = found.of(METRICS.built_in)
     names = {move.quantity for move in differences(older, found.of(older.metrics))}
     assert "blurred" not in names
-    assert set(BUILT_IN) < names
+    assert set(METRICS.built_in) < names
 
 
 def test_a_metric_from_outside_is_in_fits_and_studies(metric):
     rng = np.random.default_rng(0)
     before, after, reference = rng.random((3, 8, 8, 3))
     counted = np.ones((8, 8), bool)
-    data, maps = departure(before, after, reference, counted, 0 * after, DEFAULT_VIEWING)
+    data, maps = departures(before, after, reference, counted, 0 * after, DEFAULT_VIEWING)
     expected = blurred(after, reference, DEFAULT_VIEWING)
     np.testing.assert_array_equal(maps["blurred"], expected)
     assert data["blurred"].after == expected.mean()
-    assert columns.results()["blurred"].meaning == "Blurred <difference>, mean"
+    assert dataset.results()["blurred"][1] == "Blurred <difference>, mean"
 
 
 def test_a_metric_of_neighbourhoods_sees_the_whole_image(metric):
@@ -185,7 +180,7 @@ def test_a_metric_of_neighbourhoods_sees_the_whole_image(metric):
 def test_a_name_that_is_taken_or_unfit_is_refused(name):
     with pytest.raises(InputError, match="name"):
         declare(replace(BLURRED, name=name))
-    assert list(METRICS) == list(BUILT_IN)
+    assert list(METRICS) == list(METRICS.built_in)
 
 
 def test_a_metric_without_a_function_says_so_when_it_is_used():
@@ -201,13 +196,13 @@ def test_metrics_of_installed_packages_are_declared(monkeypatch):
     monkeypatch.setattr(
         "heuristic.declared.entry_points", lambda group: [Point()] * (group == METRICS.group)
     )
-    monkeypatch.setattr(METRICS, "_others", {})
-    monkeypatch.setattr(METRICS, "_loaded", False)
+    monkeypatch.setattr(METRICS, "added", {})
+    monkeypatch.setattr(METRICS, "is_loaded", False)
     assert METRICS["blurred"] is BLURRED
-    assert list(METRICS) == [*BUILT_IN, "blurred"]
+    assert list(METRICS) == [*METRICS.built_in, "blurred"]
 
 
-# -- A metric, a rung and a heuristic in one run ------------------------------------------------
+# -- A metric, a method and a heuristic in one run ----------------------------------------------
 
 
 def flat_tone(point):
@@ -220,14 +215,15 @@ def flat_tone(point):
 
 
 TONE = Heuristic("flat-tone", flat_tone, "Flat <tone>")
-NO_SHADOWS = Rung("no <shadows>", "physical", Physical(frozenset({OCCLUSION}), max_depth=2))
+NO_SHADOWS = Method(name="no <shadows>", family="physical", without=("occlusion",), max_depth=2)
 
 
 @pytest.fixture
 def all_three(metric, monkeypatch):
-    """A metric, a rung and a heuristic, declared and taken back."""
-    for registry, toy in ((RUNGS, NO_SHADOWS), (HEURISTICS, TONE)):
-        monkeypatch.setitem(registry._others, toy.name, toy)
+    """A metric, a method and a heuristic, declared and taken back."""
+    monkeypatch.setattr(methods, "_DECLARED", {})
+    methods.declare(NO_SHADOWS)
+    monkeypatch.setitem(HEURISTICS.added, TONE.name, TONE)
 
 
 def test_all_three_are_in_json_tables_page_and_chart(all_three, run, scene_file, tmp_path):
@@ -245,10 +241,10 @@ def test_all_three_are_in_json_tables_page_and_chart(all_three, run, scene_file,
         jsonschema.validate(record, schema(name))
         assert record["heuristic"] == "flat-tone"
     assert compared["metrics"]["blurred"]["mean"] > 0
-    rungs = {rung["name"]: rung for rung in priced["rungs"]}
-    assert rungs["no <shadows>"]["family"] == "physical"
-    assert "Phong kernel: Flat <tone>" in rungs
-    assert {point["rung"] for point in priced["points"]} == set(rungs)
+    measured = {method["name"]: method for method in priced["methods"]}
+    assert measured["no <shadows>"]["family"] == "physical"
+    assert "Phong kernel: Flat <tone>" in measured
+    assert {point["method"] for point in priced["points"]} == set(measured)
     chart = (place / "cost.svg").read_text(encoding="utf-8")
     page = (out / "index.html").read_text(encoding="utf-8")
     for text in (chart, page):

@@ -1,7 +1,5 @@
 """Heuristics declared from outside the package: shading, records, parameters, messages."""
 
-import json
-import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,20 +8,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.cost.ladder import Distinct, shaded_by
-from comparisons.cost.rungs import DIRECT, FULL_PLAN, KERNELS
+from comparisons.cost.methods import FULL_PLAN, KERNELS, shaded_by
 from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from heuristic import Material, heuristics, meshes, shading
+from heuristic import kernel, meshes
+from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import BLINN, HEURISTICS, PHONG, Heuristic, Parameter, declare, named
-from heuristic.interpolation import Interpolation
-from heuristic.mesh_shading import shading_points
-from heuristic.plugins import integrator
 from heuristic.points import Point
 from reference.pairing import halves
 from reference.rendering.renderer import Renderer
-from reports.run.kept import key_of
 from tests import checks, oracle
 
 
@@ -83,7 +76,7 @@ DECLARED = {
 @pytest.fixture
 def declared(monkeypatch):
     """The toys are known while a test runs."""
-    monkeypatch.setattr(HEURISTICS, "_others", {})
+    monkeypatch.setattr(HEURISTICS, "added", {})
     for heuristic in DECLARED.values():
         declare(heuristic)
 
@@ -160,40 +153,34 @@ def check(name, **parameters):
     oracle.require_close(colour[hit], expected, absolute=3e-6, where=~edge)
 
 
-@pytest.mark.parametrize("name", ["toon", "wrapped"])
-def test_a_heuristic_from_outside_is_rendered_as_it_says(rgb, declared, name):
-    check(name)
-
-
-@pytest.mark.parametrize(
-    ("name", "parameters"), [("toon", {"steps": 5.0, "outline": 0.0}), ("wrapped", {"wrap": 1.0})]
-)
-def test_parameters_are_those_of_the_integrator(rgb, declared, name, parameters):
-    check(name, **parameters)
-
-
-@pytest.mark.parametrize("name", ["wrapped"])
-def test_a_wrong_order_of_lights_is_found_out(rgb, declared, monkeypatch, name):
-    right = Point.lights.func
-    monkeypatch.setattr(Point, "lights", property(lambda point: right(point)[::-1]))
-    with pytest.raises(AssertionError, match="values are off"):
+def test_a_heuristic_from_outside_is_rendered_as_it_says(rgb, declared):
+    for name in ("toon", "wrapped"):
         check(name)
+    check("toon", steps=5.0, outline=0.0)
+    check("wrapped", wrap=1.0)
+    for value in (1.5, -0.1, float("nan")):
+        with pytest.raises(Exception, match=r"wrap = .* is not allowed: give a value from 0 to 1"):
+            mi.load_dict({"type": "heuristic", "model": "wrapped", "wrap": value})
 
 
-@pytest.mark.parametrize("name", ["toon", "wrapped"])
-def test_swapped_intensities_are_found_out(rgb, declared, monkeypatch, name):
+def test_a_wrong_order_of_lights_or_intensities_is_found_out(rgb, declared, monkeypatch):
     right = Point.lights.func
 
-    def wrong(point):
+    def swapped(point):
         lights = right(point)
         return tuple(
             replace(light, intensity=lights[place - 1].intensity)
             for place, light in enumerate(lights)
         )
 
-    monkeypatch.setattr(Point, "lights", property(wrong))
-    with pytest.raises(AssertionError, match="values are off"):
-        check(name)
+    for name, wrong in (
+        ("wrapped", lambda point: right(point)[::-1]),
+        ("wrapped", swapped),
+        ("toon", swapped),
+    ):
+        monkeypatch.setattr(Point, "lights", property(wrong))
+        with pytest.raises(AssertionError, match="values are off"):
+            check(name)
 
 
 # --- The built-in ones ---------------------------------------------------------------------------
@@ -216,7 +203,7 @@ def test_phong_is_the_kernel_itself(rgb, monkeypatch, interpolation):
         given = {name: value for name, value in given.items() if name != "sphere"} | {"mesh": mesh}
     loaded = mi.load_dict(given, optimize=False)
     image, hashes = kernels(loaded)
-    monkeypatch.setattr(Heuristic, "evaluate", lambda self, given, *_: shading.shade(*given))
+    monkeypatch.setattr(Heuristic, "evaluate", lambda self, given, *_: kernel.shade(*given))
     bare, bare_hashes = kernels(loaded)
     np.testing.assert_array_equal(image, bare)
     assert image.max() > 0.1
@@ -234,47 +221,20 @@ def with_form(form, model, normalised=False):
     return given | {"sphere": given["sphere"] | {"bsdf": bsdf}, "small": small}
 
 
-@pytest.mark.parametrize("normalised", [False, True])
-@pytest.mark.parametrize("alone", [False, True])
-def test_blinn_is_the_blinn_lobe_whatever_the_material_says(rgb, alone, normalised):
-    found, expected, other = (
-        with_form(form, model, normalised)
-        for form, model in (("phong", "blinn"), ("blinn", "phong"), ("phong", "phong"))
-    )
-    if alone:
-        for given in (found, expected, other):
-            del given["small"]
-    found, expected, other = (
-        checks.render(checks.with_film(given, 48, 4), 4, 1) for given in (found, expected, other)
-    )
-    np.testing.assert_array_equal(found, expected)
-    assert abs(found - other).max() > 0.05
+def test_blinn_is_the_blinn_lobe_whatever_the_material_says(rgb):
+    for normalised, alone in ((False, False), (True, False), (True, True)):
+        images = []
+        for form, model in (("phong", "blinn"), ("blinn", "phong"), ("phong", "phong")):
+            given = with_form(form, model, normalised)
+            if alone:
+                del given["small"]
+            images.append(checks.render(checks.with_film(given, 48, 4), 4, 1))
+        found, expected, other = images
+        np.testing.assert_array_equal(found, expected)
+        assert abs(found - other).max() > 0.05
 
 
 # --- What a declaration owns ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("interpolation", [Interpolation.FLAT, Interpolation.GOURAUD])
-def test_vertices_and_faces_are_shaded_by_the_heuristic(rgb, declared, interpolation):
-    given = checks.with_film(scene("wrapped", interpolation=interpolation.value), 16, 1)
-    sphere = given.pop("sphere")
-    given["mesh"] = meshes.to_mesh(mi.load_dict(sphere), 4)
-    loaded = mi.load_dict(given, optimize=False)
-    assert np.array(mi.render(loaded, spp=1)).max() > 0.1
-    (mesh,) = loaded.shapes()
-    at = shading_points(mesh, interpolation)
-    name = "face_heuristic" if interpolation is Interpolation.FLAT else "vertex_heuristic"
-    stored = np.array(mesh.attribute_buffer(name)).reshape(-1, 3)
-    material, lights, ambient, viewer = checks.described(given | {"sphere": sphere})
-    p, n = np.array(at.p, float).T, np.array(at.n, float).T
-    expected, _ = wrapped_expected(p, n, viewer - p, material, lights, ambient)
-    oracle.require_close(stored, expected, absolute=3e-6)
-
-
-def test_a_spectral_variant_shades_at_the_corners(spectral, declared):
-    given = checks.with_film(scene("wrapped", interpolation="gouraud"), 16, 4)
-    given["mesh"] = meshes.to_mesh(mi.load_dict(given.pop("sphere")), 4)
-    assert checks.render(given, 4, 1).max() > 0.1
 
 
 def test_what_is_prepared_is_prepared_once_for_a_scene(rgb, declared):
@@ -287,28 +247,6 @@ def test_what_is_prepared_is_prepared_once_for_a_scene(rgb, declared):
     second = mi.load_dict(given | {"ball": {"type": "sphere", "bsdf": given["sphere"]["bsdf"]}})
     assert np.array(mi.render(second, integrator=first.integrator(), spp=1)).max() == 2
     assert PREPARED == [1, 2]
-
-
-def test_the_materials_of_a_scene_are_found_once(rgb, monkeypatch):
-    """What is clear, two-sided and mapped is asked for in turn, layer by layer."""
-    found = []
-
-    class Counted(integrator.SceneMaterials):
-        def __init__(self, scene, *options):
-            found.append(scene.shapes()[0])
-            super().__init__(scene, *options)
-
-    monkeypatch.setattr(integrator, "SceneMaterials", Counted)
-    glass = {"type": "phong", "k_d": 0.2, "transmittance": 0.5, "twosided": True}
-    given = checks.with_film(scene("phong"), 8, 1)
-    given["pane"] = {"type": "rectangle", "bsdf": glass}
-    made = mi.load_dict(given)
-    for seed in range(2):
-        mi.render(made, spp=1, seed=seed)
-    assert len(found) == 1
-    other = mi.load_dict(given)
-    mi.render(other, integrator=made.integrator(), spp=1)
-    assert len(found) == 2
 
 
 def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):
@@ -339,21 +277,15 @@ def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):
     assert sorted(set(np.unique(image))) == [0.0, 0.375]
 
 
-@pytest.mark.parametrize(
-    ("shade", "missing"),
-    [(lambda point: point.uv.x, "uv"), (lambda point: point.lights[0].visible(), "visible")],
-)
-def test_what_is_not_declared_to_be_needed_cannot_be_read(rgb, declared, shade, missing):
-    declare(Heuristic("hasty", shade, needs={"position", "lights"}))
-    loaded = mi.load_dict(checks.with_film(scene("hasty"), 8, 1), optimize=False)
-    with pytest.raises(InputError, match=f"'{missing}' is read, but not declared"):
-        Renderer(loaded, None, 1, "image").render(0)
-
-
-def test_the_material_is_that_of_a_plain_lobe(rgb):
-    given = heuristics.Given(0, 0, 0, Material(k_s=0.5, n=10, normalised=True), [])
-    point = Point(frozenset({"material"}), given, None, SimpleNamespace())
-    assert (point.material.k_s, point.material.normalised) == (3.0, False)
+def test_what_is_not_declared_to_be_needed_cannot_be_read(rgb, declared):
+    for shade, missing in (
+        (lambda point: point.uv.x, "uv"),
+        (lambda point: point.lights[0].visible(), "visible"),
+    ):
+        declare(Heuristic("hasty", shade, needs={"position", "lights"}))
+        loaded = mi.load_dict(checks.with_film(scene("hasty"), 8, 1), optimize=False)
+        with pytest.raises(InputError, match=f"'{missing}' is read, but not declared"):
+            Renderer(loaded, None, 1, "image").render(0)
 
 
 def test_parameters_can_be_edited_without_a_new_kernel(rgb, declared):
@@ -373,15 +305,8 @@ def test_parameters_can_be_edited_without_a_new_kernel(rgb, declared):
 # --- Messages ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["fong", ""])
-def test_an_unknown_name_lists_what_there_is(name):
-    with pytest.raises(InputError, match=r"not declared: choose one of .*blinn, .*phong"):
-        Options(heuristic=name)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
+def test_a_wrong_declaration_is_refused():
+    for make, message in (
         (lambda: Heuristic("My toon", toon), "'My toon': a name has lower-case"),
         (lambda: Heuristic("a", toon, needs={"depth"}), "needs depth: choose from position"),
         (lambda: Heuristic("a", toon, form="ward"), "'ward' is not known"),
@@ -390,90 +315,39 @@ def test_an_unknown_name_lists_what_there_is(name):
         (lambda: Parameter("two words", 0, 0, 1), "'two words' is not allowed"),
         (lambda: Parameter("x", 2, 0, 1), "x = 2 is not allowed: give a value from 0 to 1"),
         (lambda: declare(Heuristic("phong", toon)), "'phong' is already declared"),
-    ],
-)
-def test_a_wrong_declaration_is_refused(make, message):
-    with pytest.raises(InputError, match=message):
-        make()
+        (lambda: named("fong"), "not declared: choose one of .*blinn, .*phong"),
+        (lambda: named(""), "not declared: choose one of .*blinn, .*phong"),
+    ):
+        with pytest.raises(InputError, match=message):
+            make()
 
 
-@pytest.mark.parametrize("value", [1.5, -0.1, float("nan")])
-def test_a_parameter_out_of_bounds_is_refused(rgb, declared, value):
-    with pytest.raises(Exception, match=r"wrap = .* is not allowed: give a value from 0 to 1"):
-        mi.load_dict({"type": "heuristic", "model": "wrapped", "wrap": value})
-
-
-def test_a_package_declares_its_own_by_an_entry_point(declared, monkeypatch):
-    here = __name__.rpartition(".")[2]
-    entries = [SimpleNamespace(name="late", value=f"{here}:LATE", load=lambda: late)]
-    late = Heuristic("late", toon)
-    monkeypatch.setattr("heuristic.declared.entry_points", lambda group: entries)
-    monkeypatch.setattr(HEURISTICS, "_loaded", False)
-    assert named("late") is late
-    entries[0].load = lambda: 1 / 0
-    monkeypatch.setattr(HEURISTICS, "_loaded", False)
-    with pytest.raises(InputError, match=r"late: the entry point .*division by zero"):
-        named("other")
+def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
+    loads, late = [], Heuristic("late", toon)
+    entry = SimpleNamespace(name="late", value="package:LATE", load=lambda: loads.append(1) or late)
+    monkeypatch.setattr("heuristic.declared.entry_points", lambda group: [entry])
+    registry = Declared("heuristic", "fotismos.toys", phong="heuristic.heuristics:PHONG")
+    assert (registry["phong"], loads) == (PHONG, [])
+    mine = registry.declare(Heuristic("mine", toon))
+    assert list(registry) == ["phong", "mine", "late"]
+    assert (len(registry), "none" in registry, loads) == (3, False, [1])
+    assert registry.built_in == ("phong",)
+    assert (registry.is_own(PHONG), registry.is_own(mine)) == (True, False)
+    again = registry.declare(Heuristic("mine", wrapped))
+    assert registry["mine"] is again
+    entry.load = lambda: 1 / 0
+    with pytest.raises(InputError, match=r"late: the entry point package:LATE .*division by zero"):
+        Declared("heuristic", "fotismos.toys").get("other")
 
 
 # --- Along the way to the page --------------------------------------------------------------------
 
 
-def test_the_record_the_page_and_the_terminal_name_it(run, declared, tmp_path, scene_file):
-    words = ("compare", scene_file, "--spp", 4, "--heuristic", "toon")
-    code, said, _ = run(*words, "-o", tmp_path / "out")
-    assert code == 0
-    (path,) = (tmp_path / "out").glob("*/comparison.json")
-    record = json.loads(path.read_text(encoding="utf-8"))
-    assert record["heuristic"] == "toon"
-    assert "--heuristic toon" in record["command"]
-    assert "heuristic toon" in said
-    page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
-    assert "Shaded by the heuristic <strong>toon</strong>" in page
-
-
-def test_the_command_refuses_an_unknown_one(run, tmp_path):
-    code, _, said = run("compare", "fig-8-9", "--heuristic", "fong", "-o", tmp_path / "out")
-    assert code == 2
-    words = " ".join(said.split())
-    assert re.search(r"'fong' is not declared: choose one of .*blinn, .*phong", words)
-
-
-def test_its_picture_is_another_one_than_that_of_phong(rgb, declared):
-    from comparisons.compare import prepare
-
-    source = SCENES["fig-8-9"].source()
-    images = {
-        name: np.array(
-            prepare(source, Options(resolution=(24, 24), spp=4, heuristic=name)).heuristic.render(0)
-        )
-        for name in ("phong", "blinn", "toon")
-    }
-    assert abs(images["phong"] - images["toon"]).max() > 0.05
-    assert abs(images["phong"] - images["blinn"]).max() > 0.05
-
-
-def test_finished_results_are_those_of_one_heuristic_and_its_code(rgb, declared, monkeypatch):
-    source = SCENES["fig-8-9"].source()
-    keys = [key_of(source, Options(heuristic=h), "v", {}) for h in ("phong", "toon", "toon")]
-    monkeypatch.setattr(Heuristic, "digest", lambda self: "edited")
-    keys.append(key_of(source, Options(heuristic="toon"), "v", {}))
-    assert keys[1] == keys[2]
-    assert len(set(keys)) == 3
-
-
-def test_rungs_of_the_kernel_say_its_label(declared):
-    kernel = Distinct((KERNELS[2], KERNELS[3]), KERNELS[2].method, False)
+def test_methods_of_the_kernel_say_its_label(declared):
+    kernel = KERNELS[2]
     assert shaded_by(PHONG, kernel) is kernel
     assert shaded_by(BLINN, kernel).name == "Phong kernel: Blinn"
-    full = Distinct((DIRECT, FULL_PLAN), FULL_PLAN.method, True)
-    assert shaded_by(DECLARED["toon"], full) is full
-
-
-def test_a_fit_refuses_other_heuristics(run):
-    code, _, said = run("fit", "fig-8-9", "--heuristic", "blinn")
-    assert code == 2
-    assert "heuristic blinn cannot be fitted" in " ".join(said.split())
+    assert shaded_by(DECLARED["toon"], FULL_PLAN) is FULL_PLAN
 
 
 def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):

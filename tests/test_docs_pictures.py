@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 
 from reports import verdict
-from reports.charts import term_figure
 from tests.programs import ROOT
 
 
@@ -22,7 +21,7 @@ def docs(monkeypatch):
 @pytest.fixture
 def hero(docs):
     module = docs("hero")
-    parts = (verdict.Part("shadows", "#0072b2", 6.0), verdict.Part("Fresnel", "#e69f00", 2.0))
+    parts = (verdict.BarPart("shadows", "#0072b2", 6.0), verdict.BarPart("Fresnel", "#e69f00", 2.0))
     found = verdict.Finding("box", 8.0, {1.0: 0.9, 2.0: 0.75, 5.0: 0.5}, parts, {}, False)
     pictures = {name: Image.new("RGB", (8, 8)) for name in module.PANELS}
     return module, module.Hero(pictures, found, "./run compare box")
@@ -60,7 +59,7 @@ def test_the_readme_shows_the_picture_with_the_command_that_makes_its_numbers(do
 
 def test_the_lobes_are_those_of_the_equations(rgb, docs):
     module = docs("model_figures")
-    views = np.radians(term_figure.VIEWS)
+    views = np.radians(module.VIEWS)
     light = np.radians(module.INCIDENCE)
     reflected = np.maximum(np.cos(views - light), 0)
     assert np.allclose(module.seen(50.0, k_d=1.0), np.cos(light), atol=1e-6)

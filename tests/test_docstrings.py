@@ -38,8 +38,7 @@ SHOWN_BY_EXAMPLE = (
     *(terms.normalisation, terms.spot_falloff),
     *(factors.alpha_of, factors.exponent_of, factors.specular_albedo),
     *(factors.to_roughplastic, factors.to_phong),
-    *(metrics.delta_e_2000, metrics.delta_e_itp, metrics.delta_e_cam16ucs),
-    *(metrics.rmse, metrics.log2_luminance_ratio),
+    *(metrics.delta_e_2000, metrics.log2_luminance_ratio),
 )
 
 

@@ -3,13 +3,16 @@
 The quadrature shares neither code nor nodes with the audit, and evaluates f, not pi f cos.
 """
 
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from comparisons.audit import angles
-from comparisons.audit.shaded import opened
+from comparisons.audit import furnace
+from comparisons.audit.subjects import ShadingSubject
+from heuristic import heuristics
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 DIELECTRIC = 0.04
@@ -77,6 +80,11 @@ FORMS = {
 }
 
 
+def exchanged(f):
+    """Return a form with light and viewer exchanged."""
+    return lambda view, light, half: f(light, view, half)
+
+
 def integral(f, degrees):
     """``int f(fixed, o) cos o do`` over the hemisphere: Gauss and Legendre, and trapezoids."""
     nodes, weights = np.polynomial.legendre.leggauss(192)
@@ -92,23 +100,15 @@ def integral(f, degrees):
     return (f(fixed, over, half) * z).mean(axis=1) @ weights * 2 * np.pi
 
 
-@pytest.mark.parametrize("kind", ["glossy", "metal"])
-@pytest.mark.parametrize("name", FORMS)
-def test_albedos_are_those_of_an_independent_quadrature(rgb, name, kind):
-    subject = opened(str(SHADERS / name), {})
-    subject.grid = GRID
-    f0, base = (1.0, 0.0) if kind == "metal" else (DIELECTRIC, 1.0)
-    for alpha in (0.3, 1.0):
-        curve = angles.curve(subject, f"{kind}, alpha {alpha:g}")
-        for degrees in (0.0, 60.0, 85.0):
-
-            def returned(light, view, half, alpha=alpha):
-                return FORMS[name](alpha, f0, base, light, view, half)
-
-            def seen(view, light, half, alpha=alpha):
-                return FORMS[name](alpha, f0, base, light, view, half)
-
-            place = angles.ANGLES.index(degrees)
-            found = curve.returned[place], curve.seen[place]
-            expected = integral(returned, degrees), integral(seen, degrees)
-            np.testing.assert_allclose(found, expected, rtol=5e-3)
+@pytest.mark.thorough
+def test_albedos_are_those_of_an_independent_quadrature(rgb):
+    for name, form in FORMS.items():
+        subject = ShadingSubject(heuristics.named(str(SHADERS / name)), {})
+        for kind, alpha in product(("glossy", "metal"), (0.3, 1.0)):
+            f0, base = (1.0, 0.0) if kind == "metal" else (DIELECTRIC, 1.0)
+            response = partial(subject.response, f"{kind}, alpha {alpha:g}")
+            for degrees in (0.0, 60.0, 85.0):
+                reflected = partial(form, alpha, f0, base)
+                expected = integral(reflected, degrees), integral(exchanged(reflected), degrees)
+                found = [part(response, degrees, GRID) for part in (furnace.returned, furnace.seen)]
+                np.testing.assert_allclose(found, expected, rtol=5e-3, err_msg=name)

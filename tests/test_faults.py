@@ -1,96 +1,142 @@
-"""Commands that meet faults of every kind: a message and an exit code, and nothing lost."""
+"""Commands, each in a process of its own, that meet something broken or are interrupted."""
 
-import dataclasses
 import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+from random import Random
 
 import pytest
 
-from tests.faults import __main__ as faults
-from tests.faults import table, trial
-from tests.faults.fault import Fault
+from tests.outputs import results
+from tests.programs import ROOT
+from tests.small_scene import SCENE
 
-SHORT = {
-    "words": ("a scene with a typo", "--spp 'nan'", "an empty scene"),
-    "bad scenes": (
-        "radius = 'nan'", "a pipe included", "a mesh with an index beyond its points",
-        "a camera that looks away",
-    ),
-    "scripts": ("os._exit(0)", "a null pointer", "a fork that sleeps", "KeyboardInterrupt"),
-    "baselines": ("another mean", "in place of it: a pipe", "passes of -1"),
-    "disk and names": (
-        "another's page", "compare with files of 4 blocks at most",
-        "standard output full, for a list", "--junit pipe",
-    ),
-    "kept results": ("view.json is garbage", ".fotismos that is a link to a file of others"),
-    "signals": ("SIGTERM at out/.fotismos-lock", "SIGKILL to the worker"),
-    "together": ("a folder that is held, for compare", "one scene at once"),
-}  # fmt: skip
-"""Names of the faults in every run of the tests, by kind."""
+pytestmark = pytest.mark.thorough
 
-LEAST = 400
+SMALL = ("--spp", "8", "--resolution", "16x16", "-o", "out")
+COMPARE = ("compare", "a.xml", *SMALL)
+STUDY = """[[part]]
+scene = "lobe"
+[part.parameters]
+alpha = { from = 0.1, to = 0.8, steps = 9 }
+"""
+RIGHTS = "exec setpriv --bounding-set -dac_override,-dac_read_search,-fowner "
+"""Rights of files hold for root, too."""
+
+FAULTS = (
+    ("compare", ("compare", "b.xml", *SMALL), "", 2, "did you mean a.xml"),
+    ("no scene", ("compare", "text.xml", *SMALL), "", 2, "text.xml: .*not valid|XML|syntax"),
+    ("a script that exits", ("compare", "exit.py", *SMALL), "", 2, "exit.py"),
+    ("a script that is killed", ("compare", "kill.py", *SMALL), "", 1, "SIGKILL"),
+    ("no time", (*COMPARE, "--timeout", "1e-9"), "", 1, "made no progress"),
+    ("no scheduler", (*COMPARE, "--scheduler", "x"), "", 2, "scheduler"),
+    ("a file in the way", ("compare", "a.xml", "-o", "mine.txt"), "", 2, "mine.txt"),
+    ("another's folder", ("compare", "a.xml", *SMALL), "mkdir out; cp mine.txt out/index.html;", 2,
+     "not made by fotismos"),
+    ("no rights", COMPARE, f"mkdir out; chmod 555 out; {RIGHTS}", 2, "denied"),
+    ("a full disk", COMPARE, "ulimit -f 4;", 2, "File too large"),
+    ("output closed", COMPARE, "exec >&-;", None, ""),
+    ("a study of nothing", ("study", "text.xml", "-o", "out"), "", 2, "not TOML"),
+    ("a baseline of nothing", ("check", "text.json", "-o", "out"), "", 2, "not JSON"),
+    ("a current folder that is gone", ("scenes",), "mkdir x; cd x; rmdir ../x;", None, ""),
+)  # fmt: skip
+"""Name, words, what a shell does before, exit code (None: any), and what the message has."""
 
 
-def without_causes(fault):
-    """Nine tenths of a small comparison are its causes; the long form has them."""
-    more = ("--no-why",) if "compare" in fault.words[:1] else ()
-    shell = fault.shell.replace(" compare ", " compare --no-why ")
-    return dataclasses.replace(fault, words=(*fault.words, *more), shell=shell)
+def started(folder, words, shell="", mark=""):
+    """Start a command, marked so that all processes that come of it can be found."""
+    return subprocess.Popen(
+        ["sh", "-c", f'{shell} "$@"', "sh", sys.executable, "-P", "-m", "reports", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "FOTISMOS_MARK": mark},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
 
 
-def wrong(kind, chosen):
-    return list(table.failures(faults.trials([(kind, fault) for fault in chosen])))
+def orphans(mark):
+    """Return the processes that are still there after some seconds."""
+    until = time.monotonic() + 5
+    while time.monotonic() < until:
+        left = []
+        for place in Path("/proc").glob("[0-9]*"):
+            try:
+                is_zombie = (place / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
+                if mark.encode() in (place / "environ").read_bytes() and not is_zombie:
+                    left.append(place.name)
+            except (OSError, IndexError):
+                continue
+        if not left:
+            break
+        time.sleep(0.05)
+    return left
 
 
-@pytest.mark.parametrize("kind", faults.KINDS)
-def test_a_few_faults_of_each_kind(kind):
-    known = {fault.name: fault for fault in faults.of_kind(kind)}
-    assert wrong(kind, [without_causes(known[name]) for name in SHORT[kind]]) == []
+@pytest.fixture
+def folder(tmp_path):
+    boxed = SCENE.replace("</film>", '<rfilter type="box"/></film>')
+    scripts = {"exit": "import sys\nsys.exit(3)", "kill": "import os\nos.kill(os.getpid(), 9)"}
+    files = {"a.xml": boxed, "text.xml": "no scene", "text.json": "{", "mine.txt": "mine"}
+    files |= {"s.toml": STUDY} | {f"{name}.py": text for name, text in scripts.items()}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.guarantee(
+    "runs", "A fault ends with a message and an exit code: no traceback, no orphan, no file lost."
+)
+def test_each_fault_is_one_message(folder):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    for name, words, shell, code, message in FAULTS:
+        mark = uuid.uuid4().hex
+        process = started(folder, words, shell, mark)
+        printed, _ = process.communicate(timeout=120)
+        assert code in (None, process.returncode), (name, process.returncode, printed)
+        assert re.search(message, printed), (name, printed)
+        assert "Traceback" not in printed, (name, printed)
+        assert not orphans(mark), name
+        if (folder / "out").exists():
+            shutil.rmtree(folder / "out")
+        after = {path.name: path.read_bytes() for path in folder.iterdir()}
+        assert after == before, name
 
 
 @pytest.mark.guarantee(
     "runs",
-    "Of more than 400 faults, each ends with a message and an exit code: no traceback, no hang, "
-    "no silence, no orphan, and no file lost.",
+    "Ctrl-C and SIGTERM leave no orphan; the same command then gives the results of an undisturbed"
+    " run.",
 )
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", faults.KINDS)
-def test_all_faults(kind):
-    assert wrong(kind, faults.of_kind(kind)) == []
+@pytest.mark.parametrize("words", [COMPARE, ("study", "s.toml", "-o", "out")], ids=lambda w: w[0])
+def test_an_interrupted_command_goes_on(words, folder):
+    def finish():
+        begin = time.perf_counter()
+        process = started(folder, words)
+        printed, _ = process.communicate(timeout=300)
+        assert process.returncode == 0, printed
+        return results(folder / "out"), time.perf_counter() - begin
 
-
-def test_there_are_as_many_faults_as_is_said():
-    assert sum(len(faults.of_kind(kind)) for kind in faults.KINDS) > LEAST
-
-
-BAD = {
-    "a traceback": ('echo "Traceback (most recent call last)" >&2; exit 2', "has_traceback"),
-    "a hang": ("exec sleep 1000", "hangs"),
-    "a pass": ("exit 0", "is_silent"),
-    "no message": ("exit 2", "is_silent"),
-    "an orphan": ("setsid sleep 1000 >/dev/null 2>&1 & echo no such thing >&2; exit 2", "orphans"),
-    "a file lost": ("rm mine.txt; echo no such thing >&2; exit 2", "lost"),
-    "a file changed": ("echo x >>out/mine.txt; echo no such thing >&2; exit 2", "lost"),
-}
-
-
-@pytest.mark.parametrize("shell", BAD)
-def test_what_goes_wrong_is_seen(shell, monkeypatch):
-    monkeypatch.setattr(trial, "LIMIT_S", 2.0)
-    script, field = BAD[shell]
-    found = trial.run("words", Fault("it", (), "no such thing", shell=script))
-    assert getattr(found, field)
-    assert not found.is_good
-    columns = list(table.lines([found]))[2].split(" | ")[3:]
-    assert sum(int(count.strip(" |")) for count in columns) == 1
-    assert next(table.failures([found])).startswith("- words: it: ")
-
-
-def test_what_is_not_as_expected_is_seen():
-    good = Fault("it", (), "no such thing", shell="echo no such thing >&2; exit 2")
-    assert trial.run("words", good).is_good
-    for other in ({"codes": (1,)}, {"message": "another"}, {"leaves": ("page",)}):
-        found = trial.run("words", dataclasses.replace(good, **other))
-        assert not found.is_expected
-        assert not found.is_good
-    half = f"touch out/.page.{trial.atomic.HOST}.{os.getpid()}.fotismos-partial; {good.shell}"
-    assert trial.run("words", dataclasses.replace(good, shell=half)).notes
+    whole, _ = finish()
+    shutil.rmtree(folder / "out")
+    _, seconds = finish()  # its kernels are there, as for all others
+    random = Random(words[0])
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+        shutil.rmtree(folder / "out")
+        mark = uuid.uuid4().hex
+        process = started(folder, words, "exec", mark)
+        time.sleep(random.uniform(0.3, 0.9) * seconds)
+        process.send_signal(number)
+        printed, _ = process.communicate(timeout=60)
+        assert process.returncode in (0, 128 + number, -number), printed
+        assert "Traceback" not in printed or process.returncode == -number
+        assert not orphans(mark)
+        assert finish()[0] == whole

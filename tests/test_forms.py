@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.planning.forms import Form, geometries
+from reference.planning.shapes import Form, geometry
 
 pytestmark = pytest.mark.usefixtures("rgb")
 
@@ -46,7 +46,8 @@ def test_flat_shapes_look_where_mitsuba_says(kind, shear):
     ]
     shapes = [mi.load_dict(one) for one in given]
     flat = 0
-    for shape, found in zip(shapes, geometries(shapes), strict=True):
+    for shape in shapes:
+        found = geometry(shape)
         if found.form is Form.FLAT:
             flat += 1
             assert met(shape, *found.plane) @ found.plane[1] == pytest.approx(1, abs=1e-6)
@@ -61,7 +62,7 @@ def test_spheres_look_where_mitsuba_says():
         to_world = random_transform(rng)
         given = {"type": "sphere", "to_world": to_world, "flip_normals": bool(flip)}
         shape = mi.load_dict(given)
-        (found,) = geometries([shape])
+        found = geometry(shape)
         box = shape.bbox()
         centre = np.ravel(box.min + box.max) / 2
         up = np.array([0.0, 0, 1])
@@ -110,7 +111,8 @@ def rendered(mesh):
 def test_meshes_look_where_mitsuba_says(smooth, face_normals, flip):
     rng = np.random.default_rng(2)
     meshes = [random_mesh(rng, f"mesh {i}", smooth, face_normals, flip) for i in range(12)]
-    for mesh, found in zip(meshes, geometries(meshes), strict=True):
+    for mesh in meshes:
+        found = geometry(mesh)
         geometric, shading = rendered(mesh)
         if not np.allclose(geometric, shading, atol=1e-3):
             assert smooth
@@ -121,11 +123,3 @@ def test_meshes_look_where_mitsuba_says(smooth, face_normals, flip):
         corners = np.array(mesh.vertex_positions_buffer()).reshape(4, 3, 3)[:, 0]
         outwards = np.einsum("fi,fi->f", geometric, corners - centre) > 0
         assert outwards.all() if found.is_outward else not outwards.any()
-
-
-def test_meshes_of_one_size_are_judged_each_by_itself():
-    rng = np.random.default_rng(3)
-    alike = [random_mesh(rng, f"mesh {i}", None, False, i % 2 == 0) for i in range(8)]
-    alone = [geometries([mesh])[0] for mesh in alike]
-    assert geometries(alike) == alone
-    assert len({one.is_outward for one in alone}) == 2

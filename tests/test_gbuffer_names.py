@@ -22,11 +22,8 @@ def seen(near, far):
     return {name for name in gbuffer(scene, 16, 16).bsdf.names if name}
 
 
-def test_a_material_keeps_its_id(rgb):
+def test_a_material_is_named_by_its_id_or_else_after_its_shape(rgb):
     assert seen('<bsdf type="diffuse" id="a"/>', '<bsdf type="diffuse" id="b"/>') == {"a", "b"}
-
-
-def test_one_without_an_id_is_named_after_its_shape(rgb):
     none = '<bsdf type="diffuse"/>'
     assert seen(none, none) == {"material of near", "material of far"}
     assert seen('<bsdf type="diffuse" id="a"/>', none) == {"a", "material of far"}

@@ -11,15 +11,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import Request, open_case
-from comparisons.compare import compare, prepare
+from comparisons.case import open_case
+from comparisons.compare import compare
 from comparisons.fit.fit import fit
-from heuristic import program, trial
+from comparisons.options import Options
+from comparisons.prepared import prepare
+from heuristic import program, user_shaders
 from heuristic.errors import InputError, InstallationError
-from heuristic.glsl import gpu, shader_files, shader_text
-from heuristic.heuristics import Heuristic, in_file, named
+from heuristic.glsl import shader_files, shader_text
+from heuristic.heuristics import Heuristic, named
 from heuristic.points import INPUTS
-from reports.ci.baselines import options_for
 from reports.commands import doctor
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
@@ -30,25 +31,26 @@ SMALL = {"resolution": (24, 24), "spp": 8}
 def without_opengl():
     """Return why no shader can be run here; empty where one can."""
     try:
-        gpu.device()
+        shader_files.opengl()
     except InstallationError as error:
         return str(error)
     return ""
 
 
+pytestmark = pytest.mark.thorough
 MISSING = without_opengl()
 opengl = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 
 
 def image(scene, name, **more):
-    case = open_case(scene, Request(heuristic=name, **{**SMALL, **more}))
+    case = open_case(scene, Options(heuristic=name, **{**SMALL, **more}))
     return np.array(prepare(case.source, case.options).heuristic.render(3))
 
 
 def points(text, needs=INPUTS):
     """Return a shader, and the points of a trial."""
     shader = shader_files.Shader("mine.glsl", text)
-    return shader, trial._points(Heuristic("mine.glsl", shader, needs=frozenset(needs)), {})[0]
+    return shader, user_shaders.trial_points(Heuristic("mine.glsl", shader, needs=frozenset(needs)))
 
 
 def returning(expression):
@@ -63,30 +65,20 @@ def returning(expression):
     "kernel",
     "Phong's model, written in GLSL and run by OpenGL, gives the kernel's image to 1e-5.",
 )
-@pytest.mark.parametrize("scene", ["fig-8-9", "fig-8-11-n3", "cornell-box", "plastic-spheres"])
-def test_phong_in_glsl_is_phong(scene):
-    own, theirs = (image(scene, name) for name in ("phong", PHONG))
-    assert own.max() > 0.1
-    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
-
-
-@opengl
-@pytest.mark.parametrize(
-    "more",
-    [{"interpolation": "gouraud"}, {"interpolation": "flat"}, {"everything": True},
-     {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}],
-    ids=str,
-)  # fmt: skip
-def test_phong_in_glsl_is_phong_by_other_ways(more):
-    own, theirs = (image("fig-8-9", name, **more) for name in ("phong", PHONG))
-    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
-
-
-@opengl
-def test_a_wrong_shader_is_told_from_phong(written):
-    text = Path(PHONG).read_text(encoding="utf-8")
-    name = written(text.replace("2.0 * cosine", "2.02 * cosine"), "mine.glsl")
-    assert abs(image("fig-8-9", name) - image("fig-8-9", "phong")).max() > 1e-3
+def test_phong_in_glsl_is_phong():
+    spectral = {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}
+    for scene, more in (
+        ("fig-8-11-n3", {}),
+        ("cornell-box", {}),
+        ("plastic-spheres", {}),
+        ("fig-8-9", {"interpolation": "gouraud"}),
+        ("fig-8-9", {"interpolation": "flat"}),
+        ("fig-8-9", {"everything": True}),
+        ("fig-8-9", spectral),
+    ):
+        own, theirs = (image(scene, name, **more) for name in ("phong", PHONG))
+        assert own.max() > 0.1
+        np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5, err_msg=f"{scene} {more}")
 
 
 def room(lights, **bsdf):
@@ -111,28 +103,12 @@ def room(lights, **bsdf):
 
 
 @opengl
-@pytest.mark.parametrize("lights", [0, 1, shader_files.LIGHTS])
-def test_any_number_of_lights(rgb, lights):
-    own, theirs = (image(room(lights), name) for name in ("phong", PHONG))
-    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
-
-
-@opengl
-def test_more_lights_than_the_record_holds_are_refused(rgb):
+def test_any_number_of_lights(rgb):
+    for lights in (0, 1, shader_files.LIGHTS):
+        own, theirs = (image(room(lights), name) for name in ("phong", PHONG))
+        np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
     with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights; .* at most 64"):
         image(room(shader_files.LIGHTS + 1), PHONG)
-
-
-@opengl
-def test_layers_that_let_light_through(rgb):
-    """Their loop is symbolic for what Dr.Jit can record."""
-    clear = {"type": "mask", "opacity": 0.5, "bsdf": {"type": "twosided", "b": {"type": "diffuse"}}}
-    own, theirs, opaque = (
-        image(room(2, **bsdf), name)
-        for bsdf, name in ((clear, "phong"), (clear, PHONG), (clear["bsdf"], PHONG))
-    )
-    np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
-    assert abs(opaque - theirs).max() > 0.02
 
 
 @opengl
@@ -162,7 +138,7 @@ def test_shadows_are_those_of_a_heuristic_in_python(rgb, written):
 
 def shown(colour):
     """Return a Dr.Jit colour as an array (3, points of the trial)."""
-    return np.broadcast_to(np.array(colour, float).reshape(3, -1), (3, trial.POINTS))
+    return np.broadcast_to(np.array(colour, float).reshape(3, -1), (3, user_shaders.POINTS))
 
 
 FIELDS = (
@@ -178,17 +154,13 @@ FIELDS = (
 
 
 @opengl
-@pytest.mark.parametrize(("glsl", "field"), FIELDS, ids=[field for _, field in FIELDS])
-def test_each_field_arrives_as_it_is(rgb, glsl, field):
-    shader, point = points(returning(f"point.{glsl}"))
-    expected = eval(f"point.{field}", {"point": point})
-    if field == "uv":
-        expected = mi.Spectrum(expected.x, expected.y, 0.25)
-    np.testing.assert_array_equal(shown(shader(point)), shown(mi.Spectrum(expected)))
-
-
-@opengl
-def test_parallel_light_is_infinitely_far(rgb):
+def test_each_field_arrives_as_it_is(rgb):
+    for glsl, field in FIELDS:
+        shader, point = points(returning(f"point.{glsl}"))
+        expected = eval(f"point.{field}", {"point": point})
+        if field == "uv":
+            expected = mi.Spectrum(expected.x, expected.y, 0.25)
+        np.testing.assert_array_equal(shown(shader(point)), shown(mi.Spectrum(expected)), field)
     shader, point = points(returning("isinf(point.lights[1].distance) ? 1.0 : 0.0"))
     assert np.all(shown(shader(point)) == 1)
 
@@ -199,7 +171,7 @@ def test_points_are_shaded_in_portions(rgb, monkeypatch):
     whole = shown(shader(point))
     monkeypatch.setattr(shader_files, "POINTS", 100)
     np.testing.assert_array_equal(shown(shader(point)), whole)
-    assert len(np.unique(whole)) > trial.POINTS
+    assert len(np.unique(whole)) > user_shaders.POINTS
 
 
 @opengl
@@ -210,23 +182,6 @@ def test_only_what_is_read_is_needed(written):
     ))  # fmt: skip
     assert found.needs == {"material"}
     assert found.reads == ("material", "material.k_d")
-
-
-@opengl
-def test_a_changed_file_is_read_again(written):
-    name = written(returning("0.25"), "mine.glsl")
-    first = named(name)
-    assert named(name) is first
-    written(returning("0.5"), "mine.glsl")
-    assert named(name).code != first.code
-    assert image("fig-8-9", name).max() == pytest.approx(0.5)
-
-
-def test_a_path_stays_with_its_baseline(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert in_file("shaders/mine.glsl") == ("shaders/mine.glsl", "")
-    placed = options_for({"heuristic": "shaders/mine.glsl"}, tmp_path / "baselines/one.json")
-    assert placed == {"heuristic": "../shaders/mine.glsl"}
 
 
 # --- Mistakes ------------------------------------------------------------------------------------
@@ -263,10 +218,12 @@ MISTAKES = {
 
 
 @opengl
-@pytest.mark.parametrize(("text", "message"), MISTAKES.values(), ids=MISTAKES)
-def test_a_mistake_is_told_by_its_line(written, text, message):
-    with pytest.raises(InputError, match=rf"(?s){message}"):
-        named(written(text, "mine.glsl"))
+def test_a_mistake_is_named_by_its_line(written):
+    lines = "uniform float wrap;", "uniform vec3 tint = vec3(1); // 0 to 1"
+    uniforms = [(f"{line}\n{returning('0.5')}", "line 1: a uniform is a") for line in lines]
+    for text, message in (*MISTAKES.values(), *uniforms):
+        with pytest.raises(InputError, match=rf"(?s){message}"):
+            named(written(text, "mine.glsl"))
 
 
 def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
@@ -299,7 +256,7 @@ def test_a_symbolic_loop_is_refused(rgb):
 
 @opengl
 def test_a_fit_is_refused(rgb):
-    case = open_case("fig-8-9", Request(heuristic=PHONG, **SMALL))
+    case = open_case("fig-8-9", Options(heuristic=PHONG, **SMALL))
     with pytest.raises(InputError, match="has no derivatives, which a fit needs"):
         fit(case.source, case.options)
 
@@ -311,23 +268,14 @@ LOGS = {
 }
 
 
-@pytest.mark.parametrize("log", LOGS.values(), ids=LOGS)
-def test_places_of_several_compilers_are_read(log):
-    told = shader_text.explained(log, "a.glsl", "one\ntwo")
-    assert "a.glsl, line 2: " in told
-    assert "oops" in told
-    assert "a.glsl, at its end: " in told
-
-
-def test_of_each_line_the_first_error_counts():
-    log = "0:2(9): error: undeclared\n0:2(1): error: no matching types\n0:3(1): error: end\n"
-    told = shader_text.explained(log, "a.glsl", "one\ntwo\nthree")
-    assert told == "a.glsl, line 2: undeclared; a.glsl, line 3: end"
-
-
-def test_a_warning_is_no_error():
-    log = "0:1(2): warning: unused\n0:2(9): error: oops\n"
-    assert shader_text.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: oops"
+def test_places_of_several_compilers_are_read():
+    for log in LOGS.values():
+        told = shader_text.explained(log, "a.glsl", "one\ntwo")
+        assert "a.glsl, line 2: " in told
+        assert "oops" in told
+        assert "a.glsl, at its end: " in told
+    log = "0:1(2): warning: unused\n0:2(9): error: undeclared\n0:2(1): error: no match\n"
+    assert shader_text.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: undeclared"
 
 
 # --- Where it runs -------------------------------------------------------------------------------
@@ -335,14 +283,16 @@ def test_a_warning_is_no_error():
 
 @opengl
 def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
-    device = gpu.device()
+    device = shader_files.opengl()
     name = written(returning("0.5"), "mine.glsl")
     for renderer, is_software in (("llvmpipe (LLVM 15)", True), ("NVIDIA L4", False)):
         monkeypatch.setattr(
-            gpu._kept, "device", (gpu.os.getpid(), replace(device, renderer=renderer))
+            shader_files._kept,
+            "device",
+            (shader_files.os.getpid(), replace(device, renderer=renderer)),
         )
-        monkeypatch.setattr(shader_files, "_opened", {})
-        case = open_case("fig-8-9", Request(heuristic=name, **SMALL))
+        monkeypatch.setattr(shader_files, "_known", {})
+        case = open_case("fig-8-9", Options(heuristic=name, **SMALL))
         assert ("software GPU" in named(name).label) == is_software
         warnings = compare(case.source, case.options).record.warnings
         assert ("a software GPU" in json.dumps(warnings)) == is_software
@@ -350,9 +300,9 @@ def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
 
 def test_without_moderngl_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    monkeypatch.setattr(gpu, "_kept", gpu.threading.local())
+    monkeypatch.setattr(shader_files, "_kept", shader_files.threading.local())
     with pytest.raises(InstallationError, match=re.escape(program.installation("moderngl"))):
-        gpu.device()
+        shader_files.opengl()
     assert "pip install" in doctor.shaded()
 
 
@@ -363,14 +313,9 @@ def test_without_a_driver_it_says_what_to_install(monkeypatch):
         raise OSError("libEGL.so is not there")
 
     monkeypatch.setattr(moderngl, "create_context", fail)
-    monkeypatch.setattr(gpu, "_kept", gpu.threading.local())
+    monkeypatch.setattr(shader_files, "_kept", shader_files.threading.local())
     with pytest.raises(InstallationError, match="apt-get install libegl1 libgl1-mesa-dri"):
-        gpu.device()
-
-
-@opengl
-def test_the_doctor_names_the_renderer():
-    assert doctor.shaded().startswith(f"runs on {gpu.device().renderer}")
+        shader_files.opengl()
 
 
 WRAPPED = """uniform float wrap = 0.5;  // 0 to 1
@@ -395,19 +340,10 @@ def test_a_uniform_with_bounds_is_a_parameter(rgb, tmp_path):
     assert (found[0][1].low, found[0][1].high) == (0.1, 10)
     images = []
     for name in (str(path), str(SHADERS / "wrapped.py")):
-        case = open_case("plastic-spheres", Request(heuristic=name, resolution=(24, 24)))
+        case = open_case("plastic-spheres", Options(heuristic=name, resolution=(24, 24)))
         half = prepare(case.source, case.options).heuristic
         for wrap in (0.5, 0.1):
             half.integrator.parameters["wrap"] = mi.Float(wrap)
             images.append(np.array(half.render(1)))
     np.testing.assert_allclose(images[:2], images[2:], rtol=1e-4, atol=1e-5)
     assert abs(images[0] - images[1]).mean() > 0.01
-
-
-@opengl
-@pytest.mark.parametrize("line", ["uniform float wrap;", "uniform vec3 tint = vec3(1); // 0 to 1"])
-def test_a_uniform_without_bounds_is_refused(tmp_path, line):
-    path = tmp_path / "x.glsl"
-    path.write_text(f"{line}\nvec3 shade(Point point) {{ return vec3(0.5); }}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 1: a uniform is a parameter"):
-        named(str(path))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from comparisons.departure.statistics import BINS_A_DECADE, DECADES, histogram
-from comparisons.records import Pixels
+from reference.records import Pixels
 from reports.charts import histograms
 from tests import records
 

@@ -1,6 +1,6 @@
 """The wheel in an environment of its own, and the pytest plugin in the suite of another project.
 
-Slow: it installs all dependencies from the package registry.
+It installs all dependencies from the package registry.
 """
 
 import os
@@ -11,6 +11,8 @@ import pytest
 
 from tests.programs import ROOT
 from tests.small_scene import SCENE
+
+pytestmark = pytest.mark.thorough
 
 SUITE = """
 import pytest
@@ -64,7 +66,6 @@ def do(*words, folder=None, code=0):
     return done.stdout
 
 
-@pytest.mark.slow
 def test_the_installed_commands_work(installed, tmp_path):
     fotismos = installed / "fotismos"
     assert "llvm_ad_spectral renders" in " ".join(do(fotismos, "doctor").split())
@@ -76,9 +77,10 @@ def test_the_installed_commands_work(installed, tmp_path):
     do(fotismos, "check", "base", "--update", "--scene", "ball.xml", *words, folder=tmp_path)
     assert "1 of 1 unmoved" in do(fotismos, "check", "base", folder=tmp_path)
     assert "did you mean fig-8-9?" in do(fotismos, "compare", "fig-8-99", code=2)
+    program = "import fotismos; print(fotismos.plan('fig-8-9').integrator, fotismos.shade)"
+    assert do(installed / "python", "-c", program).startswith("direct_all <function shade")
 
 
-@pytest.mark.slow
 def test_a_foreign_suite_uses_the_plugin(installed, tmp_path):
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes/ball.xml").write_text(SCENE, encoding="utf-8")

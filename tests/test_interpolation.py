@@ -8,24 +8,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comparisons.gallery.builtin import builtin
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade
-from heuristic.errors import InputError, OutputError
+from heuristic.errors import InputError
 from heuristic.interpolation import (
     Interpolation,
+    MeshCorners,
     barycentric_coordinates,
     edge_intensity,
     edge_normal,
     scan_line_intensity,
     scan_line_normal,
+    shade_mesh,
+    shading_points,
+    stored_shade,
 )
-from heuristic.mesh_shading import MeshCorners, shade_mesh, shading_points, stored_shade
-from heuristic.vertex_normals import Weighting
+from heuristic.normals import WEIGHTINGS
 from reference import Source
-from reference.pairing import meshing
 from reference.pairing.halves import pair
 from reference.scene import messages
-from reference.scene.graph import Reference, properties
 from tests import oracle
 from tests.test_normals import rows, uv_sphere
 
@@ -86,15 +86,6 @@ def test_barycentric_coordinates_of_a_point_and_of_its_foot(s, t, height):
         Array3f64(x, y, 2 + height), *(Array3f64(*corner, 2) for corner in TRIANGLE)
     )
     assert [float(w[0]) for w in found] == pytest.approx(list(weights), abs=1e-12)
-
-
-def test_what_cannot_be_interpolated_takes_the_first_value():
-    one, two = Float64(1), Float64(2)
-    assert edge_intensity(one, two, Float64(5), Float64(5), Float64(5))[0] == 1
-    normal = scan_line_normal(Array3f64(0, 0, 1), Array3f64(0, 0, -1), one, one + 2, two)
-    assert rows(normal).tolist() == [[0, 0, 0]]
-    weights = barycentric_coordinates(*[Array3f64(1, 2, 3)] * 4)
-    assert [float(w[0]) for w in weights] == [1, 0, 0]
 
 
 # --- Convergence --------------------------------------------------------------------------------
@@ -173,16 +164,6 @@ def test_ways_of_shading_converge_at_their_order(one, other, order, material):
     assert np.all(abs(orders - order) < 0.35)
 
 
-def test_the_horizon_costs_gouraud_half_an_order():
-    """Along it, where N.L is cut off at 0, the error falls with the edge's length."""
-    errors = [
-        difference(bands, DIFFUSE, gouraud, phong, near_light=-2) for bands in (16, 32, 64, 128)
-    ]
-    orders = -np.diff(np.log2(errors))
-    print(f"gouraud to phong, whole sphere: rms {errors}, orders {orders}")
-    assert np.mean(orders) == pytest.approx(1.5, abs=0.25)
-
-
 # --- In Mitsuba -----------------------------------------------------------------------------------
 
 
@@ -241,24 +222,6 @@ def test_gouraud_is_stored_at_vertices_and_interpolated(rgb):
     np.testing.assert_allclose(found, weights @ at_vertices, rtol=1e-5, atol=1e-6)
 
 
-def test_flat_is_one_value_a_face(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED)
-    shade_mesh(mesh, FLAT, (1, 1, 9), COLOURED, LIGHTS, 1.0)
-    normal = np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])
-    expected = by_oracle(CORNERS.mean(0)[None], normal[None] / np.linalg.norm(normal), (1, 1, 9))
-    si = hits(mesh, looking_down((INNER @ CORNERS)[:, :2]))
-    found = rows(mi.Color3f(stored_shade(si, FLAT)))
-    np.testing.assert_allclose(found, np.repeat(expected, len(INNER), 0), rtol=1e-5)
-
-
-def test_phong_interpolates_the_normal_that_mitsuba_shades_with(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED)
-    si = hits(mesh, looking_down((INNER @ CORNERS)[:, :2]))
-    mean = INNER @ TILTED
-    expected = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    np.testing.assert_allclose(rows(si.sh_frame.n), expected, atol=1e-6)
-
-
 def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb):
     """Figure 6.14: light and viewer stand over the middle, and no vertex sees the highlight."""
     angles = 2 * np.pi * np.arange(3) / 3
@@ -277,21 +240,20 @@ def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb)
     assert float(kept[0]) == pytest.approx(0.9, rel=1e-5)
 
 
-@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
-@pytest.mark.parametrize("count", [1, 3, 4, 7])
-def test_any_number_of_wavelengths(rgb, count, interpolation):
-    shares = tuple(np.linspace(0.1, 1, count))
-    material = Material(k_d=shares[0] if count == 1 else shares)
+def test_any_number_of_wavelengths(rgb):
     mesh = triangle_mesh(CORNERS, TILTED)
-    stored = shade_mesh(mesh, interpolation, (1, 1, 9), material, LIGHTS[1:])
-    assert stored == (count if count > 1 else 3)
     si = hits(mesh, looking_down([(1, 1)]))
-    values = [float(v[0]) for v in stored_shade(si, interpolation, count)]
-    assert len(values) == count
-    assert values[-1] > 0
-    np.testing.assert_allclose(
-        np.array(values) / values[-1], np.array(shares) / shares[-1], rtol=1e-5
-    )
+    for interpolation in (FLAT, GOURAUD):
+        for count in (1, 3, 4, 7):
+            shares = tuple(np.linspace(0.1, 1, count))
+            material = Material(k_d=shares[0] if count == 1 else shares)
+            stored = shade_mesh(mesh, interpolation, (1, 1, 9), material, LIGHTS[1:])
+            assert stored == (count if count > 1 else 3)
+            values = np.array([float(v[0]) for v in stored_shade(si, interpolation, count)])
+            assert values[-1] > 0
+            np.testing.assert_allclose(
+                values / values[-1], np.divide(shares, shares[-1]), rtol=1e-5
+            )
 
 
 @pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
@@ -305,14 +267,6 @@ def test_large_meshes_are_stored_whole(rgb, interpolation):
     toward = dr.normalize(mi.Vector3f(0, -1, 2))
     expected = 0.5 * dr.maximum(dr.dot(points.n, toward), 0)
     assert float(dr.max(abs(stored.y - expected))[0]) < 1e-6
-
-
-def test_shading_again_replaces_what_was_stored(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED)
-    si = hits(mesh, looking_down([(1, 1)]))
-    for k_a in (0.25, 0.5):
-        shade_mesh(mesh, GOURAUD, (1, 1, 9), Material(k_a=k_a), [], 1.0)
-        assert [float(v[0]) for v in stored_shade(si, GOURAUD)] == pytest.approx([k_a] * 3)
 
 
 def test_the_back_is_black_or_has_its_own_values(rgb):
@@ -361,15 +315,6 @@ def test_evaluating_at_the_corners_of_the_face_gives_what_is_stored(variant, fli
     np.testing.assert_allclose(rows(corners[0][1].n)[where], rows(si.n)[where], atol=1e-6)
     assert np.isfinite(rows(total)).all()
     assert not rows(total)[np.array(si.shape == mi.ShapePtr(ball))].any()
-
-
-def test_flipped_normals_are_those_that_mitsuba_shades_with(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED, flip_normals=True)
-    si = hits(mesh, looking_down([(1, 1)]))
-    for interpolation in (FLAT, GOURAUD):
-        points = shading_points(mesh, interpolation)
-        assert dr.all(dr.dot(points.n, si.sh_frame.n) > 0.7)
-        assert dr.all(dr.dot(points.n, si.n) > 0.7)
 
 
 @pytest.mark.parametrize("plugin", ["sphere", "disk", "cylinder", "rectangle"])
@@ -422,50 +367,26 @@ def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
     assert float(dr.max(dr.select(middle, dr.max(seam), 0))[0]) < 0.02
 
 
-@pytest.mark.parametrize("plugin", ["sphere", "cylinder", "disk"])
-def test_made_meshes_have_no_cracks(rgb, plugin):
-    """Edges that meet at the seam and the poles do so in equal points: each is shared or a rim."""
-    mesh = meshes.to_mesh(mi.load_dict({"type": plugin}), 5)
-    points, faces = rows(meshes.positions(mesh)) + 0.0, np.array(meshes.faces(mesh)).T  # no -0
-    _, same = np.unique(points, axis=0, return_inverse=True)
-    edges = {
-        (a, b) for face in same.ravel()[faces] for a, b in zip(face, np.roll(face, -1), strict=True)
-    }
-    rim = [edge for edge in edges if edge[::-1] not in edges]
-    assert len(edges) == 3 * len(faces)
-    assert len(rim) == {"sphere": 0, "cylinder": 40, "disk": 20}[plugin]
-
-
-def test_a_cube_stays_the_mesh_that_it_is(rgb):
-    cube = mi.load_dict({"type": "cube"})
-    assert meshes.to_mesh(cube) is cube
-
-
-def test_other_shapes_are_refused(rgb):
-    shape = mi.load_dict(
-        {
-            "type": "sdfgrid",
-            "id": "blob",
-            "grid": mi.TensorXf(np.linspace(-1, 1, 8).reshape(2, 2, 2, 1)),
-        }
-    )
+def test_what_cannot_be_made_into_triangles_is_refused(rgb):
+    grid = mi.TensorXf(np.linspace(-1, 1, 8).reshape(2, 2, 2, 1))
     with pytest.raises(InputError, match=r"'blob'.*SDFGrid.*phong interpolation"):
-        meshes.to_mesh(shape)
-
-
-def test_a_sheared_cylinder_is_refused(rgb):
+        meshes.to_mesh(mi.load_dict({"type": "sdfgrid", "id": "blob", "grid": grid}))
     sheared = mi.ScalarTransform4f().rotate((1, 2, 3), 40)  # an axis of another length than 1
     with messages.collected(said := []):
         shape = mi.load_dict({"type": "cylinder", "id": "tube", "to_world": sheared})
     assert "shearing" in " ".join(said)
     with pytest.raises(InputError, match=r"'tube'.*to_world"):
         meshes.to_mesh(shape)
-
-
-@pytest.mark.parametrize("resolution", [0, -3, 1.5])
-def test_resolutions_that_mean_nothing_are_refused(rgb, resolution):
-    with pytest.raises(InputError, match="whole number from 1 to 512"):
-        meshes.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
+    for resolution in (0, -3, 1.5):
+        with pytest.raises(InputError, match="whole number from 1 to 512"):
+            meshes.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
+    with pytest.raises(InputError, match="every point"):
+        shade_mesh(triangle_mesh(CORNERS, TILTED), PHONG, (0, 0, 1), COLOURED, LIGHTS)
+    cube = mi.load_dict({"type": "cube"})
+    assert meshes.to_mesh(cube) is cube
+    scene = mi.load_dict(two_balls(twosided=False))
+    with pytest.raises(InputError, match=r"shape '(out|in)ward' is a Sphere: .* need triangle"):
+        scene.integrator().render(scene, spp=1)
 
 
 # --- Meshes without, or with several, vertex normals ----------------------------------------------
@@ -478,7 +399,7 @@ def test_a_mesh_without_vertex_normals_gets_those_of_6_34(rgb):
     mesh = triangle_mesh(ROOF, faces=ROOF_FACES)
     expected = np.array([(0, 0, 1)] * 2 + [(1, 0, 2) / np.sqrt(5), (-1, 0, 2) / np.sqrt(5)])
     np.testing.assert_allclose(rows(shading_points(mesh, GOURAUD).n), expected, atol=1e-6)
-    for weighting in Weighting:
+    for weighting in WEIGHTINGS:
         smooth = meshes.with_vertex_normals(mesh, weighting)
         np.testing.assert_allclose(rows(meshes.normals(smooth)), expected, atol=1e-6)
         assert smooth.has_vertex_normals()
@@ -514,96 +435,7 @@ def test_degenerate_faces_and_lone_vertices_stay_black_and_finite(rgb):
         assert not stored[-1].any()
 
 
-def test_phong_has_nothing_to_store(rgb):
-    with pytest.raises(InputError, match="every point"):
-        shade_mesh(triangle_mesh(CORNERS, TILTED), PHONG, (0, 0, 1), COLOURED, LIGHTS)
-
-
 # --- Whole pictures -------------------------------------------------------------------------------
-
-
-def picture(shape, interpolation, viewer, material, lights):
-    """Render a shape by an integrator that reads what `shade_mesh` stored."""
-
-    class Interpolated(mi.SamplingIntegrator):
-        def sample(self, scene, sampler, ray, medium=None, active=True):
-            si = scene.ray_intersect(ray, active)
-            hit = active & si.is_valid()
-            if interpolation is PHONG:
-                colour = shade(
-                    mi.Vector3f(si.p), mi.Vector3f(si.sh_frame.n), -ray.d, material, lights
-                )
-                colour = mi.Color3f(colour)
-            else:
-                colour = mi.Color3f(stored_shade(si, interpolation, active=hit))
-            return mi.Spectrum(dr.select(hit, colour, 0)), hit, []
-
-    if interpolation is not PHONG:
-        shade_mesh(shape, interpolation, viewer, material, lights)
-    sensor = {
-        "type": "perspective",
-        "fov": 40.0,
-        "to_world": mi.ScalarTransform4f().look_at(viewer, (0, 0, 0), (0, 0, 1)),
-        "film": {"type": "hdrfilm", "width": 96, "height": 96, "rfilter": {"type": "box"}},
-    }
-    scene = mi.load_dict({"type": "scene", "it": shape, "sensor": sensor}, optimize=False)
-    return np.array(mi.render(scene, integrator=Interpolated(mi.Properties()), spp=16, seed=2))
-
-
-def test_pictures_of_a_finer_mesh_come_near_the_analytic_sphere(rgb):
-    """Silhouettes differ by the mesh's step, so the pixels that count are those inside both."""
-    viewer, lights = (-3, -3, 0), [PointLight((-4.24, 0, 0), 1.0)]
-    material = Material(k_d=0.5, k_s=0.7, n=9)
-    ball = mi.load_dict({"type": "sphere"})
-    analytic = picture(ball, PHONG, viewer, material, lights)
-    rows_, columns = np.mgrid[:96, :96] - 47.5
-    inner = rows_**2 + columns**2 < 25**2
-    assert analytic[inner].mean() > 0.2
-    errors = {}
-    for interpolation in Interpolation:
-        for resolution in (8, 32):
-            found = picture(
-                meshes.to_mesh(ball, resolution), interpolation, viewer, material, lights
-            )
-            assert np.isfinite(found).all()
-            errors[interpolation.value, resolution] = np.sqrt(
-                np.mean((found - analytic)[inner] ** 2)
-            )
-    print(errors)
-    assert errors["flat", 8] > 1.5 * errors["gouraud", 8] > 5 * errors["phong", 8]
-    assert errors["flat", 32] < 0.35 * errors["flat", 8]
-    assert errors["gouraud", 32] < 0.15 * errors["gouraud", 8]
-    assert errors["phong", 32] < 1e-3
-
-
-def test_a_scenes_shapes_are_replaced_by_meshes_that_keep_material_and_name(rgb, tmp_path):
-    """From a figure's graph to values at vertices, with the plugins' own material and lights."""
-    graph = builtin("fig-8-9").source().parse()
-    shapes = {shape.id(): shape for shape in graph.instantiate().shapes()}
-    for node in graph.nodes(mi.ObjectType.Shape):
-        given = graph.props(node)
-        path = tmp_path / f"{node}.ply"
-        meshes.to_mesh(shapes[given.id()], 8).write_ply(str(path))
-        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
-        graph.replace(node, properties("ply", filename=str(path), **children))
-    scene = graph.instantiate()
-    (mesh,) = scene.shapes()
-    assert mesh.id() == "sphere"
-    at = shading_points(mesh, GOURAUD)
-    viewer = scene.sensors()[0].world_transform().translation()
-    lights = [emitter.light(at) for emitter in scene.emitters()]
-    shade_mesh(mesh, GOURAUD, viewer, mesh.bsdf().material(at), lights, 1.0)
-    points, light = rows(at.p), oracle.Light("point", 1.0, position=(-4.24, 0, 0))
-    expected = oracle.shade(
-        points,
-        points,
-        np.array((-3, 0, 1)) - points,
-        oracle.Material(k_a=0.3, k_d=0.5, k_s=0.7, n=9),
-        [light],
-        1.0,
-    )
-    stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
-    np.testing.assert_allclose(stored, np.broadcast_to(expected, stored.shape), atol=1e-5)
 
 
 # --- Through the plugins --------------------------------------------------------------------------
@@ -667,13 +499,6 @@ def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
         np.testing.assert_allclose(found[where], expected + 0 * found[where], atol=1e-5)
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
-def test_the_integrator_refuses_shapes_that_are_not_meshes(variant):
-    scene = mi.load_dict(two_balls(twosided=False))
-    with pytest.raises(InputError, match=r"shape '(out|in)ward' is a Sphere: .* need triangle"):
-        scene.integrator().render(scene, spp=1)
-
-
 # --- A scene's shapes become meshes ---------------------------------------------------------------
 
 TETRAHEDRON = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)
@@ -713,17 +538,6 @@ def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
         np.testing.assert_allclose(picture, expected, atol=1e-5, err_msg=name)
 
 
-def test_meshes_without_normals_get_those_of_their_faces(rgb):
-    """The normals of a sphere's mesh are nearly its radii."""
-    ball = {"type": "ellipsoidsmesh", "centers": mi.TensorXf([0.5, 1, -1], (1, 3)),
-            "scales": mi.TensorXf([0.7] * 3, (1, 3)),
-            "quaternions": mi.TensorXf([0, 0, 0, 1], (1, 4))}  # fmt: skip
-    (mesh,) = half(seen(it=ball), GOURAUD).shapes()
-    radii = rows(meshes.positions(mesh)) - (0.5, 1, -1)
-    radii /= np.linalg.norm(radii, axis=1, keepdims=True)
-    assert np.sum(rows(meshes.normals(mesh)) * radii, axis=1) == pytest.approx(1, abs=0.02)
-
-
 @pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
 def test_instances_are_refused_by_name(rgb, interpolation):
     group = {"type": "shapegroup", "ball": {"type": "sphere"}}
@@ -731,9 +545,3 @@ def test_instances_are_refused_by_name(rgb, interpolation):
     source = seen(group=group, left=copy)
     with pytest.raises(InputError, match=r"instances and their groups .* --interpolation phong"):
         half(source, interpolation)
-
-
-def test_without_room_for_the_meshes_it_says_what_to_do(rgb, tmp_path, monkeypatch):
-    monkeypatch.setattr(meshing, "mkdtemp", lambda prefix: str(tmp_path / "gone"))
-    with pytest.raises(OutputError, match=r"a test: .*gone.* Free some space, or set TMPDIR"):
-        half(seen(it={"type": "sphere"}), FLAT)

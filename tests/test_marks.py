@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
-from reference.rendering.moments import sample
+from reference.rendering.sums import sample
 from tests import noisy
 
 KINDS = ("lognormal", "poisson", "spikes")

@@ -11,15 +11,15 @@ import drjit.llvm.ad
 import pytest
 
 from comparisons.gallery.builtin import SCENES
-from heuristic import DirectionalLight, Material, shading, terms
+from heuristic import DirectionalLight, Material, kernel, terms
 from tests import checks
 from tests.test_figures import everything
 
-right = shading.shade
+right = kernel.shade
 
 
 def put_in_place(monkeypatch, wrong):
-    monkeypatch.setattr(shading, "shade", wrong)
+    monkeypatch.setattr(kernel, "shade", wrong)
 
 
 def without_horizon(monkeypatch):

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from heuristic import normals
 from heuristic.errors import InputError
-from heuristic.vertex_normals import Weighting, corner_angles, relative_areas, vertex_normals
+from heuristic.normals import WEIGHTINGS, corner_angles, vertex_normals
 
 SINGLE, DOUBLE = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
 EVERY_TYPE = pytest.mark.parametrize(
     "vector_type", [SINGLE, DOUBLE, drjit.llvm.Array3f, drjit.llvm.Array3f64], ids=str
 )
-EVERY_WEIGHTING = pytest.mark.parametrize("weighting", Weighting, ids=lambda w: w.value)
+EVERY_WEIGHTING = pytest.mark.parametrize("weighting", WEIGHTINGS)
 Array3u = drjit.llvm.ad.Array3u
 
 
@@ -46,30 +46,12 @@ def test_a_plane_has_its_coefficients_as_normal(vector_type):
     )
 
 
-def test_both_forms_of_a_plane_are_one():
-    normal, point = DOUBLE(2 / 7, -3 / 7, 6 / 7), DOUBLE(1, 2, -4)
-    a, b, c, d = normals.plane_coefficients(normal, point)
-    require_units(normals.plane_normal(a, b, c), rows(normal)[0], 1e-15)
-    assert float((a * 1 + b * 2 + c * -4 + d)[0]) == pytest.approx(0, abs=1e-15)
-    other = DOUBLE(1.5, -2, 0.25)
-    value = a * other.x + b * other.y + c * other.z + d
-    assert float(value[0]) == pytest.approx(float(dr.dot(normal, other - point)[0]))
-
-
 @EVERY_TYPE
 def test_a_triangle_faces_those_who_see_it_anticlockwise(vector_type):
     p0, p1, p2 = vector_type(1, 1, 5), vector_type(3, 1, 5), vector_type(1, 2, 5)
     require_units(normals.triangle_normal(p0, p1, p2), (0, 0, 1), 0)
     require_units(normals.triangle_normal(p1, p2, p0), (0, 0, 1), 0)
     require_units(normals.triangle_normal(p0, p2, p1), (0, 0, -1), 0)
-
-
-def test_scalar_arrays_work_too():
-    array = drjit.scalar.Array3f64
-    found = normals.triangle_normal(array(0, 0, 0), array(2, 0, 0), array(5, 3, 0))
-    assert list(found) == [0, 0, 1]
-    found = normals.triangle_normal(array(0, 0, 0), array(2, 0, 0), array(5, 0, 0))
-    assert list(found) == [0, 0, 0]
 
 
 whole = st.integers(-1000, 1000)
@@ -109,16 +91,6 @@ def test_the_size_of_a_triangle_does_not_matter(vector_type, scale):
         vector_type(0), vector_type(scale, 0, scale), vector_type(0, scale, 0)
     )
     require_units(found, (-(0.5**0.5), 0, 0.5**0.5), rounding(vector_type))
-
-
-@EVERY_TYPE
-def test_the_length_of_gradients_and_tangents_does_not_matter(vector_type):
-    for scale in (1e-30, 1e30):
-        found = normals.implicit_normal(vector_type(scale, 0, -scale))
-        require_units(found, (0.5**0.5, 0, -(0.5**0.5)), rounding(vector_type))
-        for other in (1e-30, 1e30):
-            tangents = vector_type(scale, 0, 0), vector_type(other, other, 0)
-            require_units(normals.parametric_normal(*tangents), (0, 0, 1), rounding(vector_type))
 
 
 @pytest.mark.parametrize(
@@ -241,8 +213,8 @@ def test_vertex_normals_of_a_sphere_converge_to_its_own(weighting):
         distance = dr.norm(found - points)
         errors.append(float(dr.sqrt(dr.mean(dr.square(distance)))[0]))
     orders = -np.diff(np.log2(errors))
-    print(weighting.value, "rms errors", errors, "orders", orders)
-    least = 1.85 if weighting is Weighting.ANGLE else 1.45
+    print(weighting, "rms errors", errors, "orders", orders)
+    least = 1.85 if weighting == "angle" else 1.45
     assert np.all(orders > least)
     assert np.all(orders < least + 0.3)
 
@@ -266,10 +238,10 @@ def test_only_angles_are_indifferent_to_how_a_side_is_cut():
     """All areas are equal, however many slices there are; the mean counts the slices."""
     for cuts in (2, 3, 9):
         points, faces = cube_corner(cuts)
-        for weighting in Weighting:
+        for weighting in WEIGHTINGS:
             x, y, z = rows(vertex_normals(points, faces, weighting))[0]
             assert y == pytest.approx(x)
-            share = cuts / 2 if weighting is Weighting.MEAN else 1
+            share = cuts / 2 if weighting == "mean" else 1
             assert z / x == pytest.approx(share, rel=1e-14), (weighting, cuts)
 
 
@@ -278,41 +250,11 @@ def test_areas_count_what_does_not_touch_the_vertex():
     points = DOUBLE([0, 1, 0, 0, 0.25, 0], [0, 0, 1, 0, 0, 0.25], [0, 0, 0, 1, 0, 0])
     whole = Array3u([0, 0, 0], [1, 2, 3], [2, 3, 1])
     cut = Array3u([0, 4, 4, 0, 5, 0, 3], [4, 1, 2, 5, 2, 3, 1], [5, 2, 5, 3, 3, 4, 4])
-    for weighting, share in {Weighting.AREA: 1 / 4, Weighting.ANGLE: 1}.items():
+    for weighting, share in {"area": 1 / 4, "angle": 1}.items():
         x, y, z = rows(vertex_normals(points, whole, weighting))[0]
         assert (y / x, z / x) == pytest.approx((1, 1))
         x, y, z = rows(vertex_normals(points, cut, weighting))[0]
         assert (y / x, z / x) == pytest.approx((1, share))
-
-
-def test_areas_count_in_proportion():
-    """Two faces at a right angle, of areas 1/2 and 3/2."""
-    points = DOUBLE([0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 3])
-    faces = Array3u([0, 0], [1, 2], [2, 3])
-    require_units(
-        vertex_normals(points, faces, "area"),
-        [(3, 0, 1), (0, 0, 1), (3, 0, 1), (1, 0, 0)] / np.sqrt([[10], [1], [10], [1]]),
-        1e-15,
-    )
-    np.testing.assert_allclose(
-        rows(vertex_normals(points, faces, "mean"))[0], (0.5**0.5, 0, 0.5**0.5), atol=1e-15
-    )
-
-
-@EVERY_TYPE
-@EVERY_WEIGHTING
-def test_a_vertex_with_no_face_has_no_normal(vector_type, weighting):
-    points = vector_type([0, 1, 0, 7], [0, 0, 1, 7], [0, 0, 0, 7])
-    found = vertex_normals(points, Array3u(0, 1, 2), weighting)
-    require_units(found, [(0, 0, 1)] * 3 + [(0, 0, 0)], 0)
-
-
-@EVERY_WEIGHTING
-def test_a_mesh_without_faces_has_no_normals(weighting):
-    faces = dr.zeros(Array3u, 0)
-    require_units(
-        vertex_normals(SINGLE([0, 1], [0, 0], [0, 0]), faces, weighting), [(0,) * 3] * 2, 0
-    )
 
 
 @EVERY_WEIGHTING
@@ -343,7 +285,7 @@ def test_two_sides_of_a_sheet_cut_along_other_diagonals_leave_no_normal(vector_t
         origin, right, up = rng.normal(size=(3, 3))
         square = np.array([origin, origin + right, origin + right + up, origin + up])
         faces = Array3u([0, 0, 1, 1], [1, 2, 0, 3], [2, 3, 3, 2])
-        found = vertex_normals(vector_type(square.T), faces, Weighting.ANGLE)
+        found = vertex_normals(vector_type(square.T), faces, "angle")
         require_units(found, np.zeros((4, 3)), 0)
 
 
@@ -357,36 +299,11 @@ def test_angles_of_slivers_keep_their_digits():
         assert float(third[0]) == pytest.approx(np.pi - 2 * np.arctan(2 * h), rel=1e-6)
 
 
-@settings(max_examples=50, deadline=None)
-@given(a=vectors, b=vectors, c=vectors)
-def test_angles_add_up_to_half_a_turn(a, b, c):
-    corners = [DOUBLE(*p) for p in (a, b, c)]
-    if float(relative_areas(*corners)[0]) > 0:
-        assert float(sum(corner_angles(*corners))[0]) == pytest.approx(np.pi, rel=1e-9)
-
-
-@EVERY_WEIGHTING
-@pytest.mark.parametrize("scale", [1e-25, 1e25])
-def test_the_size_of_a_mesh_does_not_matter(weighting, scale):
-    points, faces = uv_sphere(8, SINGLE)
-    found = vertex_normals(points * scale, faces, weighting)
-    require_units(found, rows(vertex_normals(points, faces, weighting)), 8 * rounding(SINGLE))
-
-
-def test_slivers_around_a_vertex_do_not_tilt_its_angle_weighted_normal():
-    """A fan in a plane, one face of it a needle of 1e-6: every normal is the plane's."""
-    points = SINGLE([0, 1, 1, 0], [0, 0, 1e-6, 1], [0, 0, 0, 0])
-    faces = Array3u([0, 0], [1, 2], [2, 3])
-    require_units(vertex_normals(points, faces, "angle"), [(0, 0, 1)] * 4, 0)
-
-
-def test_faces_with_vertices_that_do_not_exist_are_refused():
+def test_faces_and_weightings_that_do_not_exist_are_refused():
     points = SINGLE([0, 1, 0], [0, 0, 1], [0, 0, 0])
     with pytest.raises(InputError, match="vertex number 3 does not exist"):
         vertex_normals(points, Array3u(0, 1, 3))
-
-
-def test_an_unknown_weighting_is_refused():
-    points = SINGLE([0, 1, 0], [0, 0, 1], [0, 0, 0])
     with pytest.raises(InputError, match="choose one of mean, area, angle"):
         vertex_normals(points, Array3u(0, 1, 2), "volume")
+    none = vertex_normals(points, dr.zeros(Array3u, 0))
+    require_units(none, [(0,) * 3] * 3, 0)

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import heuristic
-from heuristic import lobes, numerics, shading, terms, vectors
+from heuristic import kernel, lobes, numerics, terms, vectors
 from tests import checks, oracle
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
@@ -108,7 +108,7 @@ def test_a_sum_beyond_the_range_is_infinite_and_no_nan():
     assert numerics.summed(total, lost)[0] == np.inf
 
 
-@pytest.mark.parametrize("count", [3 * shading.BLOCK + 5, 3000])
+@pytest.mark.parametrize("count", [3 * kernel.BLOCK + 5, 3000])
 @pytest.mark.parametrize("spread", [0, 4, 30])
 def test_many_lights_of_mixed_magnitude_add_up_to_a_millionth(count, spread):
     """Terms of up to 60 decades, in blocks as they are summed."""
@@ -217,3 +217,36 @@ def test_the_lobe_between_local_directions_is_that_in_space():
             if form == "blinn":
                 expected = half[2] / np.linalg.norm(half, axis=0)
             np.testing.assert_allclose(np.array(cosine), expected, atol=5e-7)
+
+
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+def test_a_highlight_keeps_its_digits_at_any_exponent(form):
+    """Rounding the cosine even to 1e-13 would cost a tenth of it at n = 1e12."""
+    random = np.random.default_rng(3)
+    for n in (1e9, 1e12, 1e14):
+        normal = np.float32(random.normal(size=3)).astype(float)
+        unit = normal / np.linalg.norm(normal)
+        toward = -np.float32(unit + 0.3 * random.normal(size=3)).astype(float)
+        mirrored = -toward + 2 * unit * (toward @ unit)
+        view = np.float32(-mirrored + random.normal(size=3) / n**0.5).astype(float)
+        with mpmath.workdps(40):
+            n_, l_, v_ = (_exact_unit(each) for each in (normal, -toward, view))
+            if form == "phong":
+                cosine = 2 * _exact_dot(n_, l_) * _exact_dot(n_, v_) - _exact_dot(l_, v_)
+            else:
+                cosine = _exact_dot(n_, _exact_unit([a + b for a, b in zip(l_, v_, strict=True)]))
+            expected = float(cosine ** mpmath.mpf(n))
+        sun = heuristic.DirectionalLight(tuple(toward), 1.0)
+        material = heuristic.Material(k_s=1.0, n=n, form=form)
+        place, *given = (Array3f(*map(float, each)) for each in ((0, 0, 0), normal, view))
+        found = heuristic.shade(place, *given, material, [sun])
+        assert abs(found[0] - expected) < 1e-4
+
+
+def _exact_unit(vector):
+    length = mpmath.sqrt(sum(mpmath.mpf(float(each)) ** 2 for each in vector))
+    return [mpmath.mpf(float(each)) / length for each in vector]
+
+
+def _exact_dot(a, b):
+    return sum(x * y for x, y in zip(a, b, strict=True))

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from comparisons import intervals
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.cost.cost import quick
-from comparisons.cost.object_prices import object_prices
-from comparisons.departure import objects
-from comparisons.effects.naming import named
-from reference.rendering.gbuffer import Owners, gbuffer
-from reports.terminal import carrier_lines
+from comparisons.departure import regions
+from comparisons.hybrids.attribution import by_object
+from comparisons.hybrids.dominance import named
+from comparisons.options import Options
+from reference.rendering.gbuffer import ObjectIds, gbuffer
+from reports.terminal import tables
 from tests import records
 from tests.test_physics import look_at
 
@@ -50,14 +51,14 @@ def shadowed(size=24):
 
 @pytest.fixture(scope="module")
 def compared():
-    case = open_case(shadowed(), Request.of({"resolution": (48, 48)}), "shadowed")
+    case = open_case(shadowed(), Options.of({"resolution": (48, 48)}), "shadowed")
     found = compare(case.source, case.options)
     study = quick(case.source, case.options)
-    return SimpleNamespace(found=found, study=study, record=named(found, study.effects))
+    return SimpleNamespace(found=found, study=study, record=named(found, study.causes.maps))
 
 
 @pytest.mark.guarantee(
-    "prices",
+    "attribution",
     "Every shape and every region is listed with its share of the departure, and its cause.",
 )
 def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
@@ -79,9 +80,9 @@ def test_materials_are_those_of_the_shapes(compared):
     assert record.materials[0].effect == "occlusion"
 
 
-def test_shadows_are_worth_their_price_on_the_floor_alone(compared):
+def test_shadows_remove_the_departure_of_the_floor_alone(compared):
     record = compared.study.record
-    assert [price.effect for price in record.prices.effects] == ["occlusion"]
+    assert [one.effect for one in record.attribution.effects] == ["occlusion"]
     floor, sphere = record.objects
     assert (floor.name, sphere.name) == ("floor", "sphere")
     assert floor.share > 0.99
@@ -90,16 +91,16 @@ def test_shadows_are_worth_their_price_on_the_floor_alone(compared):
 
 
 @pytest.mark.guarantee(
-    "prices", "What an effect removes on each shape averages to what it removes in the image."
+    "attribution", "What an effect removes on each shape averages to what it removes in the image."
 )
-def test_prices_on_shapes_average_to_those_of_the_image(compared):
+def test_what_is_removed_on_shapes_averages_to_that_of_the_image(compared):
     study = compared.study
     record = study.record
     pixels = [row.pixels for row in record.objects]
     assert sum(pixels) == record.pixels.counted
-    for place, price in enumerate(record.prices.effects):
+    for place, one in enumerate(record.attribution.effects):
         removed = [row.removes[place].value for row in record.objects]
-        assert np.average(removed, weights=pixels) == pytest.approx(price.removes.value)
+        assert np.average(removed, weights=pixels) == pytest.approx(one.removes.value)
     for row in record.objects:
         total = sum(removes.value for removes in row.removes) + row.left
         assert total == pytest.approx(row.departure)
@@ -109,14 +110,14 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     """Noise of known size in the replicates of one shape, none in those of another."""
     rng = np.random.default_rng(5)
     counted = np.array([[True, True, True], [True, True, False]])
-    owners = Owners(np.array([[0, 0, 1], [1, 1, 1]]), ("noisy", "still"))
+    owners = ObjectIds(np.array([[0, 0, 1], [1, 1, 1]]), ("noisy", "still"))
     spread = rng.normal(size=8)
     left_out = [(spread.sum() - each) / 7 for each in spread]
     means = np.array([spread.mean(), *left_out])
     removed = np.stack([means, means, *[np.full(9, 2.0)] * 3], axis=1)
     departure = np.where(counted, 3.0, 0)
-    priced = SimpleNamespace(removed={"shadow": removed}, departure=departure, left=departure)
-    found = {row.name: row for row in object_prices(priced, counted, owners)}
+    causes = SimpleNamespace(removed={"shadow": removed}, departure=departure, left=departure)
+    found = {row.name: row for row in by_object(causes, counted, owners)}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
     assert still.removes[0].low == still.removes[0].high == 2.0
@@ -172,13 +173,13 @@ def test_an_instance_is_a_shape_of_its_own():
 
 def test_many_shapes_end_in_a_row_of_the_others():
     rng = np.random.default_rng(3)
-    count = objects.MOST + 17
+    count = regions.MOST_OBJECTS + 17
     places = np.arange(count * 8).reshape(-1, 8) % count
     error = rng.random(places.shape) * (1 + places)
     counted = rng.random(places.shape) < 0.8
-    owners = Owners(places, tuple(f"shape {place}" for place in range(count)))
-    found, rows = objects.find(error, counted, owners)
-    assert len(found) == objects.MOST
+    owners = ObjectIds(places, tuple(f"shape {place}" for place in range(count)))
+    found, rows = regions.find_objects(error, counted, owners)
+    assert len(found) == regions.MOST_OBJECTS
     assert found[-1].name == "18 others"
     assert sum(each.share for each in found) == pytest.approx(1)
     listed = [each.share for each in found[:-1]]
@@ -192,17 +193,17 @@ def test_many_shapes_end_in_a_row_of_the_others():
 
 
 def test_nothing_is_carried_where_nothing_differs():
-    owners = Owners(np.zeros((2, 3), int), ("only",))
-    (only,), _ = objects.find(np.zeros((2, 3)), np.ones((2, 3), bool), owners)
+    owners = ObjectIds(np.zeros((2, 3), int), ("only",))
+    (only,), _ = regions.find_objects(np.zeros((2, 3)), np.ones((2, 3), bool), owners)
     assert (only.share, only.mean_dE2000, only.pixels) == (0.0, 0.0, 6)
 
 
 def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     """In maps of half the size, whose left column is bright by shadow, the right one by gloss."""
-    owners = Owners(np.repeat([[0, 0, 1, 1]], 4, axis=0), ("left", "right"))
+    owners = ObjectIds(np.repeat([[0, 0, 1, 1]], 4, axis=0), ("left", "right"))
     error = np.where(owners.places, 5.0, 4.0)
     counted = np.ones((4, 4), bool)
-    carriers, places = objects.find(error, counted, owners)
+    carriers, places = regions.find_objects(error, counted, owners)
     effects = {"shadow": np.array([[3.0, 0], [3, 0]]), "gloss": np.array([[0.0, 2], [0, 2]])}
     images = records.images(4, 4, objects=places, materials=places)
     record = records.record(objects=carriers, materials=carriers, regions=())
@@ -215,10 +216,10 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
 
 def test_the_terminal_and_the_table_have_every_shape(compared, tmp_path):
     record = compared.record
-    text = "\n".join(carrier_lines.lines(record))
+    text = "\n".join(tables.shape_lines(record))
     assert "floor" in text
     assert "occlusion" in text
-    carrier_lines.write(tmp_path, [record])
+    tables.write(tmp_path, [record])
     heading, *rows = (tmp_path / "carriers.csv").read_text(encoding="utf-8").splitlines()
     assert heading == "scene,kind,name,material,pixels,share,mean_dE2000,effect"
     assert [row.split(",")[1:3] for row in rows] == [

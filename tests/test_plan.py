@@ -5,39 +5,25 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import Options, prepare
 from comparisons.gallery.builtin import SCENES
+from comparisons.options import Options
+from comparisons.prepared import prepare
 from comparisons.verification import verify
-from reference.effects import EFFECTS
-from reference.effects.bsdf_forms import TRANSMISSION
-from reference.effects.obstacles import INTERREFLECTION, OCCLUSION
-from reference.planning.facts import examine
+from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, TRANSMISSION
+from reference.planning.facts import Facts
 from reference.planning.plan import wants_spectra
-from reference.planning.premises import Pruning, Ruling
-from reference.planning.shape_tree import Queries, ShapeTree
-from reference.rendering.albedo_table import AlbedoTable
+from reference.planning.rules import Boxes
+from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
+from tests import misplanned
+from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
 
-WHITE = {"type": "diffuse", "reflectance": 0.7}
-BLACK = {"type": "diffuse", "reflectance": 0.0}
-
-
-def transform():
-    return mi.ScalarTransform4f()
+WHITE = DIFFUSE
+VIEWER = (0, -6, 3)
 
 
-def scene(viewer=(0, -6, 3), target=(0, 0, 0), size=48, **parts):
-    return {
-        "type": "scene",
-        "integrator": {"type": "path"},
-        "sensor": {
-            "type": "perspective",
-            "fov": 40.0,
-            "to_world": transform().look_at(viewer, target, (0, 0, 1)),
-            "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}},
-        },
-        **parts,
-    }
+def scene(viewer=VIEWER, target=(0, 0, 0), **parts):
+    return misplanned.scene(viewer, target, size=48, **parts)
 
 
 def ball(center=(0, 0, 0), radius=1.0, bsdf=WHITE, **more):
@@ -45,110 +31,62 @@ def ball(center=(0, 0, 0), radius=1.0, bsdf=WHITE, **more):
 
 
 def floor(height=-1.0, bsdf=WHITE):
-    to_world = transform().translate((0, 0, height)).scale(5)
+    to_world = mi.ScalarTransform4f().translate((0, 0, height)).scale(5)
     return {"type": "rectangle", "to_world": to_world, "bsdf": bsdf}
 
 
 def lamp(position, intensity=40.0):
-    return {"type": "point", "position": position, "intensity": intensity}
+    return misplanned.lamp(position, intensity)
 
 
-def mesh(vertices, faces, path):
-    """Write a triangle mesh to a PLY file, faces without vertex normals."""
-    vertices, faces = np.asarray(vertices, float), np.asarray(faces, int)
-    header = (
-        f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
-        f"property float y\nproperty float z\nelement face {len(faces)}\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    lines = [" ".join(f"{x:.9g}" for x in vertex) for vertex in vertices]
-    lines += ["3 " + " ".join(map(str, face)) for face in faces]
-    path.write_text(header + "\n".join(lines) + "\n", encoding="ascii")
-    return {"type": "ply", "filename": str(path), "face_normals": True, "bsdf": WHITE}
+def mesh(path, bsdf=WHITE, flip_normals=False, **form):
+    own = {"filename": str(octahedron(path, **form)), "flip_normals": flip_normals, "bsdf": bsdf}
+    return {"type": "ply", "face_normals": True, **own}
 
 
-def dented_octahedron(depth):
-    """An octahedron whose upper front face is split at its centre, which is pushed in."""
-    points = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
-    faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
-    a, b, c = (np.array(points[i], float) for i in (3, 0, 4))
-    middle = (a + b + c) / 3
-    points.append(tuple(middle * (1 - depth)))
-    return points, [*faces, (3, 0, 6), (0, 4, 6), (4, 3, 6)]
+def wall(position, target, size, bsdf):
+    to_world = mi.ScalarTransform4f().look_at(position, target, (0, 0, 1)).scale(size)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": bsdf}
 
 
-def bowl(rings=8, sides=16):
-    """The inside of a lower half sphere, faces turned to its centre."""
-    points = [(0, 0, -1)]
-    for ring in range(1, rings + 1):
-        t = np.pi / 2 * ring / rings
-        for side in range(sides):
-            p = 2 * np.pi * side / sides
-            points.append((np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), -np.cos(t)))
-    at = lambda ring, side: 1 + (ring - 1) * sides + side % sides  # noqa: E731 a table in one line
-    faces = [(0, at(1, s), at(1, s + 1)) for s in range(sides)]
-    for ring in range(1, rings):
-        for s in range(sides):
-            a, b, c, d = at(ring, s), at(ring + 1, s), at(ring + 1, s + 1), at(ring, s + 1)
-            faces += [(a, b, c), (a, c, d)]
-    return points, faces
-
-
+SKY = {"type": "constant", "radiance": 0.2}
 MIRROR = {"type": "roughplastic", "alpha": 0.02, "diffuse_reflectance": 0.0, "int_ior": 3.0}
+RED = {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.9, 0.1, 0.1)}}
 ADVERSARIAL = {
     "two spheres that shadow each other": lambda tmp: scene(
         one=ball((-1.2, 0, 0)), two=ball((1.2, 0, 0)), light=lamp((-8, 0, 0.5), 300.0)
     ),
-    "a concave bowl": lambda tmp: scene(
-        viewer=(0, -3, 4), bowl=mesh(*bowl(), tmp / "bowl.ply"), light=lamp((1.5, 0, 2), 20.0)
+    "a bowl": lambda tmp: scene(
+        (0, -3, -4), bowl=mesh(tmp / "bowl.ply", faces=4, flip_normals=True), light=lamp((1, 0, -2))
     ),
     "an occluder smaller than a pixel": lambda tmp: scene(
         floor=floor(0.0), dust=ball((0, 0, 2.999), 0.0005), light=lamp((0, 0, 3))
     ),
     "a light inside an object": lambda tmp: scene(
-        shell=ball((0, 0, 0), 0.8), floor=floor(), light=lamp((0, 0, 0)), sky={
-            "type": "constant", "radiance": 0.2
-        }
+        shell=ball((0, 0, 0), 0.8), floor=floor(), light=lamp((0, 0, 0)), sky=SKY
     ),
     "an emissive neighbour": lambda tmp: scene(
         object=ball((-1, 0, 0), 0.8),
         glowing=ball((1, 0, 0), 0.8, emitter={"type": "area", "radiance": 2.0}),
     ),
     "a mirror behind the camera": lambda tmp: scene(
-        object=ball(),
-        mirror={
-            "type": "rectangle",
-            "to_world": transform().look_at((0, -8, 4), (0, 0, 0), (0, 0, 1)).scale(3),
-            "bsdf": MIRROR,
-        },
-        light=lamp((-3, 2, 4)),
+        object=ball(), mirror=wall((0, -8, 4), (0, 0, 0), 3, MIRROR), light=lamp((-3, 2, 4))
     ),
-    "a mesh that is almost convex": lambda tmp: scene(
-        viewer=(2.5, -2.5, 2),
-        thing=mesh(*dented_octahedron(0.15), tmp / "dented.ply"),
-        light=lamp((0.2, -3, 3)),
+    "a mesh with a dent": lambda tmp: scene(
+        (2.5, -2.5, 2), thing=mesh(tmp / "dent.ply", height=-0.1), light=lamp((0.2, -1, 3))
     ),
     "a black room with one coloured wall": lambda tmp: scene(
-        viewer=(0, -3.9, 0),
+        (0, -3.9, 0),
         object=ball((0.8, 0, 0), 0.7),
         floor=floor(-2.0, BLACK),
-        wall={
-            "type": "rectangle",
-            "to_world": transform().translate((-2, 0, 0)).rotate((0, 1, 0), 90).scale(3),
-            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.9, 0.1, 0.1)}},
-        },
+        wall=wall((-2, 0, 0), (0, 0, 0), 3, RED),
         light=lamp((-1, -1, 1.5), 10.0),
     ),
     "a light at the horizon": lambda tmp: scene(floor=floor(0.0), light=lamp((2, 0, 0.0))),
     "a camera inside a sphere": lambda tmp: scene(
-        viewer=(0, 0, 0.3),
-        target=(1, 0, 0),
-        room={
-            "type": "sphere", "radius": 2.0, "flip_normals": True, "bsdf": WHITE
-        },
-        light=lamp((0.5, 0.5, 0.5), 5.0),
+        (0, 0, 0.3), (1, 0, 0.31), room=ball(radius=2.0, flip_normals=True), light=lamp((0.5,) * 3)
     ),
-}  # fmt: skip
+}
 CHEAP = {"a light at the horizon"}
 
 
@@ -160,7 +98,7 @@ def test_nothing_that_is_there_is_pruned(rgb, tmp_path, name):
         assert ready.plan.integrator == "direct_all"
     else:
         assert ready.plan.calls_for(OCCLUSION) or ready.plan.calls_for(INTERREFLECTION)
-    result = verify(source, Options(spp=512), steps=False)
+    result = verify(source, Options(spp=512))
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
@@ -173,70 +111,65 @@ def test_nothing_is_pruned_where_light_may_come_through_glass(rgb):
     assert (ready.plan.integrator, ready.plan.max_depth) == ("path", -1)
 
 
-OF_EACH_KIND = ("fig-8-6b", "fig-8-8c", "fig-8-9", "fig-6-5-m40", "fig-6-10", "fig-6-14")
-OF_EACH_KIND += ("lambert-sphere", "plastic-spheres", "metameric-pair", "cornell-box")
-"""Built-in scenes of which each has something that the others have not."""
-OTHERS = [name for name in SCENES if name not in (*OF_EACH_KIND, "narrow-band-lamp")]
-
-
 @pytest.mark.parametrize(
-    "name", [*OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
+    "name",
+    [
+        pytest.param(name, marks=() if name in ("fig-8-9", "fig-6-14") else pytest.mark.thorough)
+        for name in SCENES
+        if name != "narrow-band-lamp"
+    ],
 )
 def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
     mi.set_variant(SCENES[name].variant)
-    result = verify(SCENES[name].source(), Options(resolution=(48, 48)), steps=False)
+    result = verify(SCENES[name].source(), Options(resolution=(48, 48)))
     assert result.significant == 0
     assert result.heuristic_largest < 1e-6
 
 
 def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
     """The verification can fail: with shadows left out it marks the shadow."""
-    monkeypatch.setattr(Pruning, "judge", lambda self, facts: Ruling(self))
+    prune_blindly(monkeypatch)
     parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=512), steps=False).significant > 0
+    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
 
 
 def facts(parts):
     ready = prepare(Source("facts", scene(**parts, light=lamp((0, 0, 5)))))
-    structure = examine(ready.pair.physical, ready.scene)
-    return {shape.name: shape for shape in structure.shapes}
-
-
-@pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (-0.1, True), (1e-3, False)])
-def test_a_dent_makes_a_mesh_concave_and_a_tip_does_not(rgb, tmp_path, depth, convex):
-    thing = mesh(*dented_octahedron(depth), tmp_path / "thing.ply")
-    assert facts({"thing": thing})["thing"].is_convex is convex
+    return Facts.of(ready.pair, ready.scene).by_name
 
 
 def test_which_shapes_are_convex(rgb, tmp_path):
+    """Not one with a dent of a thousandth."""
     found = facts(
         {
             "ball": ball(),
             "floor": floor(),
             "cube": {"type": "cube", "bsdf": WHITE},
-            "bowl": mesh(*bowl(), tmp_path / "bowl.ply"),
+            "tip": mesh(tmp_path / "tip.ply", height=2.0),
+            "dent": mesh(tmp_path / "dent.ply", height=-1e-3),
+            "bowl": mesh(tmp_path / "bowl.ply", faces=4, bsdf=TWO_SIDED),
             "tube": {"type": "cylinder", "bsdf": WHITE},
         }
     )
-    convex = {name: shape.is_convex for name, shape in found.items()}
-    assert convex == {"ball": True, "floor": True, "cube": True, "bowl": False, "tube": False}
+    assert {name for name, shape in found.items() if shape.is_convex} == {
+        "ball", "floor", "cube", "tip"
+    }  # fmt: skip
     assert found["floor"].plane is not None
 
 
 def test_what_lies_behind_a_one_sided_wall_does_not_face_it(rgb):
     below, above = ball((0, 0, -3), 0.5), ball((0, 0, 3), 0.5)
     found = facts({"floor": floor(0.0), "below": below, "above": above})
-    tree = ShapeTree.of((found["below"], found["floor"], found["above"]))
-    assert tree.first(Queries.everywhere(np.array([1]))) == (0, 2)
-    assert not tree.holding(np.array([0, 1])).answered(Queries.everywhere(np.array([1])))
+    boxes = Boxes([found["below"], found["floor"], found["above"]])
+    assert boxes.is_before[1].tolist() == [False, False, True]
 
 
 def test_a_figure_is_planned_without_random_numbers(rgb):
     plan = prepare(SCENES["fig-8-9"].source()).plan
     assert (plan.integrator, plan.max_depth, plan.shadows) == ("direct_all", 2, False)
-    assert plan.tabulate_environment
+    assert plan.tabulated_environment
     assert plan.kernel_terms == ("k_a", "k_d", "k_s")
-    assert [decision.effect for decision in plan.decisions] == list(EFFECTS)
+    assert [decision.name for decision in plan.effects] == [effect.label for effect in EFFECTS]
 
 
 def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled(rgb):
@@ -246,12 +179,8 @@ def test_several_points_among_diffuse_surfaces_are_exact_and_the_rest_is_sampled
     assert (plan.integrator, plan.max_depth) == ("direct_all", -1)
     result = verify(source, Options(spp=512))
     assert result.significant == 0
-    assert result.gain > 2
-    *steps, whole = result.factors
-    assert [step.name for step in steps] == ["sampler", "integrator", "pruning"]
-    assert np.prod([step.value for step in steps]) == pytest.approx(whole.value) == result.gain
-    assert all(step.low <= step.value <= step.high for step in result.factors)
-    assert steps[2].low == steps[2].high == 1  # its plan leaves nothing out
+    assert result.gain.value > 2
+    assert result.gain.low <= result.gain.value <= result.gain.high
     glossy = parts | {"ball": ball(bsdf={"type": "roughplastic"})}
     assert prepare(Source("glossy", scene(**glossy))).plan.integrator == "path"
 
@@ -274,7 +203,7 @@ def test_spectra_are_called_for_where_three_numbers_are_too_few(rgb, spectrum, w
 def test_everything_is_what_a_user_types_without_thinking(rgb):
     plan = prepare(SCENES["fig-8-9"].source(), Options(everything=True)).plan
     assert (plan.integrator, plan.max_depth, plan.sampler) == ("path", -1, "independent")
-    assert all(decision.called_for for decision in plan.decisions)
+    assert all(decision.called_for for decision in plan.effects)
     assert plan.kernel_terms == ("k_i", "k_a", "k_d", "k_s")
 
 

@@ -12,7 +12,8 @@ from msgspec import structs
 from comparisons.departure.metrics import METRICS, drawn
 from comparisons.departure.statistics import histogram
 from reports.charts import figures
-from reports.files import images, ownership
+from reports.files import images
+from reports.run import results
 from tests import records
 
 SRGB_VIEWING = (64 / np.pi * 0.2, 20.0)
@@ -71,7 +72,7 @@ def test_a_scene_is_written_as_svg_and_pdf_with_its_number(tmp_path):
     figures.write_scene(tmp_path / "figures", "ball", comparison())
     names = ["ball", *(f"ball-histogram-{metric}" for metric in drawn())]
     found = {path.name: path for path in (tmp_path / "figures").iterdir()}
-    found.pop(ownership.MARK)
+    found.pop(results.MARK)
     assert set(found) == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf")}
     for path in found.values():
         content = path.read_bytes()

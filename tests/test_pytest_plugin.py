@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from heuristic.errors import InputError
-from reports.ci.testing import Fotismos
+from reports.ci.testing import Departure, Fotismos
 from tests import small_baselines
 from tests.programs import ROOT, python
 
@@ -84,7 +84,7 @@ def suite(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n", encoding="utf-8")
 
     def run(*arguments, **variables):
-        words = [sys.executable, "-m", "pytest", "-p", "reports.ci.pytest_plugin", "-W", "error"]
+        words = [sys.executable, "-m", "pytest", "-p", "reports.ci.plugin", "-W", "error"]
         # Without the colours and services of the run that this is part of.
         environment = {
             k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "GITHUB"))
@@ -98,6 +98,7 @@ def suite(tmp_path):
     return run
 
 
+@pytest.mark.thorough
 def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     code, printed = suite("-rf")
     assert code == 1
@@ -130,6 +131,7 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
         assert words in printed
 
 
+@pytest.mark.thorough
 def test_without_llvm_tests_are_skipped_with_the_reason(suite):
     code, printed = suite("-rs", DRJIT_LIBLLVM_PATH="/nowhere/libLLVM.so")
     assert code == 0
@@ -139,15 +141,8 @@ def test_without_llvm_tests_are_skipped_with_the_reason(suite):
 
 def test_the_plugin_imports_nothing_heavy():
     heavy = "{'mitsuba', 'drjit', 'numpy'}"
-    code = f"import reports.ci.pytest_plugin, sys; print({heavy} & {{*sys.modules}})"
+    code = f"import reports.ci.plugin, sys; print({heavy} & {{*sys.modules}})"
     assert python("-c", code).stdout.strip() == "set()"
-
-
-def test_the_package_brings_the_plugin():
-    import tomllib
-
-    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert data["project"]["entry-points"]["pytest11"] == {"fotismos": "reports.ci.pytest_plugin"}
 
 
 # --- In this process ------------------------------------------------------------------------------
@@ -194,3 +189,23 @@ def test_what_cannot_be_measured_is_refused(fixtures):
         checked.departure("scenes/scene.xml", metric="dE2001", **SMALL)
     with pytest.raises(InputError, match="a dictionary needs a name"):
         checked.unchanged({"type": "scene"})
+
+
+def test_a_departure_compares_with_numbers_and_with_nothing_else():
+    close, far = (Departure("a", "dE2000", value, 0.1, None, 4) for value in (1.0, 2.0))
+    assert close == 1 != far
+    assert close < far <= 2
+    assert close is not None
+    assert (close == None, close != "one") == (False, True)  # noqa: E711
+    assert {close: "a"}[close] == "a"
+    with pytest.raises(TypeError, match="not supported"):
+        close < None  # noqa: B015
+
+
+@pytest.mark.guarantee("checks", "A baseline's name leads to no other folder.")
+def test_a_baseline_stays_in_its_folder(fixtures, tmp_path):
+    _, updated = fixtures
+    for name in ("../../../esc", "/tmp/esc", "..", "a/b", "a\nb"):
+        with pytest.raises(InputError, match="a file gets that name"):
+            updated.unchanged("scenes/scene.xml", name=name, **SMALL)
+    assert [path.name for path in tmp_path.iterdir()] == ["scenes"]

@@ -5,7 +5,7 @@ from msgspec import structs
 
 from comparisons.departure.metrics import METRICS
 from reports.page import page
-from reports.ranking import FEWEST, rankings
+from reports.page.page import FEWEST, rankings
 from tests import records
 
 

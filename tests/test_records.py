@@ -2,9 +2,9 @@
 
 import pytest
 
-from comparisons import records
-from comparisons.records import VERSION, Record
 from heuristic.errors import InputError
+from reference import records
+from reference.records import VERSION, Record
 
 
 class Toy(Record):
@@ -43,10 +43,18 @@ def test_what_was_written_is_read():
         ("[]", "array"),
         ('{"colour": "red"}', "of fotismos 0.1"),
         ('{"colour": "red", "record_version": 9}', "version 9"),
-        ('{"colour": 5, "record_version": 2}', "got `int`"),
-        ('{"colour": "red", "size": 1, "record_version": 2}', "unknown field `size`"),
+        ('{"colour": 5, "record_version": 3}', "got `int`"),
+        ('{"colour": "red", "size": 1, "record_version": 3}', "unknown field `size`"),
+        ('{"rung": "red", "record_version": 2}', "version 2; version 3 calls rungs `methods`"),
+        (100_000 * "[", "nested too deep"),
+        (f'{{"colour": {10_000 * "1"}}}', "10000 digits"),
     ],
 )
 def test_what_is_not_such_a_record_is_refused(text, expected):
     with pytest.raises(InputError, match=f"^toy.json: .*{expected}"):
         records.read(Toy, text, "toy.json")
+
+
+def test_a_record_of_version_2_in_which_nothing_changed_is_read():
+    text = records.to_json(Toy("red", 0.5)).replace('"record_version": 3', '"record_version": 2')
+    assert records.read(Toy, text, "toy.json") == Toy("red", 0.5)

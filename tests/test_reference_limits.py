@@ -6,7 +6,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons import records
 from comparisons.departure.limits import (
     SMALLEST_ALPHA,
     WEDGE_LOST,
@@ -16,8 +15,10 @@ from comparisons.departure.limits import (
     fireflies,
     lights_of,
     of_scene,
+    terminator,
 )
 from heuristic import meshes
+from reference.scene.source import Source
 
 SIDE = 32
 UP = np.broadcast_to([0.0, 0.0, 1.0], (SIDE, SIDE, 3))
@@ -43,19 +44,20 @@ def noise(seed=0, size=0.01):
     return np.abs(np.random.default_rng(seed).normal(size=GREY.shape)) * size
 
 
-def test_a_surface_without_limits_has_none(plain):
-    limits = find(plain, GREY, noise())
-    assert records.plain(limits.counts()) == {
-        "clamped": 0, "terminator": 0, "energy_loss": 0, "fireflies": 0, "any": 0
-    }  # fmt: skip
-
-
-def test_alpha_at_mitsubas_smallest_is_clamped_and_above_it_not(plain):
-    alpha = plain.alpha.copy()
+def test_limits_of_plain_arrays_are_where_the_arrays_say(plain):
+    assert not any(mask.any() for mask in find(plain, GREY, noise()).values())
+    alpha, albedo = plain.alpha.copy(), plain.albedo.copy()
     alpha[0, :3] = SMALLEST_ALPHA, 1e-6, 1.01 * SMALLEST_ALPHA
-    limits = find(replace(plain, alpha=alpha), GREY, noise())
-    assert limits.counts().clamped == 2
-    assert limits.clamped[0, :3].tolist() == [True, True, False]
+    albedo[1], albedo[2] = 0.74, 0.985
+    changed = replace(plain, alpha=alpha, albedo=albedo)
+    limits = find(changed, GREY, noise())
+    assert limits["clamped"][0, :3].tolist() == [True, True, False]
+    counts = {name: int(mask.sum()) for name, mask in limits.items()}
+    assert counts == {
+        "clamped": 2, "terminator": 0, "energy_loss": SIDE, "fireflies": 0, "any": SIDE + 2
+    }  # fmt: skip
+    nothing = np.zeros((SIDE, SIDE), bool)
+    assert not find(changed, GREY, noise(), nothing)["any"].any()
 
 
 GRAZING = np.array([-0.96, 0.0, 0.28])
@@ -69,16 +71,14 @@ LIT_FROM = {
 
 @pytest.mark.parametrize("which", ["view", *LIT_FROM])
 def test_normals_that_disagree_about_light_or_viewer_are_a_terminator(plain, which):
-    tilted = UP.copy()
+    tilted, grazing = UP.copy(), UP.copy()
     tilted[4, 5] = 0.8, 0.0, 0.6
-    grazing = UP.copy()
     grazing[4, 5] = GRAZING
     changed = {"view": grazing} if which == "view" else {"lights": LIT_FROM[which]}
-    limits = find(replace(plain, shading=tilted, **changed), GREY, noise())
-    assert limits.counts().terminator == 1
-    assert limits.terminator[4, 5]
-    assert not find(replace(plain, shading=tilted), GREY, noise()).terminator.any()
-    assert not find(replace(plain, **changed), GREY, noise()).terminator.any()
+    both, normals = replace(plain, shading=tilted, **changed), replace(plain, shading=tilted)
+    assert np.argwhere(terminator(both)).tolist() == [[4, 5]]
+    assert not terminator(normals).any()
+    assert not terminator(replace(plain, **changed)).any()
 
 
 def test_under_light_from_all_sides_the_wedge_that_counts_is_a_hundredth(plain):
@@ -87,14 +87,7 @@ def test_under_light_from_all_sides_the_wedge_that_counts_is_a_hundredth(plain):
         angle = np.deg2rad(degrees)
         tilted[0, x] = np.sin(angle), 0, np.cos(angle)
     shaded = replace(plain, shading=tilted, lights=LIT_FROM["all sides"])
-    assert np.argwhere(find(shaded, GREY, noise()).terminator).tolist() == [[0, 1]]
-
-
-def test_a_surface_that_loses_light_is_marked(plain):
-    albedo = plain.albedo.copy()
-    albedo[:2] = 0.74
-    albedo[2] = 0.985
-    assert find(replace(plain, albedo=albedo), GREY, noise()).counts().energy_loss == 2 * SIDE
+    assert np.argwhere(terminator(shaded)).tolist() == [[0, 1]]
 
 
 def test_a_pixel_whose_light_came_in_one_pass_is_a_firefly():
@@ -108,56 +101,94 @@ def test_a_pixel_whose_light_came_in_one_pass_is_a_firefly():
     assert not fireflies(noisy.mean(axis=0), noisy.std(axis=0, ddof=1) / 4).any()
 
 
-def test_pixels_that_do_not_count_are_not_marked(plain):
-    nothing = np.zeros((SIDE, SIDE), bool)
-    bad = replace(plain, alpha=np.zeros((SIDE, SIDE)), albedo=np.zeros((SIDE, SIDE)))
-    assert find(bad, GREY, noise(), nothing).counts().any == 0
-    assert find(bad, GREY, noise()).counts().any == SIDE**2
+# --- Materials of a scene ------------------------------------------------------------------------
 
 
-def scene(bsdf, shape=None):
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "sensor": {
-                "type": "perspective", "fov": 40.0,
-                "to_world": mi.ScalarTransform4f().look_at((-3, 0, 1), (0, 0, 0), (0, 0, 1)),
-            },
-            "shape": {"type": "sphere", **(shape or {}), "bsdf": bsdf},
-            "light": {"type": "point", "position": (-4, 0, 0), "intensity": 10.0},
-            "spot": {
-                "type": "spot",
-                "to_world": mi.ScalarTransform4f().look_at((0, 0, 3), (0, 0, 0), (0, 1, 0)),
-            },
+def plastic(alpha, **more):
+    return {"type": "roughplastic", "alpha": alpha, "diffuse_reflectance": 0.2, **more}
+
+
+def blend(weight):
+    """Diffuse, with a share of plastic that is too smooth."""
+    parts = {"a": {"type": "diffuse"}, "b": plastic(1e-5)}
+    return {"type": "blendbsdf", "weight": weight, **parts}
+
+
+HALF = {"type": "checkerboard", "color0": 0.0, "color1": 1.0,
+        "to_uv": mi.ScalarTransform4f().scale((1, 0.5, 1))}  # fmt: skip
+"""1 on the first half of u, 0 on the second."""
+
+MATERIALS = {
+    "smooth": (plastic(1e-5), {"clamped"}),
+    "sharp": (plastic(0.05), set()),
+    "rough": (plastic(0.5), {"energy_loss"}),
+    "two-sided": ({"type": "twosided", "bsdf": plastic(0.5)}, {"energy_loss"}),
+    "front only": ({"type": "twosided", "a": plastic(0.5), "b": plastic(0.05)}, {"energy_loss"}),
+    "diffuse": ({"type": "diffuse", "reflectance": 1.0}, set()),
+    "beckmann": (plastic(0.1), set()),
+    "ggx": (plastic(0.1, distribution="ggx"), {"energy_loss"}),
+    "all diffuse": (blend(0.0), set()),
+    "some plastic": (blend(0.3), {"clamped"}),
+    "thin": ({"type": "mask", "opacity": 0.1, "bsdf": plastic(0.5)}, set()),
+    "dense": ({"type": "mask", "opacity": 0.9, "bsdf": plastic(0.5)}, {"energy_loss"}),
+    "bumpy": ({"type": "bumpmap", "t": HALF, "bsdf": plastic(0.5)}, {"energy_loss"}),
+    "own": ({"type": "MyRoughPlastic"}, set()),
+}
+"""Materials, and the limits that they have wherever they are seen."""
+
+
+class MyRoughPlastic(mi.BSDF):
+    """A plugin of a user."""
+
+    def __init__(self, props):
+        super().__init__(props)
+        self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide]
+
+    def to_string(self):
+        return "MyRoughPlastic[]"
+
+
+def surfaces_of(bsdf, **sphere):
+    """Return what a camera sees of a sphere of a material."""
+    graph = Source("a", lambda: {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective", "fov": 40.0,
+            "to_world": mi.ScalarTransform4f().look_at((-3, 0, 1), (0, 0, 0), (0, 0, 1)),
         },
-        optimize=False,
-    )  # fmt: skip
+        "shape": {"type": "sphere", **sphere, "bsdf": bsdf},
+        "light": {"type": "point", "position": (-4, 0, 0), "intensity": 10.0},
+        "spot": {
+            "type": "spot",
+            "to_world": mi.ScalarTransform4f().look_at((0, 0, 3), (0, 0, 0), (0, 1, 0)),
+        },
+    }).parse()  # fmt: skip
+    return of_scene(graph.instantiate(), graph, SIDE, SIDE)
 
 
-@pytest.mark.parametrize(
-    ("alpha", "expected"),
-    [
-        (1e-5, {"clamped": True, "energy_loss": False}),
-        (0.05, {"clamped": False, "energy_loss": False}),
-        (0.5, {"clamped": False, "energy_loss": True}),
-    ],
+@pytest.mark.guarantee(
+    "means",
+    "Pixels are marked as beyond the reference's own limits by the materials that they show:"
+    " distribution, blends, masks and sides included.",
 )
-@pytest.mark.parametrize("twosided", [False, True])
-def test_a_scenes_roughplastic_is_read(rgb, alpha, expected, twosided):
-    bsdf = {"type": "roughplastic", "alpha": alpha, "diffuse_reflectance": 0.2}
-    bsdf = {"type": "twosided", "bsdf": bsdf} if twosided else bsdf
-    surfaces = of_scene(scene(bsdf), SIDE, SIDE)
-    limits = find(surfaces, GREY, noise())
-    assert 0.2 < surfaces.hit.mean() < 0.9
-    for name, everywhere in expected.items():
-        np.testing.assert_array_equal(getattr(limits, name), surfaces.hit & everywhere)
+def test_limits_are_of_the_material_that_a_pixel_shows(rgb):
+    mi.register_bsdf("MyRoughPlastic", MyRoughPlastic)
+    for name, (bsdf, expected) in MATERIALS.items():
+        surfaces = surfaces_of(bsdf)
+        masks = find(surfaces, GREY, noise())
+        assert 0.2 < surfaces.hit.mean() < 0.9
+        for limit in ("clamped", "energy_loss"):
+            everywhere = surfaces.hit & (limit in expected)
+            np.testing.assert_array_equal(masks[limit], everywhere, err_msg=f"{name}: {limit}")
+        assert not masks["terminator"].any(), "a sphere's two normals are one"
     assert surfaces.lights.points.tolist() == [[-4, 0, 0], [0, 0, 3]]
-    assert not limits.terminator.any(), "a sphere's two normals are one"
 
 
-def test_other_materials_have_no_limit(rgb):
-    surfaces = of_scene(scene({"type": "diffuse", "reflectance": 1.0}), SIDE, SIDE)
-    assert find(surfaces, GREY, noise()).counts().any == 0
+def test_a_textured_blend_is_limited_where_its_plastic_is(rgb):
+    surfaces = surfaces_of(blend(HALF))
+    clamped = find(surfaces, GREY, noise())["clamped"]
+    first = surfaces.position[..., 1] > 0  # u grows from the x axis around z
+    np.testing.assert_array_equal(clamped[surfaces.hit], first[surfaces.hit])
 
 
 # --- Terminators of a mesh -------------------------------------------------------------------
@@ -197,7 +228,7 @@ def seen(scene, integrator, samples=1):
 
 def marked(surfaces):
     nothing = np.zeros((64, 64, 3))
-    return find(surfaces, nothing, nothing).terminator
+    return find(surfaces, nothing, nothing)["terminator"]
 
 
 def cosines(surfaces, toward):
@@ -216,7 +247,7 @@ def cosines(surfaces, toward):
 def test_a_coarse_mesh_with_smooth_normals_is_black_where_it_is_marked(rgb, name):
     """Where the interpolated normal still sees the light and the face does not."""
     scene = coarse_sphere(LIGHTS[name])
-    surfaces = of_scene(scene, 64, 64)
+    surfaces = of_scene(scene, None, 64, 64)
     at_infinity = name != "point"
     toward = (1, 0.3, 0) if at_infinity else np.array([5, 0, 0]) - surfaces.position
     shading, geometric, view = cosines(surfaces, np.broadcast_to(toward, (64, 64, 3)))
@@ -235,7 +266,7 @@ def test_pixels_that_lose_a_part_of_an_area_light_are_marked(rgb):
     place = mi.ScalarTransform4f().look_at((3, 0, 0), (0, 0, 0), (0, 0, 1))
     light = {"type": "rectangle", "to_world": place, "emitter": {"type": "area", "radiance": 1.0}}
     scene = coarse_sphere(light)
-    surfaces = of_scene(scene, 64, 64)
+    surfaces = of_scene(scene, None, 64, 64)
     cells = (np.arange(64) + 0.5) / 32 - 1
     y, z = (axis.ravel() for axis in np.meshgrid(cells, cells))
     points = np.stack([np.full_like(y, 3), y, z], axis=1)
@@ -258,7 +289,7 @@ def test_pixels_that_lose_a_part_of_an_area_light_are_marked(rgb):
 
 def test_what_an_environment_loses_by_two_normals_is_the_wedge_between_them(rgb):
     scene = coarse_sphere({"type": "constant", "radiance": 1.0})
-    surfaces = of_scene(scene, 64, 64)
+    surfaces = of_scene(scene, None, 64, 64)
     assert surfaces.lights.surrounding
     radiance = seen(scene, {"type": "direct"}, samples=256)
     _, _, view = cosines(surfaces, surfaces.view)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.compare import compare, prepare
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
+from comparisons.prepared import prepare
 from heuristic.errors import NonFiniteError
 from reference.pairing import halves
 from reference.rendering import passes, renderer, sums
@@ -66,52 +66,12 @@ def estimate(made, integrator, spp, passes, first_seed=0):
     return total.estimate()
 
 
-# --- Sums ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("passes", [2, 3, 16])
-def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
-    rng = np.random.default_rng(passes)
-    images = rng.exponential(size=(passes, 5, 7, 3)).astype(np.float32)
-    total = sums.Accumulator()
-    for image in images:
-        total.add(mi.TensorXf(image))
-    found, images = total.estimate(), images.astype(float)
-    np.testing.assert_allclose(found.mean, images.mean(axis=0), rtol=1e-12)
-    error = images.std(axis=0, ddof=1) / np.sqrt(passes)
-    np.testing.assert_allclose(found.standard_error, error, rtol=1e-9)
-    signs = np.where(np.arange(passes) % 2, -1, 1)[:, None, None, None]
-    np.testing.assert_allclose(found.noise, (signs * images).mean(axis=0), atol=1e-12)
-    assert found.passes == passes
-
-
-def test_running_sums_keep_small_noise_on_a_large_level(rgb):
-    """A sum of squares less the square of the sum would lose it."""
-    rng = np.random.default_rng(1)
-    images = 1e4 + rng.normal(size=(50, 4, 4, 3)) * 1e-3
-    total = sums.Accumulator()
-    for image in images:
-        total.add(mi.TensorXd(image))
-    error = images.std(axis=0, ddof=1) / np.sqrt(50)
-    np.testing.assert_allclose(total.estimate().standard_error, error, rtol=1e-6)
-
-
-def test_the_noise_image_has_the_spread_of_the_mean(rgb):
-    """Its root mean square is the standard error's, over many pixels."""
-    rng = np.random.default_rng(2)
-    total = sums.Accumulator()
-    for _ in range(8):
-        total.add(mi.TensorXd(5 + rng.normal(size=(100, 100, 3))))
-    found = total.estimate()
-    assert np.sqrt(np.mean(found.noise**2)) == pytest.approx(1 / np.sqrt(8), rel=0.02)
-    assert np.sqrt(np.mean(found.standard_error**2)) == pytest.approx(1 / np.sqrt(8), rel=0.02)
-
-
 # --- Common random numbers -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["fig-8-9", "plastic-spheres"])
-@pytest.mark.parametrize("integrator", ["path", "direct_all", "direct"])
+@pytest.mark.parametrize(
+    ("name", "integrator"), [("fig-8-9", "direct_all"), ("plastic-spheres", "path")]
+)
 def test_camera_rays_coincide_in_both_halves(rgb, name, integrator):
     """Same sampler and seed: what the pixels see differs by exactly nothing."""
     pair = halves.pair(SCENES[name].source(), resolution=(48, 48))
@@ -174,22 +134,6 @@ def test_means_vary_as_those_of_independent_passes_must(rgb):
     assert of_means.mean() / within.mean() == pytest.approx(1.0, abs=0.1)
 
 
-def test_neighbouring_seeds_are_as_different_as_distant_ones(rgb):
-    """By mean absolute difference, on the Cornell box: 0.23 of it while seeds were added up."""
-
-    def image(seed):
-        options = Options(seed=seed, resolution=(48, 48), spp=64)
-        return compare(SCENES["cornell-box"].source(), options).images.reference
-
-    def off(one, other):
-        return np.mean(np.abs(one - other))
-
-    images = {seed: image(seed) for seed in (0, 1, 2, 3, 1000, 2000)}
-    near = [off(images[a], images[b]) for a, b in ((0, 1), (1, 2), (2, 3))]
-    far = [off(images[a], images[b]) for a, b in ((0, 1000), (1, 2000), (1000, 2000))]
-    assert np.mean(near) / np.mean(far) == pytest.approx(1, abs=0.1)
-
-
 # --- Direct light ----------------------------------------------------------------------------
 
 
@@ -226,41 +170,12 @@ def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
     assert ours.standard_error.mean() < theirs.standard_error.mean()
 
 
-@pytest.mark.parametrize("max_depth", [3, -1])
+@pytest.mark.parametrize("max_depth", [pytest.param(3, marks=pytest.mark.thorough), -1])
 def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
     """Between a sphere and a floor, of points, a lamp and the sky."""
     made = mi.load_dict(scene(one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = ({"type": kind, "max_depth": max_depth} for kind in ("direct_all", "path"))
     check_same_means(made, *integrators, passes=32)
-
-
-def test_hidden_emitters_are_not_seen(rgb):
-    made = mi.load_dict(scene(lamp=lamp(), sky=CONSTANT))
-    shown, hidden = (
-        np.array(
-            mi.render(
-                made,
-                integrator=mi.load_dict({"type": "direct_all", "hide_emitters": hide}),
-                spp=16,
-                seed=0,
-            )
-        )
-        for hide in (False, True)
-    )
-    assert np.allclose(shown[0, 0], 0.3)
-    assert not hidden[0, 0].any()
-
-
-def test_direct_light_of_several_points_has_no_noise(rgb):
-    """Seen through the same camera rays it is the sum of what each light gives alone."""
-    direct_all = mi.load_dict({"type": "direct_all"})
-
-    def picture(**lights):
-        made = mi.load_dict(scene(**lights))
-        return np.array(mi.render(made, integrator=direct_all, spp=4, seed=3), float)
-
-    together = picture(one=POINT, two=SECOND)
-    np.testing.assert_allclose(together, picture(one=POINT) + picture(two=SECOND), atol=1e-6)
 
 
 def test_direct_light_of_one_point_is_mitsubas_to_rounding(rgb):
@@ -273,15 +188,6 @@ def test_direct_light_of_one_point_is_mitsubas_to_rounding(rgb):
         )
     )
     np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-7)
-
-
-def test_direct_light_is_paths_of_length_2(rgb):
-    made = mi.load_dict(scene(point=POINT, lamp=lamp()))
-    ours = estimate(made, mi.load_dict({"type": "direct_all"}), 64, 16)
-    path = estimate(made, mi.load_dict({"type": "path", "max_depth": 2}), 64, 16, 500)
-    difference = (ours.mean - path.mean).mean()
-    error = np.hypot(ours.standard_error, path.standard_error)
-    assert abs(difference) < 5 * np.sqrt(np.sum(error**2)) / error.size + 1e-6
 
 
 # --- Standard errors -------------------------------------------------------------------------
@@ -303,6 +209,7 @@ def coverage(repetitions, passes=8):
     return np.mean(shares)
 
 
+@pytest.mark.thorough
 def test_standard_errors_are_honest(rgb):
     """95 % intervals hold the truth in 90 to 98 % of pixels, over 30 seeds."""
     assert 0.90 < coverage(30) < 0.98
@@ -312,14 +219,6 @@ def test_standard_errors_are_honest(rgb):
 def test_standard_errors_are_honest_over_100_seeds(rgb):
     """95 % intervals hold the truth in 93 to 97 % of pixels."""
     assert 0.93 < coverage(100, passes=16) < 0.97
-
-
-def test_the_mean_gets_better_as_it_says(rgb):
-    """Four times the passes halve the standard error."""
-    made = mi.load_dict(scene(lamp=lamp()))
-    integrator = mi.load_dict({"type": "direct_all"})
-    few, many = (estimate(made, integrator, 4, passes).standard_error for passes in (8, 32))
-    assert np.sqrt(np.mean(few**2) / np.mean(many**2)) == pytest.approx(2, rel=0.15)
 
 
 # --- Failures --------------------------------------------------------------------------------
@@ -375,6 +274,6 @@ def test_times_are_of_all_passes(rgb):
         half.render(seed)
     times = half.pass_times()
     assert times.passes == 5
-    assert 0 < times.median < times.total
-    assert times.first < times.total
-    assert 0 <= times.compilation <= times.total
+    assert 0 < times.median_s < times.total_s
+    assert times.first_s < times.total_s
+    assert 0 <= times.compile_s <= times.total_s

@@ -4,9 +4,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import Request, open_case
-from comparisons.compare import prepare
-from comparisons.cost.methods import Methods
+from comparisons.case import open_case
+from comparisons.cost.methods import Ladder
+from comparisons.options import Options
+from comparisons.prepared import prepare
 from reference.rendering.renderer import Renderer, variant
 from tests.programs import python
 
@@ -15,11 +16,11 @@ SEEDS = (1, 2, 3)
 
 def methods(name):
     """Return a renderer of each method of a scene's ladder."""
-    case = open_case(name, Request(resolution=(24, 16)))
+    case = open_case(name, Options(resolution=(24, 16)))
     mi.set_variant(case.variant)
     ready = prepare(case.source, case.options)
-    found = Methods(case.source, case.options, ready)
-    return {rung.name: found.renderer(rung.method, 4) for rung in found.rungs}
+    found = Ladder(case.source, case.options, ready)
+    return {method.name: found.renderer(method, 4) for method in found.methods}
 
 
 def traced(renderer, seed):
@@ -32,26 +33,31 @@ def traced(renderer, seed):
 
 # A plain pair, lamps and glossy surfaces, many materials, an environment from a table, meshes.
 @pytest.mark.parametrize(
-    "name", ["lambert-sphere", "plastic-spheres", "cornell-box", "fig-8-9", "fig-6-14"]
+    "name",
+    [
+        pytest.param(name, marks=() if name == "fig-8-9" else pytest.mark.thorough)
+        for name in ("lambert-sphere", "plastic-spheres", "cornell-box", "fig-8-9", "fig-6-14")
+    ],
 )
 def test_replayed_passes_are_traced_ones_bit_for_bit(name):
-    for rung, renderer in methods(name).items():
+    for method, renderer in methods(name).items():
         for seed in SEEDS:
             image = np.array(renderer.render(seed))
             if seed != SEEDS[0]:  # the first is traced
-                assert np.array_equal(image, traced(renderer, seed)), (rung, seed)
+                assert np.array_equal(image, traced(renderer, seed)), (method, seed)
 
 
 REPLAYED = """
 from tests.test_replays import SEEDS, methods
 for name in {names}:
-    for rung, renderer in methods(name).items():
+    for method, renderer in methods(name).items():
         for seed in SEEDS:
             renderer.render(seed)
-        print(name, rung, renderer.replays, sep="|")
+        print(name, method, renderer.replays, sep="|")
 """
 
 
+@pytest.mark.thorough
 def test_later_passes_are_replayed_in_a_process_of_their_own():
     # What other tests leave alive, such as a BSDF without a scene, keeps Dr.Jit from it.
     done = python("-c", REPLAYED.format(names=("plastic-spheres", "fig-8-9")))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from heuristic.errors import InputError
-from reference.scene.script import Script
+from reference.scene.source import Script
 from tests.small_scene import SCENE
 
 SCENE_OF = """
@@ -43,6 +43,7 @@ DEEDS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee(
     "runs",
     "Changes that a scene's script makes to its process affect no other scene.",

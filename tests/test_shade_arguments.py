@@ -38,18 +38,21 @@ ACCEPTED = {
 }
 
 
-@pytest.mark.parametrize("given", ACCEPTED.values(), ids=ACCEPTED.keys())
-@pytest.mark.parametrize("name", ["normal", "view"])
-def test_a_vector_may_be_given_in_any_of_these_forms(name, given):
+def test_a_vector_may_be_given_in_any_of_these_forms():
     expected = np.array(shaded(normal=Array3f(UP), view=Array3f(UP)))
-    np.testing.assert_allclose(np.array(shaded(**{name: given})), expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("vector", [Array3f16, Array3i])
-def test_narrow_types_are_computed_in_single_precision(vector):
-    value = shaded(vector(0, 0, 0), vector(0, 0, 1), vector(0, 0, 1))
-    assert type(value) is Float
-    assert value[0] == pytest.approx(0.8)
+    for name in ("normal", "view"):
+        for form, given in ACCEPTED.items():
+            value = np.array(shaded(**{name: given}))
+            np.testing.assert_allclose(value, expected, rtol=1e-6, err_msg=form)
+    for narrow in (Array3f16, Array3i):  # are computed in single precision
+        value = shaded(narrow(0, 0, 0), narrow(0, 0, 1), narrow(0, 0, 1))
+        assert type(value) is Float
+        assert value[0] == pytest.approx(0.8)
+    number = np.float32(2)
+    spot, same = (SpotLight((0, 0, 3), (0, 0, -1), n, 20 * n, n) for n in (number, 2))
+    value = shaded(material=Material(k_d=0.1 * number, n=number), lights=[spot])
+    other = shaded(material=Material(k_d=0.2, n=2), lights=[same])
+    np.testing.assert_allclose(np.array(value), np.array(other), rtol=1e-6)
 
 
 REFUSED_VECTORS = {
@@ -69,19 +72,6 @@ REFUSED_VECTORS = {
     "other points": points(4),
     "no points": dr.zeros(Array3f, 0),
 }
-
-
-@pytest.mark.parametrize("given", REFUSED_VECTORS.values(), ids=REFUSED_VECTORS.keys())
-@pytest.mark.parametrize("name", ["position", "normal", "view"])
-def test_any_other_vector_is_refused_by_name(name, given):
-    arguments = {"position": points(), "normal": points(), "view": points()} | {name: given}
-    with pytest.raises(InputError, match=name):
-        shade(**arguments, material=GREY, lights=[LAMP])
-
-
-def test_plain_numbers_alone_are_refused():
-    with pytest.raises(InputError, match="none of them"):
-        shade(UP, UP, UP, GREY, [LAMP])
 
 
 REFUSED_REST = [
@@ -104,42 +94,40 @@ REFUSED_REST = [
 ]
 
 
-@pytest.mark.parametrize(("words", "message"), REFUSED_REST)
-def test_any_other_argument_is_refused_by_name(words, message):
-    with pytest.raises(InputError, match=message):
-        shaded(**words)
+def test_any_other_argument_is_refused_by_name():
+    for name in ("position", "normal", "view"):
+        for given in REFUSED_VECTORS.values():
+            words = {"position": points(), "normal": points(), "view": points()} | {name: given}
+            with pytest.raises(InputError, match=name):
+                shade(**words, material=GREY, lights=[LAMP])
+    with pytest.raises(InputError, match="none of them"):
+        shade(UP, UP, UP, GREY, [LAMP])
+    for words, message in REFUSED_REST:
+        with pytest.raises(InputError, match=message):
+            shaded(**words)
 
 
 ODD = [None, "x", object(), [1, [2]], ["a"], 1j, {1: 2}, 10**400, float("nan"), -1, (), Array2f(1)]
 
 
-@pytest.mark.parametrize("odd", ODD, ids=lambda odd: str(odd)[:9])
-def test_odd_values_are_refused_where_a_material_or_light_is_made(odd):
-    makers = [
-        lambda: Material(n=odd),
-        lambda: Material(form=odd),
-        lambda: Material(normalised=odd),
-        lambda: PointLight(odd, 1),
-        lambda: PointLight(UP, 1, attenuation=odd),
-        lambda: PointLight(UP, 1, clamped=odd),
-        lambda: DirectionalLight(odd, 1),
-        lambda: SpotLight(UP, UP, 1, cutoff=odd),
-        lambda: SpotLight(UP, UP, 1, cutoff=30, exponent=odd),
-    ]
-    if not dr.is_array_v(odd):
-        makers += [lambda: Material(k_d=odd), lambda: PointLight(UP, odd)]
-    for make in makers:
-        with pytest.raises(InputError):
-            make()
-
-
-@pytest.mark.parametrize("number", [np.int32(2), np.float32(2), np.float64(2)])
-def test_numbers_of_numpy_are_numbers(number):
-    spot = SpotLight((0, 0, 3), (0, 0, -1), number, cutoff=20 * number, exponent=number)
-    same = SpotLight((0, 0, 3), (0, 0, -1), 2, cutoff=40, exponent=2)
-    value = shaded(material=Material(k_d=0.1 * number, k_s=0.5, n=number), lights=[spot])
-    expected = shaded(material=Material(k_d=0.2, k_s=0.5, n=2), lights=[same])
-    np.testing.assert_allclose(np.array(value), np.array(expected), rtol=1e-6)
+def test_odd_values_are_refused_where_a_material_or_light_is_made():
+    for odd in ODD:
+        makers = [
+            lambda odd: Material(n=odd),
+            lambda odd: Material(form=odd),
+            lambda odd: Material(normalised=odd),
+            lambda odd: PointLight(odd, 1),
+            lambda odd: PointLight(UP, 1, attenuation=odd),
+            lambda odd: PointLight(UP, 1, clamped=odd),
+            lambda odd: DirectionalLight(odd, 1),
+            lambda odd: SpotLight(UP, UP, 1, cutoff=odd),
+            lambda odd: SpotLight(UP, UP, 1, cutoff=30, exponent=odd),
+        ]
+        if not dr.is_array_v(odd):
+            makers += [lambda odd: Material(k_d=odd), lambda odd: PointLight(UP, odd)]
+        for make in makers:
+            with pytest.raises(InputError):
+                make(odd)
 
 
 def test_lights_may_come_from_any_iterable():
@@ -160,9 +148,9 @@ MATERIALS = [
 ]
 
 
-@pytest.mark.parametrize("material", MATERIALS)
-def test_without_lights_the_type_is_the_same(material):
-    assert type(shaded(material=material, lights=[])) is type(shaded(material=material))
+def test_without_lights_the_type_is_the_same():
+    for material in MATERIALS:
+        assert type(shaded(material=material, lights=[])) is type(shaded(material=material))
 
 
 # -- Gradients -------------------------------------------------------------------------------------

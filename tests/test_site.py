@@ -54,7 +54,7 @@ def test_links_to_modules_name_what_exists(sources):
     assert len(names) > 100
     assert [name for name in names if locate(name) is None] == []
     assert "heuristic.terms.specular" in names  # by the index of equations
-    assert "heuristic.shading.shade" in names  # by its other name, heuristic.shade
+    assert "heuristic.kernel.shade" in names  # by its other name, heuristic.shade
 
 
 class Loaded(HTMLParser):

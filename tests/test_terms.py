@@ -41,16 +41,6 @@ def directions(draw):
 # --- Emission, ambient and diffuse light -----------------------------------------------------
 
 
-def test_emission_is_its_coefficient():
-    assert terms.emission(0.3) == 0.3
-
-
-@FLOATS
-def test_ambient_is_the_product(float_type):
-    intensity = np.linspace(0, 2, 11)
-    require(terms.ambient(float_type(intensity), 0.3), 0.3 * intensity, 4 * step(float_type))
-
-
 @FLOATS
 def test_diffuse_is_the_cosine_and_nothing_at_or_below_the_horizon(float_type):
     found = terms.diffuse(2.0, 0.5, float_type(COSINES))
@@ -101,15 +91,6 @@ def test_specular_is_the_power_and_nothing_where_the_lobe_ends(float_type, n, op
 
 
 @FLOATS
-@pytest.mark.parametrize("opaque", [False, True], ids=["literal", "opaque"])
-def test_exponent_zero_is_an_even_lobe_that_ends_at_a_right_angle(float_type, opaque):
-    """The limit of small ``n``; ``0 ** 0`` neither counts as 1 nor becomes NaN."""
-    n = dr.opaque(float_type, 0) if opaque else 0
-    found = terms.power(float_type([-1, -0.5, 0, 1e-20, 0.5, 1]), n)
-    np.testing.assert_array_equal(np.array(found), [0, 0, 0, 1, 1, 1])
-
-
-@FLOATS
 def test_a_large_exponent_tends_to_the_perfect_mirror(float_type):
     """8.8 becomes 8.7: on the axis nothing changes, off it the ratio falls to 0."""
     angles = np.deg2rad([0, 0.5, 1, 5, 30])
@@ -126,14 +107,6 @@ def test_a_large_exponent_tends_to_the_perfect_mirror(float_type):
     assert np.all(off_axis[-1] / on_axis[-1] < 1e-15)
 
 
-@bounded
-@given(directions(), directions(), st.floats(0, 200))
-def test_the_lobe_is_never_more_than_the_light(normal, toward, n):
-    cosine = dr.dot(normal, toward)
-    value = terms.specular(1.0, 1.0, cosine, n)
-    assert 0 <= value <= 1 + 1e-12 * (n + 1)
-
-
 # --- Vectors ---------------------------------------------------------------------------------
 
 
@@ -148,11 +121,6 @@ def test_the_mirror_vector_has_equal_angles_one_plane_and_unit_length(normal, to
     # Of the two directions that satisfy them, it is the one on the other side of the normal.
     across = dr.cross(normal, toward)
     np.testing.assert_allclose(dr.cross(normal, mirrored), -np.array(across), atol=1e-14)
-
-
-def test_the_mirror_vector_of_the_normal_is_the_normal():
-    normal = Vector(0, 0.6, 0.8)
-    np.testing.assert_allclose(vectors.mirror_vector(normal, normal, 1.0), normal, atol=1e-15)
 
 
 @FLOATS
@@ -227,16 +195,6 @@ def test_the_cone_holds_its_edge_and_nothing_beyond(float_type):
     edge = float_type(0.75)
     inside = np.array(terms.spot_cone(float_type([1, 0.7501, 0.75, 0.7499, 0, -1]), edge))
     np.testing.assert_array_equal(inside, [1, 1, 1, 0, 0, 0])
-
-
-@FLOATS
-def test_the_fall_off_is_a_power_of_the_cosine_about_the_axis(float_type):
-    cosine = np.array([1, 0.5, 0.25, 0, -0.5])
-    require(
-        terms.spot_falloff(float_type(cosine), 2.5),
-        np.maximum(cosine, 0) ** 2.5,
-        16 * step(float_type),
-    )
 
 
 # --- The convention --------------------------------------------------------------------------

@@ -1,9 +1,6 @@
 """Charts: pictures that fit the page, and text that stays text."""
 
-import base64
-import json
 import re
-import zlib
 
 import pytest
 
@@ -36,9 +33,8 @@ def test_a_chart_takes_the_texts_colour_and_has_a_transparent_ground():
 
 
 def test_a_specifications_own_config_has_the_last_word():
-    spec = vega.figure(
-        "Price", bars(config={"axis": {"labelFontSize": 7}, "bar": {"size": 3}})
-    ).spec
+    own = {"axis": {"labelFontSize": 7}, "bar": {"size": 3}}
+    spec = theme.themed(bars(config=own), theme.PAGE)
     assert spec["config"]["axis"]["labelFontSize"] == 7
     assert spec["config"]["axis"]["labelColor"] == "currentColor"
     assert spec["config"]["bar"] == {"size": 3}
@@ -58,7 +54,7 @@ def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
 
 
 def test_a_comparison_without_a_study_of_cost_does_not_wait_for_altair():
-    told = "import sys, reports.page.page, reports.run.single; print('altair' in sys.modules)"
+    told = "import sys, reports.page.page, reports.run.scene; print('altair' in sys.modules)"
     assert python("-c", told).stdout.strip() == "False"
 
 
@@ -86,44 +82,6 @@ def test_text_in_a_chart_stays_text():
     shown = Page(html)
     assert not [attrs for tag, attrs in shown.tags if tag == "img"]
     assert HOSTILE not in html
-    island = re.search(r'<script type="application/json">(.*?)</script>', html, re.S)
-    assert json.loads(island[1])["title"] == HOSTILE
-
-
-def test_the_library_is_in_the_page_once_and_only_where_a_chart_is():
-    view = records.view(records.data())
-    packed = re.findall('id="vega">([^<]*)<', page.render([view, view]))
-    (library,) = (zlib.decompress(base64.b64decode(one)).decode() for one in packed)
-    assert library.startswith(vega.bundle())
-    bare = page.render([records.view(records.data() | {"histograms": {}})])
-    assert 'id="vega"' not in bare
-    assert "How the error is distributed" not in bare
-
-
-def test_the_library_can_stand_in_a_script_element():
-    assert "</script" not in vega.bundle().lower()
-    assert "<!--" not in vega.bundle()
-
-
-def test_the_library_is_made_once_for_all_runs(tmp_path, monkeypatch):
-    made = vega._bundled()
-    calls = []
-    monkeypatch.setattr(vega, "_bundled", lambda: calls.append(None) or made)
-
-    def bundle(cache):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-        vega.bundle.cache_clear()
-        return vega.bundle() == made
-
-    assert bundle(tmp_path / "cache")
-    assert bundle(tmp_path / "cache")
-    assert len(calls) == 1
-    (kept,) = (tmp_path / "cache/fotismos").iterdir()
-    kept.write_text(kept.read_text(encoding="utf-8")[:-9], encoding="utf-8")
-    assert bundle(tmp_path / "cache")
-    assert len(calls) == 2
-    (tmp_path / "file").write_text("")
-    assert bundle(tmp_path / "file")  # where nothing can be kept
 
 
 class PanicException(BaseException):

@@ -7,13 +7,13 @@ from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import HEURISTICS
 from heuristic.points import Point
 from reports import verdict
-from reports.terminal import progress
+from reports.terminal import tables
 from tests import cost_records, records
 from tests.small_scene import PLAIN
 
 
 def found(scene="a", mean=4.0, beyond=0.5, parts=(), remedies=None):
-    parts = tuple(verdict.Part(effect, "#000000", size) for effect, size in parts)
+    parts = tuple(verdict.BarPart(effect, "#000000", size) for effect, size in parts)
     shares = dict.fromkeys(verdict.TOLERANCES, beyond)
     return verdict.Finding(scene, mean, shares, parts, remedies or {}, mean <= verdict.EXACT)
 
@@ -34,7 +34,7 @@ def test_a_scene_is_right_if_at_most_a_twentieth_of_its_pixels_departs(share, is
     assert finding.is_right(5.0)
 
 
-def test_parts_are_the_sure_prices_and_fill_the_bar():
+def test_parts_are_what_effects_surely_remove_and_fill_the_bar():
     finding = of_record(10.0, cost_records.record())
     assert [part.effect for part in finding.parts] == ["interreflection", "occlusion"]
     assert sum(part.size for part in finding.parts) == pytest.approx(10.0)
@@ -48,13 +48,20 @@ def test_the_remedy_is_the_fastest_method_that_reaches_the_tolerance():
     assert remedies[1.0] is None
 
 
-def test_what_was_judged_is_no_remedy():
+@pytest.mark.guarantee(
+    "attribution", "The remedy is the cheapest method of all, the textbook's own kernel included."
+)
+def test_all_methods_are_judged_alike_also_the_kernel_itself():
     cost = cost_records.record()
-    first = min(cost.points, key=lambda point: point.seconds.median)
-    for name in ("flat kernel", "Gouraud kernel", "Phong kernel"):
-        kernel = structs.replace(first, rung=name, error=0.0)
-        with_kernel = structs.replace(cost, points=(kernel, *cost.points))
-        assert of_record(10.0, with_kernel).remedies == of_record(10.0, cost).remedies
+    fast = structs.replace(
+        cost.points[0], error=structs.replace(cost.points[0].error, mean=1.5)
+    )  # of the kernel that was judged
+    cost = structs.replace(cost, points=(fast, *cost.points[1:]))
+    finding = of_record(10.0, cost, visible={"1": 1.0, "2": 0.12, "5": 0.0})
+    assert finding.remedies[2.0] == verdict.Remedy("Phong kernel", fast.seconds.value, True)
+    assert verdict.about(finding).endswith("Its mean is within ΔE2000 2 all the same.")
+    assert verdict.advice([finding])[0].endswith("mean within ΔE2000 2: as it is")
+    assert finding.remedies[1.0] is None
 
 
 def test_what_cannot_be_seen_is_exact():
@@ -143,6 +150,6 @@ def test_a_shader_is_called_by_its_name_and_not_textbook(heuristic, names):
 
 
 def test_verbose_lines_tell_losses_and_settings_that_are_not_used():
-    lines = "\n".join(progress.details(records.record()))
+    lines = "\n".join(tables.details(records.record()))
     assert "  lost: pane (dielectric): refraction; seen straight through" in lines
     assert "  not used: sampler independent, but multijitter" in lines

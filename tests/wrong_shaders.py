@@ -8,13 +8,13 @@ SHADERS = Path(__file__).parents[1] / "docs/shaders"
 
 @dataclass(frozen=True)
 class Wrong:
-    """A mistake: its name, the piece of phong.py or phong.glsl, what replaces it, what is told."""
+    """A mistake: the piece of phong.py or phong.glsl, what replaces it, and its message."""
 
     name: str
     suffix: str
     piece: str
     wrong: str
-    told: str
+    message: str
 
     @property
     def language(self) -> str:
@@ -90,4 +90,4 @@ WRONG = (
     Wrong("the first light alone", GLSL, "i < point.lights.length()", "i < 1",
           "only the first light"),
 )  # fmt: skip
-"""All of them, each with what is told of it, as a regular expression."""
+"""All of them, each with its message, as a regular expression."""

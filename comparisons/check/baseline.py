@@ -6,49 +6,27 @@ keep 8 significant digits, far finer than rounding errors, and errors 3.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
-from msgspec import Meta, structs
-from numpy.typing import ArrayLike
+from msgspec import Meta
 
-from comparisons import record, records
-from comparisons.case import Request
-from comparisons.check.measurement import HALVES, Colours, Measurement, Metric
+from comparisons import record
+from comparisons.check.measurement import MOST_PASSES, Half, Measurement, MetricAmount
 from comparisons.departure.metrics import LEADING, METRICS, RATIO
-from comparisons.departure.spaces import Array
-from comparisons.records import VERSION, Amount, Record, Versions, laid_out
+from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
-
-MOST_PASSES = 1024
-"""Far more than a t-test needs; all their images are in memory at once."""
+from reference import records
+from reference.records import VERSION, Record, Versions, laid_out
 
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number: images are in single precision, and squares of errors must not overflow."""
 
 FORMAT_0_1 = '"format": "fotismos baseline 1"'
 """The first line of a baseline of fotismos 0.1; its other lines are still valid."""
-
-Colour = tuple[float, float, float]
-Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
-
-
-class Block(Record):
-    """Mean linear RGB of a block of pixels."""
-
-    mean: Colour
-    error: Errors
-
-
-class Half(Record):
-    """Mean linear RGB of a half, over the image and over its blocks, row by row."""
-
-    mean: Colour
-    error: Errors
-    blocks: tuple[tuple[Block, ...], ...]
 
 
 class Baseline(Record, kw_only=True, omit_defaults=True):
@@ -75,14 +53,18 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
     passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
     versions: Versions
     images: str | None = None
-    metrics: dict[str, Metric]
+    metrics: dict[str, MetricAmount]
     heuristic: Half
     reference: Half
 
     def measured(self) -> Measurement:
-        """Return the numbers as arrays; ``ValueError`` for rows of blocks that differ in length."""
-        colours = {half: _colours(getattr(self, half)) for half in HALVES}
-        return Measurement(self.passes, self.metrics, colours)
+        """Return the measurement."""
+        return Measurement(
+            passes=self.passes,
+            metrics=self.metrics,
+            heuristic=self.heuristic,
+            reference=self.reference,
+        )
 
     def text(self) -> str:
         """Return the file's content."""
@@ -93,33 +75,29 @@ def of(
     scene: str, options: Mapping[str, Any], measured: Measurement, images: str | None = None
 ) -> Baseline:
     """Return the baseline of a scene just measured, with the current versions."""
-    return Baseline(
-        record_version=VERSION,
-        scene=scene,
-        options=dict(sorted(options.items())),
-        passes=measured.passes,
-        versions=record.versions(),
-        images=images,
-        metrics={name: _rounded_metric(metric) for name, metric in measured.metrics.items()},
-        **{half: _half(measured.colours[half]) for half in HALVES},
+    return msgspec.convert(
+        {
+            "record_version": VERSION,
+            "scene": scene,
+            "options": dict(sorted(options.items())),
+            "versions": record.versions(),
+            "images": images,
+            **_rounded(records.plain(measured)),
+        },
+        Baseline,
     )
 
 
 def parse(text: str, name: str) -> Baseline:
     """Read a baseline from its file's content, also one of fotismos 0.1.
 
-    Raises
-    ------
-    InputError
-        With the name of the file and the fault in it.
+    ``InputError`` has the name of the file and the fault in it.
     """
     text = text.replace(FORMAT_0_1, f'"record_version": {VERSION}', 1)
     try:
         baseline = records.read(Baseline, text, name)
-        _require_scene(baseline.scene)
-        msgspec.convert(baseline.options, Request)
-        _require_metrics(baseline.metrics)
-        _require_moderate(baseline)
+        _require_sane(baseline)
+        Options.of(baseline.options)
         baseline.text()  # rejects what cannot be written, such as a NaN among the options
     # Numbers too long for Python and lists nested too deeply raise other errors.
     except (InputError, ValueError, OverflowError, RecursionError) as error:
@@ -131,61 +109,31 @@ def parse(text: str, name: str) -> Baseline:
     return baseline
 
 
-def _require_scene(scene: str) -> None:
-    if not scene or not scene.isprintable():
+def _require_sane(baseline: Baseline) -> None:
+    if not baseline.scene or not baseline.scene.isprintable():
         raise ValueError(
-            f"the scene is {scene!r}: a built-in name or the path of a file is allowed."
+            f"the scene is {baseline.scene!r}: a built-in name or the path of a file is allowed."
         )
-
-
-def _require_metrics(metrics: Iterable[str]) -> None:
-    for name in metrics:
+    for name in baseline.metrics:
         if name not in {*METRICS, RATIO.name}:
             raise ValueError(f"{name!r} is not a metric.")
     for name in (LEADING.name, RATIO.name):
-        if name not in metrics:
+        if name not in baseline.metrics:
             raise ValueError(f"the metric {name!r} is missing.")
-
-
-def _require_moderate(baseline: Baseline) -> None:
-    for metric in baseline.metrics.values():
-        _require_numbers(metric.value, metric.error, metric.noise_floor or 0.0)
-    for colours in baseline.measured().colours.values():
-        _require_numbers(*(values.ravel() for values in vars(colours).values()))
-
-
-def _require_numbers(*values: ArrayLike) -> None:
-    if not (np.abs(np.hstack(values)) <= LARGEST).all():
+    for half in (baseline.heuristic, baseline.reference):
+        if half.means().ndim != 3:  # raises ValueError for rows that differ in length
+            raise ValueError("there are no blocks.")
+    numbers = [(value, error) for *_, value, error in baseline.measured().quantities()]
+    floors = [metric.noise_floor or 0.0 for metric in baseline.metrics.values()]
+    if not (np.abs(np.hstack([*numbers, floors])) <= LARGEST).all():
         raise ValueError(f"a number is not finite, or larger than {LARGEST:.2g}.")
 
 
-def _colours(half: Half) -> Colours:
-    blocks = np.array([[(b.mean, b.error) for b in row] for row in half.blocks], float)
-    if blocks.ndim != 4:
-        raise ValueError("there are no blocks.")
-    return Colours(np.array(half.mean), np.array(half.error), blocks[:, :, 0], blocks[:, :, 1])
-
-
-def _half(colours: Colours) -> Half:
-    rows = zip(colours.blocks, colours.blocks_error, strict=True)
-    blocks = (tuple(map(_block, *row)) for row in rows)
-    return Half(**structs.asdict(_block(colours.whole, colours.whole_error)), blocks=tuple(blocks))
-
-
-def _block(mean: Array, error: Array) -> Block:
-    return Block(_rounded_colour(mean, 8), _rounded_colour(error, 3))
-
-
-def _rounded_colour(values: Array, digits: int) -> Colour:
-    red, green, blue = (_rounded(value, digits) for value in values)
-    return red, green, blue
-
-
-def _rounded_metric(metric: Metric) -> Metric:
-    floor = metric.noise_floor
-    floor = None if floor is None else _rounded(floor, 3)
-    return Metric(_rounded(metric.value, 8), _rounded(metric.error, 3), floor)
-
-
-def _rounded(value: float, digits: int) -> float:
-    return float(f"{value:.{digits}g}")
+def _rounded(value: Any, digits: int = 8) -> Any:
+    """Round all numbers inside plain data: those of errors, at these keys, to fewer digits."""
+    if isinstance(value, dict):
+        errors = ("error", "noise_floor")
+        return {key: _rounded(one, 3 if key in errors else digits) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(one, digits) for one in value]
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value

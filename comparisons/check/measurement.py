@@ -7,60 +7,48 @@ the spread of the passes, so they hold for any kind of noise.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Annotated
 
+import mitsuba as mi
 import numpy as np
+from msgspec import Meta, structs
 from numpy.typing import NDArray
 
-from comparisons.compare import Prepared
+from comparisons.case import Case
+from comparisons.departure.colour import Array, Viewing
 from comparisons.departure.metrics import METRICS, RATIO, log2_luminance_ratio
-from comparisons.departure.spaces import Array, Viewing
 from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
-from comparisons.records import Amount, Record
+from comparisons.options import Options
+from comparisons.prepared import guarded, require_light
+from reference.records import Amount, Record
 from reference.rendering.passes import Progress, passes
+from reference.scene.prepare import film_size
+from reference.scene.source import Source
 
 PASSES = 16
 """Enough for a t-test, corrected for a hundred quantities, to detect five standard errors."""
 
+MOST_PASSES = 1024
+"""Far more than a t-test needs; all their images are in memory at once."""
+
 GRID = 4
 """Blocks along each side of the image: few enough to read, small enough to locate a change."""
+
+LONGEST = 64
+"""Default number of pixels along the longer side of a measured scene."""
 
 HALVES = ("heuristic", "reference")
 
 LINEAR_ROUNDING = 1e-6
+"""The difference that rounding can make in a colour."""
+
+Colour = tuple[float, float, float]
+Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
 
 
-def rounding(metric: str) -> float:
-    """Return the difference that rounding can make in a metric; ``KeyError`` for other names."""
-    return RATIO.rounding if metric == RATIO.name else METRICS[metric].rounding
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One measured number.
-
-    Attributes
-    ----------
-    name
-        A metric's name, or ``heuristic R`` and the like; for a block with row and column, from 1.
-    value, error
-        The number, and its standard error.
-    rounding
-        The difference that rounding can make.
-    half, block
-        Where a colour was measured: the half, and the block's ``(row, column)`` from 0.
-    """
-
-    name: str
-    value: float
-    error: float
-    rounding: float
-    half: str | None = None
-    block: tuple[int, int] | None = None
-
-
-class Metric(Record, omit_defaults=True):
+class MetricAmount(Record, omit_defaults=True):
     """A departure metric, its standard error, and its value from noise alone.
 
     ``noise_floor`` is None for the signed ratio of luminances, which noise does not raise.
@@ -71,78 +59,94 @@ class Metric(Record, omit_defaults=True):
     noise_floor: Amount | None = None
 
 
-@dataclass(frozen=True)
-class Colours:
-    """Mean linear RGB of one half over the image (3,) and over blocks (rows, columns, 3)."""
+class Block(Record):
+    """Mean linear RGB of a block of pixels."""
 
-    whole: Array
-    whole_error: Array
-    blocks: Array
-    blocks_error: Array
+    mean: Colour
+    error: Errors
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """All measurements of a scene, from ``passes`` independent passes."""
+class Half(Record):
+    """Mean linear RGB of a half, over the image and over its blocks, row by row."""
 
-    passes: int
-    metrics: dict[str, Metric]
-    colours: dict[str, Colours]
+    mean: Colour
+    error: Errors
+    blocks: tuple[tuple[Block, ...], ...]
+
+    def means(self) -> Array:
+        """Return the blocks' colours, (rows, columns, 3)."""
+        return np.array([[block.mean for block in row] for row in self.blocks])
+
+
+class Measurement(Record):
+    """All measurements of a scene, from ``passes`` independent passes of both halves."""
+
+    passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
+    metrics: dict[str, MetricAmount]
+    heuristic: Half
+    reference: Half
 
     def of(self, metrics: Iterable[str]) -> Measurement:
         """Return the measurement with only these metrics."""
-        return replace(self, metrics={name: self.metrics[name] for name in metrics})
+        return structs.replace(self, metrics={name: self.metrics[name] for name in metrics})
 
-    def quantities(self) -> Iterator[Quantity]:
-        """Yield all numbers: metrics, then whole images, then blocks."""
+    def quantities(self) -> Iterator[tuple[str, str | None, tuple[int, int] | None, float, float]]:
+        """Yield all numbers: metrics, then whole images, then blocks.
+
+        Each has its name, its half and its block (row and column, from 1), its value and its error.
+        """
         for name, metric in self.metrics.items():
-            yield Quantity(name, metric.value, metric.error, rounding(name))
-        for half, colours in self.colours.items():
-            for c, letter in enumerate("RGB"):
-                value, error = float(colours.whole[c]), float(colours.whole_error[c])
-                yield Quantity(f"{half} {letter}", value, error, LINEAR_ROUNDING, half)
-        for half, colours in self.colours.items():
-            for row, column, c in np.ndindex(colours.blocks.shape):
-                yield Quantity(
-                    f"{half} {'RGB'[c]}, block {row + 1},{column + 1}",
-                    float(colours.blocks[row, column, c]),
-                    float(colours.blocks_error[row, column, c]),
-                    LINEAR_ROUNDING,
-                    half,
-                    (row, column),
-                )
+            yield name, None, None, metric.value, metric.error
+        halves = {name: getattr(self, name) for name in HALVES}
+        for name, half in halves.items():
+            for letter, value, error in zip("RGB", half.mean, half.error, strict=True):
+                yield f"{name} {letter}", name, None, value, error
+        for name, half in halves.items():
+            for i, row in enumerate(half.blocks, start=1):
+                for j, block in enumerate(row, start=1):
+                    for letter, value, error in zip("RGB", block.mean, block.error, strict=True):
+                        yield f"{name} {letter}, block {i},{j}", name, (i, j), value, error
 
 
 @dataclass(frozen=True)
-class Pictures:
-    """Means of the passes, (H, W, 3) linear."""
+class MeasuredScene:
+    """A scene just measured: pictures of the halves, samples per pixel, scene and doubts."""
 
-    heuristic: Array
-    reference: Array
+    measurement: Measurement
+    pictures: dict[str, Array]
+    spp: int
+    scene: mi.Scene
+    caution: str = ""
 
 
-def measure(
-    ready: Prepared, seed: int, count: int, viewing: Viewing, progress: Progress | None = None
-) -> tuple[Measurement, Pictures]:
-    """Render both halves of a prepared scene, and measure them.
+def made_small(case: Case) -> Case:
+    """Return a case with its film reduced to `LONGEST`, unless it sets a resolution."""
+    if case.options.resolution is not None:
+        return case
+    sides = film_size(case.source.parse(), case.options.sensor)
+    scale = min(1.0, LONGEST / max(sides))
+    return case.changed(resolution=tuple(max(1, round(side * scale)) for side in sides))
 
-    Parameters
-    ----------
-    ready
-        The scene; its renderers hold the samples per pixel of a pass.
-    seed
-        Seed of the run; each pass hashes its own from it (`pass_seed`).
-    count
-        Independent passes, 2 or more.
-    viewing
-        Viewing conditions.
-    progress
-        See :func:`comparisons.compare.compare`.
+
+def measure_scene(
+    source: Source, options: Options, count: int = PASSES, progress: Progress | None = None
+) -> MeasuredScene:
+    """Measure a scene in the current variant, in so many independent passes.
+
+    ``spp`` of the options counts all passes, and is the plan's if omitted.
     """
-    loop = passes((ready.heuristic, ready.reference), seed, count, progress=progress)
+    ready = guarded(source, options)
+    spp = options.spp or ready.reference.spp * ready.passes
+    halves = ready.heuristic, ready.reference
+    for half in halves:
+        half.spp = max(1, spp // count)
+    loop = passes(halves, options.seed, count, progress=progress)
     images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)
-    measured = measurement(images, ready.counted, viewing)
-    return measured, Pictures(*images.mean(axis=0))
+    numbers = measurement(images, ready.counted, options.viewing)
+    heuristic, reference = images.mean(axis=0)
+    caution = require_light(heuristic, reference, ready.counted, source.name, options)
+    pictures = {"heuristic": heuristic, "reference": reference}
+    return MeasuredScene(numbers, pictures, spp, ready.scene, caution)
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
@@ -152,55 +156,61 @@ def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with
     equal numbers of passes and samples.
     """
-    metrics = _metrics(images, counted, viewing)
-    colours = {half: _colours(images[:, index]) for index, half in enumerate(HALVES)}
-    return Measurement(len(images), metrics, colours)
-
-
-def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metric]:
-    """Return metrics over the counted pixels, with the jackknife's error over passes."""
-    if not counted.any():
-        return {name: Metric(0.0, 0.0, 0.0) for name in (*METRICS, RATIO.name)}
-    count, total = len(images), images.sum(axis=0)
-    values = _departure(total / count, counted, viewing)
-    errors = jackknife_error(
-        [_departure((total - one) / (count - 1), counted, viewing) for one in images]
+    metrics = dict.fromkeys(
+        (*METRICS, RATIO.name), MetricAmount(value=0.0, error=0.0, noise_floor=0.0)
     )
-    floors = _floors(images, counted, viewing)
+    if counted.any():
+        metrics = _metrics(images, counted, viewing)
+    halves = {half: _half(images[:, index]) for index, half in enumerate(HALVES)}
+    return Measurement(passes=len(images), metrics=metrics, **halves)
+
+
+def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, MetricAmount]:
+    """Return metrics over the counted pixels, with the jackknife's error over passes."""
+
+    def departure(pair: Array) -> tuple[float, ...]:
+        test, reference = pair
+        means = [
+            metric.mean(metric.against(reference, counted, viewing)(test))
+            for metric in METRICS.values()
+        ]
+        return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
+
+    count, total = len(images), images.sum(axis=0)
+    values = departure(total / count)
+    errors = jackknife_error([departure((total - one) / (count - 1)) for one in images])
+    signs = np.where(np.arange(count) % 2, -1.0, 1.0)
+    noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / count
+    reference = images[:, 1].mean(axis=0)
+    floors = {
+        name: noise_floor(metric, reference, noise, counted, viewing)
+        for name, metric in METRICS.items()
+    }
     return {
-        name: Metric(float(value), float(error), floors.get(name))
+        name: MetricAmount(value=float(value), error=float(error), noise_floor=floors.get(name))
         for name, value, error in zip((*METRICS, RATIO.name), values, errors, strict=True)
     }
 
 
-def _departure(pair: Array, counted: Array, viewing: Viewing) -> tuple[float, ...]:
-    """Return the means of all metrics, and last of the ratio."""
-    test, reference = pair
-    means = [
-        metric.mean(metric.against(reference, counted, viewing)(test))
-        for metric in METRICS.values()
-    ]
-    return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
-
-
-def _floors(images: Array, counted: Array, viewing: Viewing) -> dict[str, float]:
-    signs = np.where(np.arange(len(images)) % 2, -1.0, 1.0)
-    noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / len(images)
-    reference = images[:, 1].mean(axis=0)
-    return {
-        name: noise_floor(metric, reference, noise, counted, viewing)
-        for name, metric in METRICS.items()
-    }
-
-
-def _colours(images: Array) -> Colours:
+def _half(images: Array) -> Half:
     """Return the colours of the passes (n, H, W, 3) of one half."""
-    whole, blocks = images.mean(axis=(1, 2)), block_means(images)
-    return Colours(*_estimate(whole), *_estimate(blocks))
 
+    def estimate(values: Array) -> tuple[NDArray, NDArray]:
+        return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
-def _estimate(passes: Array) -> tuple[Array, Array]:
-    return passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
+    whole, blocks = estimate(images.mean(axis=(1, 2))), estimate(block_means(images))
+    rows = zip(*(part.tolist() for part in blocks), strict=True)
+    return Half(
+        mean=tuple(whole[0].tolist()),
+        error=tuple(whole[1].tolist()),
+        blocks=tuple(
+            tuple(
+                Block(mean=tuple(mean), error=tuple(error))
+                for mean, error in zip(*row, strict=True)
+            )
+            for row in rows
+        ),
+    )
 
 
 def block_means(images: Array) -> Array:

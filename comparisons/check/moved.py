@@ -1,26 +1,60 @@
-"""Find the numbers that moved by more than both sides' uncertainty: Welch's t-test, many at once.
+"""Check a scene against its baseline: the numbers that moved by more than both sides' uncertainty.
 
-Before and after are independent measurements. If they share a seed, unchanged numbers differ by
-even less than the test allows for.
+Welch's t-test, many at once. Before and after are independent measurements. If they share a seed,
+unchanged numbers differ by even less than the test allows for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.check.measurement import Measurement
-from comparisons.records import Amount, Record, Share
+from comparisons.check.measurement import (
+    HALVES,
+    LINEAR_ROUNDING,
+    MeasuredScene,
+    Measurement,
+    block_edges,
+    measure_scene,
+)
+from comparisons.departure.colour import Array, luminance
+from comparisons.departure.metrics import METRICS, RATIO
+from comparisons.departure.regions import shares
+from comparisons.options import Options
+from heuristic.errors import InputError
+from reference.records import Amount, Record, Share
+from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size
+from reference.rendering.passes import Progress
+from reference.scene.source import Source
 
 LEVEL = 0.01
 """Chance of a false alarm, over all quantities that one check tests."""
 
 RELATIVE_ROUNDING = 1e-5
 """Share of a value that rounding can change: other machines order float32 sums otherwise."""
+
+ALIKE = 0.02
+"""Relative spread of the blocks' factors below which they count as one factor."""
+
+DARK = 1e-3
+"""Luminance below which a block has no meaningful factor."""
+
+CAUSES = {
+    (): "The colours of neither half moved, only their difference: look at the noise, the samples,"
+    " or how metrics are computed.",
+    ("heuristic",): "Only the textbook half moved: look at its shading, or at how materials and"
+    " lights are paired.",
+    ("reference",): "Only the reference moved: look at the physical materials and lights, the"
+    " integrator, or the version of Mitsuba.",
+    HALVES: "Both halves moved: look at what they share, such as geometry, camera, materials or"
+    " lights.",
+}
+"""Where to look, by the halves that moved."""
 
 
 class Move(Record):
@@ -29,9 +63,7 @@ class Move(Record):
     Attributes
     ----------
     quantity, half, block
-        See :class:`comparisons.check.measurement.Quantity`; row and column count from 1.
-    before, after
-        The values then and now.
+        See `Measurement.quantities`.
     error
         Standard error of the difference.
     standard_errors
@@ -65,22 +97,20 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     within rounding has p = 1. A larger one has p = 0 if neither side has any spread. Šidák's
     correction treats the quantities as independent; they nearly are, and alarms get rarer.
 
-    Raises
-    ------
-    ValueError
-        For measurements of different quantities, or with different numbers of passes: Welch's test
-        is then wrong in the far tails, which a correction for many tests needs.
+    ``ValueError`` for different quantities, or different numbers of passes: Welch's test is then
+    wrong in the far tails, which a correction for many tests needs.
     """
-    from scipy.stats import ttest_ind_from_stats
+    from scipy.stats import ttest_ind_from_stats  # half a second, for those who check
 
     pairs = list(zip(before.quantities(), after.quantities(), strict=True))
-    if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
+    if before.passes != after.passes or any(old[0] != new[0] for old, new in pairs):
         raise ValueError("measurements with different passes or quantities cannot be compared")
     count = before.passes
-    x = np.array([[old.value, new.value] for old, new in pairs])
-    errors = np.array([[old.error, new.error] for old, new in pairs])
+    x, errors = (np.array([[old[i], new[i]] for old, new in pairs]) for i in (3, 4))
     difference, total = x[:, 1] - x[:, 0], (errors**2).sum(axis=1)
-    rounding = np.array([old.rounding for old, _ in pairs])
+    known = {name: metric.rounding for name, metric in METRICS.items()}
+    known[RATIO.name] = RATIO.rounding
+    rounding = np.array([known.get(old[0], LINEAR_ROUNDING) for old, _ in pairs])
     rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
     spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
     deviations = np.where(spread[:, None], errors, 1.0) * np.sqrt(count)
@@ -91,11 +121,11 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     corrected = sidak(p, len(pairs))
     return tuple(
         Move(
-            quantity=old.name,
-            half=old.half,
-            block=old.block and (old.block[0] + 1, old.block[1] + 1),
-            before=old.value,
-            after=new.value,
+            quantity=old[0],
+            half=old[1],
+            block=old[2],
+            before=old[3],
+            after=new[3],
             error=float(np.sqrt(total[i])),
             standard_errors=float(t[i]) if spread[i] else None,
             p=float(p[i]),
@@ -121,10 +151,118 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
 
     Equal ones are in order of their difference, the largest first.
     """
-    found = [move for move in moves if not move.p_corrected >= level]  # a NaN does not pass
-    return sorted(found, key=_order)
+
+    def order(move: Move) -> tuple[int, float, float]:
+        part = (move.half is not None) + (move.block is not None)
+        return part, move.p, -abs(move.after - move.before)
+
+    # A NaN does not pass.
+    return sorted((move for move in moves if not move.p_corrected >= level), key=order)
 
 
-def _order(move: Move) -> tuple[int, float, float]:
-    part = (move.half is not None) + (move.block is not None)
-    return part, move.p, -abs(move.after - move.before)
+@dataclass(frozen=True)
+class Check:
+    """A scene compared with its baseline.
+
+    Attributes
+    ----------
+    before, now
+        The baseline's measurement, and the scene measured with the same options.
+    moves, moved
+        Every quantity tested, and those that moved by more than chance and rounding explain.
+    level
+        Chance of a false alarm.
+    seen
+        The objects of the scene, if something moved.
+    """
+
+    before: Measurement
+    now: MeasuredScene
+    moves: tuple[Move, ...]
+    moved: tuple[Move, ...]
+    level: float
+    seen: ObjectIds | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing moved."""
+        return not self.moved
+
+    def blocks(self, half: str) -> tuple[Array, Array]:
+        """Return the colours of a half's blocks before and now, (rows, columns, 3)."""
+        before, after = (getattr(one, half) for one in (self.before, self.now.measurement))
+        return before.means(), after.means()
+
+    def objects(self, half: str, before: NDArray[np.floating] | None = None) -> dict[str, float]:
+        """Return each object's share of a half's change, the largest first.
+
+        ``before`` is the half's picture when the baseline was made. If it is omitted, or of another
+        size, each block's change is spread evenly over its pixels.
+        """
+        if self.seen is None:
+            return {}
+        now = self.now.pictures[half]
+        if before is None or before.shape != now.shape:
+            old, new = self.blocks(half)
+            rows, columns = (np.diff(block_edges(side)) for side in now.shape[:2])
+            spread = luminance(np.abs(new - old)).repeat(rows, axis=0).repeat(columns, axis=1)
+        else:
+            spread = luminance(np.abs(now - before))
+        return shares(spread, self.seen)
+
+    def causes(self) -> list[str]:
+        """Return sentences on which half moved, where and how."""
+        halves = tuple(half for half in HALVES if any(move.half == half for move in self.moved))
+        sentences = [CAUSES[halves]]
+        for half in halves:
+            name = "textbook half" if half == "heuristic" else half
+            moves = [move for move in self.moved if move.half == half]
+            sentences.append(f"The {name} {self._where(half, moves)}.")
+            letters = {move.quantity.removeprefix(half)[1] for move in moves}
+            if len(letters) < 3:
+                colours = {"R": "red", "G": "green", "B": "blue"}
+                few = " and ".join(colours[letter] for letter in "RGB" if letter in letters)
+                sentences.append(f"Only {few} moved in the {name}: look at a colour.")
+        return sentences
+
+    def _where(self, half: str, moves: Sequence[Move]) -> str:
+        old, new = self.blocks(half)
+        before, after = luminance(old), luminance(new)
+        ratios = after[before > DARK] / before[before > DARK]
+        is_one = ratios.size and np.ptp(ratios) <= ALIKE * abs(ratios.mean())
+        if is_one and abs(ratios.mean() - 1) > ALIKE:
+            return f"has {ratios.mean():.3g} times the light everywhere: its level moved"
+        blocks = {move.block for move in moves if move.block}
+        if not blocks:
+            return "moved in the mean of the image, but in no single block"
+        change = np.abs(new - old).sum(axis=-1)
+        row, column = np.unravel_index(change.argmax(), change.shape)
+        most = f"most in row {row + 1}, column {column + 1}"
+        return f"moved in {len(blocks)} of {change.size} blocks, {most}"
+
+
+def check(
+    source: Source,
+    options: Options,
+    before: Measurement,
+    level: float = LEVEL,
+    progress: Progress | None = None,
+) -> Check:
+    """Measure a scene as before, and return what moved.
+
+    ``options`` are the baseline's. With its seed, an unchanged scene gives the same images on the
+    same machine; the test also holds for other seeds. Metrics that the baseline lacks are not
+    tested. ``level`` is the chance of a false alarm, over all quantities of this scene.
+    """
+    now = measure_scene(source, options, before.passes, progress)
+    after = now.measurement.of(before.metrics)
+    old, new = (one.reference.means().shape for one in (before, after))
+    if old != new:
+        raise InputError(
+            f"{source.name}: the baseline has {old[0]} by {old[1]} blocks, but the scene {new[0]}"
+            f" by {new[1]}. Write it again with --update."
+        )
+    moves = differences(before, after)
+    those = tuple(moved(moves, level))
+    objects = gbuffer(now.scene, *image_size(now.scene)).shape if those else None
+    return Check(before, now, moves, those, level, objects)

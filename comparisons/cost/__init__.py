@@ -1,1 +1,1 @@
-"""What accuracy costs in time: a ladder of methods, the price of effects, the departure's parts."""
+"""What accuracy costs in time: a ladder of methods, what effects remove and add."""

@@ -1,4 +1,4 @@
-"""Compare timed and judged methods: Pareto front, cheapest, equal time, equal error.
+"""Compare measured methods: Pareto front, cheapest, equal error.
 
 A point is a method at one sample count, with a time in seconds and an error. Equal error is
 interpolated between two counts of one method, along a straight line in logarithms: its slope is
@@ -7,83 +7,67 @@ beyond the counts.
 """
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby, pairwise
+from itertools import pairwise
 from math import log
-from operator import attrgetter
-from statistics import NormalDist
-from typing import NamedTuple
 
-from comparisons.cost.cost_record import Measured, Range, Reached, Within
+import numpy as np
 
-TIMES_S = (0.01, 0.1, 1.0, 10.0)
+from comparisons.cost.cost_record import LeftOut, Measured, Reached, Seconds
+from comparisons.cost.measure import Effort, measure_ladder
+from comparisons.cost.methods import FULL_PLAN
+from comparisons.departure.metrics import METRICS
+from comparisons.options import Options
+from heuristic.errors import unknown
+from reference.records import VERSION, Positive, Record, Resolution
+from reference.rendering.gbuffer import image_size
+from reference.rendering.passes import Progress
+from reference.scene.source import Source
+
 ERRORS = (5.0, 2.0, 1.0, 0.5)
 
-SURE = NormalDist().inv_cdf(0.975)
-"""Standard errors to each side of an interval of 95 %."""
 
+def reached(errors: Sequence[float], error: float) -> float | None:
+    """Return where the errors of one method, its fastest point first, fall to an error.
 
-class Place(NamedTuple):
-    """A place on a curve: a share of the way, in logarithms, from one point to the next."""
-
-    number: int
-    share: float
-
-    def of(self, values: Sequence[float]) -> float:
-        """Return the value there, given positive values at the points."""
-        after = values[self.number + 1] if self.share else 1.0
-        return values[self.number] ** (1 - self.share) * after**self.share
-
-
-def reached(errors: Sequence[float], error: float) -> Place | None:
-    """Return where the errors of one method, its fastest point first, fall to an error."""
+    As a place for :func:`at`: 1.5 is half way from the second point to the third, in logarithms.
+    """
     if errors[0] <= error:
-        return Place(0, 0.0)
+        return 0.0
     for number, (before, after) in enumerate(pairwise(errors)):
         if after <= error < before:
             share = log(before / error) / log(before / after) if after > 0 else 1.0
-            return Place(number, share)
+            return number + share
     return None
+
+
+def at(values: Sequence[float], place: float) -> float:
+    """Return the value at a place on a curve, given positive values at the points."""
+    return float(np.exp(np.interp(place, range(len(values)), np.log(values))))
 
 
 def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
     """Return the fastest point with at most this error; of equally fast ones the most accurate."""
-    allowed = (point for point in points if point.error <= within)
-    return min(allowed, key=lambda point: (point.seconds.median, point.error), default=None)
+    allowed = (point for point in points if point.error.mean <= within)
+    return min(allowed, key=lambda point: (point.seconds.value, point.error.mean), default=None)
 
 
 def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
     """Return the points that no other point beats in time or error while matching the other."""
     front, best = [], float("inf")
-    for point in sorted(points, key=lambda p: (p.seconds.median, p.error)):
-        if point.error < best:
+    for point in sorted(points, key=lambda p: (p.seconds.value, p.error.mean)):
+        if point.error.mean < best:
             front.append(point)
-            best = point.error
+            best = point.error.mean
     return tuple(front)
-
-
-def equal_time(points: Sequence[Measured], times: Sequence[float] = TIMES_S) -> tuple[Within, ...]:
-    """Return the point of smallest error within each time, for times that improve it.
-
-    Of equal points it is the fastest. Of times that no point meets, the longest is kept.
-    """
-    rows = [Within(limit, _best(points, limit)) for limit in times]
-    too_short = [row for row in rows if row.best is None][-1:]
-    better = [next(same) for best, same in groupby(rows, attrgetter("best")) if best]
-    return (*too_short, *better)
-
-
-def _best(points: Iterable[Measured], limit: float) -> Measured | None:
-    within = [point for point in points if point.seconds.median <= limit]
-    return min(within, key=lambda p: (p.error, p.seconds.median), default=None)
 
 
 def equal_error(
     points: Sequence[Measured], errors: Sequence[float] = ERRORS
 ) -> tuple[Reached, ...]:
     """Return when each method reaches each error, in the order of the points."""
-    methods = list(dict.fromkeys(point.rung for point in points))
+    methods = list(dict.fromkeys(point.method for point in points))
     return tuple(
-        _reached(method, [point for point in points if point.rung == method], error)
+        _reached(method, [point for point in points if point.method == method], error)
         for method in methods
         for error in errors
     )
@@ -91,15 +75,74 @@ def equal_error(
 
 def _reached(method: str, points: Iterable[Measured], error: float) -> Reached:
     """Return when a method reaches an error, with an interval from its points' uncertainty."""
-    ordered = sorted(points, key=lambda point: point.seconds.median)
-    found = reached([point.error for point in ordered], error)
+    ordered = sorted(points, key=lambda point: point.seconds.value)
+    found = reached([point.error.mean for point in ordered], error)
     if found is None:
-        return Reached(method, error, None)
+        return Reached(method=method, error=error, seconds=None)
     ends = []
-    for side, end in ((-1, "low"), (1, "high")):
-        errors = [max(p.error + side * SURE * p.error_stderr, 0.0) for p in ordered]
-        place = reached(errors, error) or Place(len(ordered) - 1, 0.0)
-        ends.append(place.of([getattr(p.seconds, end) for p in ordered]))
-    value = found.of([point.seconds.median for point in ordered])
-    at_most = ordered[0].error <= error
-    return Reached(method, error, Range(value, min(ends[0], value), max(ends[1], value)), at_most)
+    for end in ("low", "high"):
+        errors = [max(getattr(p.error, end), 0.0) for p in ordered]
+        place = reached(errors, error)
+        place = len(ordered) - 1 if place is None else place
+        ends.append(at([getattr(p.seconds, end) for p in ordered], place))
+    value = at([point.seconds.value for point in ordered], found)
+    seconds = Seconds(value=value, low=min(ends[0], value), high=max(ends[1], value))
+    at_most = ordered[0].error.mean <= error
+    return Reached(method=method, error=error, seconds=seconds, at_most=at_most)
+
+
+class Choice(Record, kw_only=True):
+    """The answer of ``fotismos plan --within``.
+
+    Attributes
+    ----------
+    metric, within
+        Name of the metric, and the largest allowed mean.
+    chosen
+        The cheapest point within the tolerance; None if there is none.
+    best
+        The one with the smallest error.
+    full
+        The full plan with the fewest samples within the tolerance, else with the most samples.
+    left_out
+        Methods that the scene cannot have.
+    """
+
+    scene: str
+    resolution: Resolution
+    metric: str
+    within: Positive
+    chosen: Measured | None
+    best: Measured
+    full: Measured
+    left_out: tuple[LeftOut, ...] = ()
+    record_version: int = VERSION
+
+
+def choose(
+    source: Source,
+    within: float,
+    options: Options | None = None,
+    effort: Effort | None = None,
+    metric: str = "dE2000",
+    progress: Progress | None = None,
+) -> Choice:
+    """Measure the ladder of a scene, in the current variant, and choose from it."""
+    if metric not in METRICS:
+        raise unknown("metric", metric, METRICS)
+    shown = progress or (lambda *_: None)
+    found = measure_ladder(source, options or Options(), effort or Effort(), shown, METRICS[metric])
+    full = next(one.name for one in found.ladder.methods if FULL_PLAN.name in one.names)
+    of_full = [point for point in found.points if point.method == full]
+    return Choice(
+        scene=source.name,
+        resolution=image_size(found.ready.scene),
+        metric=metric,
+        within=within,
+        chosen=cheapest(found.points, within),
+        best=min(found.points, key=lambda point: (point.error.mean, point.seconds.value)),
+        full=cheapest(of_full, within) or max(of_full, key=lambda point: point.spp),
+        left_out=tuple(
+            LeftOut(name=name, reason=reason) for name, reason in found.ladder.left_out.items()
+        ),
+    )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.rendering.moments import BLOCK
+from reference.rendering.sums import BLOCK
 
 Array = NDArray[np.float64]
 

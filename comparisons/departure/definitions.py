@@ -1,12 +1,11 @@
-"""The colour differences as colour-science defines them, and FLIP as its authors compute it.
+"""The colour differences as colour-science defines them.
 
-They take as long as rendering does, so the compiled ones (`comparisons.departure.colorimetry`,
-`comparisons.departure.flip`) are used instead; the tests and ``fotismos doctor`` compare them.
+They take as long as rendering does, so the compiled ones (`comparisons.departure.colour`) are used
+instead; the tests and ``fotismos doctor`` compare them.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any
 
@@ -21,11 +20,9 @@ from colour.models import (
     RGB_to_ICtCp,
     XYZ_to_Lab,
 )
-from numpy.typing import NDArray
 
-from comparisons.departure.flip import LARGEST, exposures
+from comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
 from comparisons.departure.metrics import METRICS
-from comparisons.departure.spaces import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
 
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""
@@ -75,47 +72,14 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
 }
 """Space and difference of each metric that colour-science defines."""
 
-FLIPS = ("ldr_flip", "hdr_flip")
-"""Metrics that their authors' program defines."""
-
-
-def flip(name: str, test: Array, reference: Array, viewing: Viewing) -> NDArray[np.float32]:
-    """Return "ldr_flip" or "hdr_flip" (H, W) of linear images from 0 to 65504, by its authors."""
-    # Threads that spin while waiting take most of a busy machine.
-    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    from flip_evaluator import evaluate
-
-    is_high = name == "hdr_flip"
-    truth, shown = (
-        np.clip(viewing.exposure * image, 0.0, LARGEST if is_high else 1.0)
-        for image in (reference, test)
-    )
-    parameters = {"ppd": float(viewing.pixels_per_degree)}
-    if is_high:
-        parameters["startExposure"], parameters["stopExposure"] = exposures(truth)
-    found, *_ = evaluate(
-        np.ascontiguousarray(truth, np.float32),
-        np.ascontiguousarray(shown, np.float32),
-        "HDR" if is_high else "LDR",
-        inputsRGB=False,
-        applyMagma=False,
-        computeMeanError=False,
-        parameters=parameters,
-    )
-    return found[..., 0]
-
 
 def farthest(count: int = 4096) -> float:
     """Return the largest deviation of the compiled differences, over random colours."""
     test, reference = np.random.default_rng(0).random((2, count, 3))
-    apart = 0.0
+    viewing, apart = DEFAULT_VIEWING, 0.0
     with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):
         for name, (space, difference) in DEFINED.items():
-            defined = difference(*(space(image, DEFAULT_VIEWING) for image in (test, reference)))
-            found = METRICS[name](test[None], reference[None], DEFAULT_VIEWING)[0]
-            apart = max(apart, float(np.abs(found - defined).max()))
-    images = [colours.reshape(64, -1, 3) for colours in (test, reference)]
-    for name in FLIPS:
-        defined = flip(name, images[0], images[1], DEFAULT_VIEWING)
-        apart = max(apart, float(np.abs(METRICS[name](*images) - defined).max()))
+            defined = difference(space(test, viewing), space(reference, viewing))
+            compiled = METRICS[name](test[None], reference[None], viewing)[0]
+            apart = max(apart, float(np.abs(compiled - defined).max()))
     return apart

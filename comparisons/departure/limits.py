@@ -1,4 +1,4 @@
-"""Find pixels where the reference itself is at fault, so the heuristic is not blamed for them.
+"""Count pixels where the reference itself is at fault, so the heuristic is not blamed for them.
 
 ================  ===========================================================================
 Limit             Where
@@ -13,7 +13,8 @@ Limit             Where
                   :data:`FIREFLY_SHARE` of it, and far exceeds that of nearby pixels
 ================  ===========================================================================
 
-Masks may overlap. `find` is a function of plain arrays; `of_scene` collects them.
+Masks may overlap. `find` is a function of plain arrays; `of_scene` collects them, and reads the
+materials from the scene's graph, through ``twosided``, ``blendbsdf``, ``mask`` and bumps.
 
 For which lights the normals disagree depends on geometry alone. Points, spots and directional
 lights have one direction. An area light is sampled at :data:`LIGHT_GRID` squared points of each of
@@ -23,6 +24,7 @@ normals always differ by a wedge. Under uniform light, it loses the share ``(1 -
 irradiance, and counts from :data:`WEDGE_LOST` on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -32,10 +34,13 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.departure.blocks import bands
-from comparisons.records import Count, Record
-from heuristic.arrays import Scene, Shape
-from heuristic.plugins.mapped import SMALLEST_ALPHA
-from reference.pairing.albedo import RoughPlastic, of_roughplastic, prepare
+from heuristic.convention import Scene, Shape
+from heuristic.plugins.textures import SMALLEST_ALPHA
+from reference.pairing.albedo import RoughPlastic, of_roughplastic
+from reference.pairing.nearest import white_roughplastic
+from reference.records import Count, Record
+from reference.scene.graph import Graph
+from reference.scene.values import number
 
 LOST = 0.05
 """Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
@@ -58,27 +63,6 @@ class LimitCounts(Record):
 
 
 @dataclass(frozen=True)
-class Limits:
-    """Masks (H, W) of counted pixels, by limit."""
-
-    clamped: np.ndarray
-    terminator: np.ndarray
-    energy_loss: np.ndarray
-    fireflies: np.ndarray
-
-    @property
-    def any(self) -> np.ndarray:
-        """The pixels with at least one limit."""
-        return self.clamped | self.terminator | self.energy_loss | self.fireflies
-
-    def counts(self) -> LimitCounts:
-        """Return the number of pixels by limit, and ``any``."""
-        return LimitCounts(
-            **{name: int(getattr(self, name).sum()) for name in LimitCounts.__struct_fields__}
-        )
-
-
-@dataclass(frozen=True)
 class Lights:
     """Origins of light: points (N, 3), directions towards it (M, 3), and whether from all sides."""
 
@@ -91,10 +75,10 @@ class Lights:
 class Surfaces:
     """Inputs of limits at the first surfaces on a grid of camera rays.
 
-    ``alpha`` (H, W) is infinite and ``albedo`` (H, W) is 1 where there is no ``roughplastic``.
-    ``albedo`` is of the same surface in a white furnace: at normal incidence, with a reflectance of
-    1. ``position`` is in world space, ``shading`` and ``geometric`` are normals, ``view`` is the
-    direction towards the viewer, (H, W, 3).
+    ``alpha`` (H, W) is the smallest of any ``roughplastic`` there, infinite without one. ``albedo``
+    (H, W) is that of the same surface in a white furnace, at normal incidence and with reflectances
+    of 1; it is 1 without a ``roughplastic``. ``position`` is in world space, ``shading`` and
+    ``geometric`` are normals, ``view`` is the direction towards the viewer, (H, W, 3).
     """
 
     hit: np.ndarray
@@ -112,43 +96,37 @@ def find(
     mean: np.ndarray,
     standard_error: np.ndarray,
     counted: np.ndarray | None = None,
-) -> Limits:
-    """Return the limits of a reference.
+) -> dict[str, np.ndarray]:
+    """Return masks (H, W) of the counted pixels with each limit, and with any.
 
-    Parameters
-    ----------
-    surfaces
-        See `of_scene`.
-    mean, standard_error
-        (H, W, 3): the reference's estimate and its standard error from independent passes.
-    counted
-        (H, W): the pixels that count; if omitted, those that see a surface.
+    ``mean`` and ``standard_error`` (H, W, 3) are the reference's, from independent passes.
     """
     counted = surfaces.hit if counted is None else np.asarray(counted, bool)
     return _masks(surfaces, fireflies(mean, standard_error), counted)
 
 
 def count(
-    scene: Scene, mean: np.ndarray, standard_error: np.ndarray, counted: np.ndarray
+    scene: Scene, graph: Graph, mean: np.ndarray, standard_error: np.ndarray, counted: np.ndarray
 ) -> LimitCounts:
     """Count the pixels of a scene's reference that `find` would return, by bands of rows."""
     flies = fireflies(mean, standard_error)
     total = dict.fromkeys(LimitCounts.__struct_fields__, 0)
     height, width = counted.shape
     for rows in bands(height):
-        surfaces = of_scene(scene, width, height, rows=rows)
-        found = _masks(surfaces, flies[rows], counted[rows]).counts()
-        total = {name: total[name] + getattr(found, name) for name in total}
+        surfaces = of_scene(scene, graph, width, height, rows)
+        for name, mask in _masks(surfaces, flies[rows], counted[rows]).items():
+            total[name] += int(mask.sum())
     return LimitCounts(**total)
 
 
-def _masks(surfaces: Surfaces, flies: np.ndarray, counted: np.ndarray) -> Limits:
-    return Limits(
-        clamped=counted & (surfaces.alpha <= SMALLEST_ALPHA),
-        terminator=counted & terminator(surfaces),
-        energy_loss=counted & (surfaces.albedo < 1 - LOST),
-        fireflies=counted & flies,
-    )
+def _masks(surfaces: Surfaces, flies: np.ndarray, counted: np.ndarray) -> dict[str, np.ndarray]:
+    masks = {
+        "clamped": counted & (surfaces.alpha <= SMALLEST_ALPHA),
+        "terminator": counted & terminator(surfaces),
+        "energy_loss": counted & (surfaces.albedo < 1 - LOST),
+        "fireflies": counted & flies,
+    }
+    return masks | {"any": np.any(list(masks.values()), axis=0)}
 
 
 def terminator(surfaces: Surfaces) -> np.ndarray:
@@ -206,43 +184,94 @@ def _lower_around(standard_error: np.ndarray, rows: slice) -> tuple[np.ndarray, 
 
 
 def of_scene(
-    scene: Scene, width: int, height: int, sensor: int = 0, rows: slice = slice(None)
+    scene: Scene, graph: Graph | None, width: int, height: int, rows: slice = slice(None)
 ) -> Surfaces:
-    """Collect what the centres of a scene's pixels see, in some rows."""
+    """Collect what the centres of a scene's pixels see, in some rows.
+
+    Materials are read from the graph that the scene was made of; without it, they have no limit.
+    """
     heights = (np.arange(height)[rows] + 0.5) / height
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, heights)
     height = len(heights)
     place = mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel()))
-    ray, _ = scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
+    ray, _ = scene.sensors()[0].sample_ray_differential(0.0, 0.5, place, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
 
     def grid(vector: Any) -> np.ndarray:
         return np.array(dr.select(hit, mi.Vector3f(vector), 0)).T.reshape(height, width, 3)
 
-    index = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
-    alpha, albedo = np.full((height, width), np.inf), np.ones((height, width))
-    plastics = {shape: _roughplastic(shape.bsdf()) for shape in scene.shapes()}
-    prepare(plastic for plastic in plastics.values() if plastic is not None)
-    for shape, plastic in plastics.items():
-        if plastic is not None:
-            is_here = index == int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
-            alpha[is_here], albedo[is_here] = plastic.alpha, _furnace(plastic)
+    alpha, albedo = np.full((2, height * width), ((np.inf,), (1.0,)))
+    if graph is not None:
+        _read_plastics(graph, si, alpha, albedo)
     seen = np.array(hit).reshape(height, width)
-    normals = grid(si.sh_frame.n), grid(si.n)
-    return Surfaces(seen, alpha, albedo, grid(si.p), *normals, grid(-ray.d), lights_of(scene))
+    return Surfaces(
+        seen,
+        alpha.reshape(seen.shape),
+        albedo.reshape(seen.shape),
+        grid(si.p),
+        grid(si.sh_frame.n),
+        grid(si.n),
+        grid(-ray.d),
+        lights_of(scene),
+    )
 
 
-def _roughplastic(bsdf: Any) -> RoughPlastic | None:
-    """Return the parameters of a ``roughplastic``, also within ``twosided``, or None."""
-    if "RoughPlastic" not in str(bsdf):
-        return None
-    params = {name.rpartition(".")[2]: value for name, value in mi.traverse(bsdf)}
-    return RoughPlastic((1.0,) * 3, _first(params["alpha"]), _first(params["eta"]))
+def _read_plastics(graph: Graph, si: Any, alpha: np.ndarray, albedo: np.ndarray) -> None:
+    """Fill in alpha and albedo (N) where surfaces (N) show a ``roughplastic`` of the graph."""
+    plastics = {i: white_roughplastic(graph, i) for i in graph.nodes(mi.ObjectType.BSDF)}
+    furnaces = {i: plastic for i, plastic in plastics.items() if plastic is not None}
+    if not furnaces:
+        return
+    bsdfs: dict[str, list[int]] = {}
+    for node in graph.nodes(mi.ObjectType.Shape):
+        children = graph.children(node, mi.ObjectType.BSDF)
+        bsdfs.setdefault(graph.props(node).id(), []).extend(i for _, i in children)
+    pointers = np.array(dr.reinterpret_array(mi.UInt32, si.shape))
+    numbers, first = np.unique(pointers, return_index=True)
+    for pointer, at in zip(numbers, first, strict=True):
+        found = bsdfs.get(si.shape[int(at)].id(), []) if pointer else []
+        if len(found) == 1:  # shapes of two groups may have one name
+            here = pointers == pointer
+            values = _of_material(graph, found[0], si, furnaces)
+            alpha[here], albedo[here] = (np.broadcast_to(v, here.shape)[here] for v in values)
 
 
-def _first(value: Any) -> float:
-    return float(np.ravel(value)[0])
+def _of_material(
+    graph: Graph, index: int, si: Any, plastics: Mapping[int, RoughPlastic]
+) -> tuple[Any, Any]:
+    """Return the least alpha and the furnace's albedo of a BSDF at surfaces, also nested."""
+    if index in plastics:
+        return plastics[index].alpha, _furnace(plastics[index])
+    children = graph.children(index, mi.ObjectType.BSDF)
+    inner = [_of_material(graph, child, si, plastics) for _, child in children]
+    match graph.plugin(index), inner:
+        case "twosided", [front, back]:
+            is_front = np.array(si.wi.z) > 0
+            return tuple(np.where(is_front, *sides) for sides in zip(front, back, strict=True))
+        case "blendbsdf", [first, second]:
+            return _mixed(second, first, _share(graph, index, "weight", si))
+        case "mask", [only]:
+            return _mixed(only, (np.inf, 1.0), _share(graph, index, "opacity", si))
+        case "twosided" | "bumpmap" | "normalmap", [only]:
+            return only
+    return np.inf, 1.0
+
+
+def _mixed(a: tuple[Any, Any], b: tuple[Any, Any], share: np.ndarray) -> tuple[Any, Any]:
+    """Return alpha and albedo of a surface of which ``a`` has a share and ``b`` the rest."""
+    alpha = np.minimum(np.where(share > 0, a[0], np.inf), np.where(share < 1, b[0], np.inf))
+    return alpha, share * a[1] + (1 - share) * b[1]
+
+
+def _share(graph: Graph, index: int, key: str, si: Any) -> np.ndarray:
+    """Return a weight between 0 and 1 at surfaces; it may be a texture."""
+    textures = dict(graph.children(index, mi.ObjectType.Texture))
+    if key in textures:
+        value = np.array(graph.instantiate(textures[key]).eval_1(si))
+    else:
+        value = np.array(number(graph, index, key, 0.5))
+    return np.clip(value, 0, 1)
 
 
 @lru_cache

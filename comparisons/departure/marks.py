@@ -42,8 +42,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import bands, block_sums, neighbourhood, ratio, spread_out
-from reference.rendering.moments import BLOCK, DifferenceEstimate
 from reference.rendering.renderer import require_finite
+from reference.rendering.sums import BLOCK, DifferenceEstimate
 
 LEVEL, BLOCK_LEVEL = 0.05, 0.01
 VISIBLE = 2.0
@@ -71,25 +71,10 @@ def find(
 ) -> NDArray[np.float32]:
     """Return marks (H, W): 1 where a difference is shown, 0.5 if undetermined, 0 elsewhere.
 
-    Parameters
-    ----------
-    difference
-        Test image less reference, pass by pass.
-    test
-        The test image (H, W, 3), linear.
-    counted
-        Boolean (H, W): the pixels to test; all others are 0.
-    distance
-        ``(test, reference) -> (N,)`` for linear colours (N, 3), in the unit of `VISIBLE`.
-    exact
-        Whether only the positions of camera rays are random, and both images share them.
-    level
-        Replaces `LEVEL`; blocks take the same share of it.
-
-    Raises
-    ------
-    NonFiniteError
-        When the difference, or its standard error, has a NaN or an infinity.
+    ``difference`` is the test image (H, W, 3) less the reference, pass by pass. Pixels that are not
+    ``counted`` (H, W) are 0. ``distance(test, reference) -> (N,)`` takes linear colours (N, 3), and
+    is in the unit of `VISIBLE`. ``exact`` says that only the positions of camera rays are random,
+    and both images share them. ``level`` replaces `LEVEL`; blocks take the same share of it.
     """
     test, counted = np.asarray(test), np.asarray(counted, bool)
     require_finite(difference.mean, "mean difference")

@@ -1,4 +1,4 @@
-"""The built-in metrics, each with its definition, unit and range.
+"""Metrics: distances between two images, each declared with its definition, unit and range.
 
 =============  ================================  ==========================================
 dE2000         CIE DE2000                        display-referred: exposed, clipped to [0, 1]
@@ -9,28 +9,40 @@ ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
 
-colour-science defines the first three, flip-evaluator the last two. The signed ratio of luminances
-in stops comes with them, but is not a distance. Statistics over an image are in
-`comparisons.departure.statistics`.
+A metric is a function of two images and the viewing conditions that returns a map. One declaration
+is enough: records, tables, the page and checks list all declared metrics. :class:`Metric` takes any
+such function, also one of neighbourhoods. :class:`Pixelwise` splits it into a colour space and a
+distance; a reference is then converted once, and compared with many images.
+
+Declare a metric from outside with :func:`declare`, or with an entry point of the group
+``fotismos.metrics`` whose object is a :class:`Metric`::
+
+    declare(
+        Metric(
+            name="absolute",
+            label="Mean absolute difference",
+            unit="1 is display white",
+            definition="Mean over the channels of the absolute linear difference.",
+            caution="It knows nothing of eyes.",
+            map_range=(0.0, 1.0),
+            function=lambda test, reference, viewing: np.abs(test - reference).mean(axis=-1),
+        )
+    )
+
+Every image is a float array (H, W, 3) of linear light with the sRGB primaries (ITU-R BT.709, D65);
+1.0 is display white. Statistics over an image are in `comparisons.departure.statistics`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.flip import hdr_flip, ldr_flip
-from comparisons.departure.metric import (
-    METRICS,
-    Metric,
-    Pixelwise,
-    checked_pair,
-    declare,
-    drawn,
-)
-from comparisons.departure.spaces import (
+from comparisons.departure.colour import (
     DEFAULT_VIEWING,
     Array,
     Viewing,
@@ -43,11 +55,152 @@ from comparisons.departure.spaces import (
     luminance,
     root_mean_square,
 )
-
-__all__ = ["METRICS", "declare", "drawn"]
+from comparisons.departure.flip import hdr_flip, ldr_flip
+from heuristic.declared import Declared
+from heuristic.errors import InputError
+from reference.rendering.renderer import require_finite
 
 LOG2_EPSILON = 1e-4
 """Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""
+
+RESERVED = frozenset(
+    {
+        "heuristic", "reference", "reference_stderr", "standard_error", "flags", "P", "N",
+        "log2_luminance", "significant", "effects", "name", "shape", "noise", "marked",
+    }
+)  # fmt: skip
+"""Names of layers and columns other than metrics."""
+
+Distances = Callable[[Array], NDArray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A distance between two images.
+
+    ``name``, an identifier, is its key in records, layer in EXR files and column in tables;
+    ``label``, ``unit``, ``definition``, ``caution`` (when not to trust it) and ``heading`` are
+    printed. ``map_range`` is that of the colour bar, fixed so that maps of scenes compare.
+
+    ``function(test, reference, viewing) -> (H, W)`` returns distances, ≥ 0 and finite, of linear
+    images (H, W, 3). `Pixelwise` needs none. Summaries give the share of pixels above each
+    threshold in ``visible``. ``rounding`` is the difference that rounding of float32 renderings can
+    make in its mean. Its map is shown and saved if it is ``drawn``. The mean of a ``linear``
+    difference is a root mean square, and its best exposure minimises squares.
+    """
+
+    name: str
+    label: str
+    unit: str
+    definition: str
+    caution: str
+    map_range: tuple[float, float]
+    function: Callable[[Array, Array, Viewing], NDArray] | None = None
+    visible: tuple[float, ...] = ()
+    rounding: float = 1e-3
+    heading: str = ""
+    drawn: bool = True
+    linear: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier() or self.name in RESERVED:
+            raise InputError(
+                f"metric {self.name!r}: use a name of letters, digits and _, other than"
+                f" {', '.join(sorted(RESERVED))}."
+            )
+        if not self.heading:
+            object.__setattr__(self, "heading", f"{self.label}, mean")
+
+    @property
+    def thresholds(self) -> tuple[str, ...]:
+        """The thresholds of `visible`, as named in records."""
+        return tuple(f"{limit:g}" for limit in self.visible)
+
+    def __call__(
+        self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
+    ) -> NDArray:
+        """Return the map (H, W) of distances between two linear images (H, W, 3)."""
+        test, reference = checked_pair(test, reference)
+        return self.against(reference, ..., viewing)(test)
+
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+        """Return a function that maps images (H, W, 3) to distances from the reference, (N,).
+
+        ``where`` is any index of pixels, such as a boolean mask (H, W).
+        """
+        if self.function is None:
+            raise InputError(
+                f"metric {self.name!r} has no function: give it one, or declare a Pixelwise metric."
+            )
+        function = self.function
+
+        def distances(test: Array) -> NDArray:
+            shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
+            return function(shown, truth, viewing)[where]
+
+        return distances
+
+    def mean(self, values: NDArray) -> float:
+        """Return the metric's mean of distances; 0 if there are none."""
+        if not values.size:
+            return 0.0
+        if self.linear:
+            return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
+        return float(values.mean(dtype=np.float64))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pixelwise(Metric):
+    """A distance between two pixels, independent of their neighbours.
+
+    ``coordinates(rgb, viewing) -> (..., 3)`` takes linear RGB to a colour space, and
+    ``difference(reference, test) -> (...)``, ≥ 0, measures there; all built-in ones are symmetric.
+    """
+
+    coordinates: Callable[[ArrayLike, Viewing], Array]
+    difference: Callable[[Array, Array], Array]
+
+    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+        """Return a function like `Metric.against`; images may be lists of pixels (N, 3)."""
+        fixed = self.coordinates(reference[where], viewing)
+
+        def distances(test: Array) -> Array:
+            pixels = np.asarray(test[where], np.float64)
+            return self.difference(fixed, self.coordinates(pixels, viewing))
+
+        return distances
+
+
+METRICS: Declared[Metric] = Declared("metric", "fotismos.metrics")
+"""All metrics by name, in the order of reports; the first one judges scenes."""
+
+declare = METRICS.declare
+"""Declare a metric and return it; everything then lists it."""
+
+
+def drawn() -> dict[str, Metric]:
+    """Return the metrics whose maps are shown, by name."""
+    return {name: metric for name, metric in METRICS.items() if metric.drawn}
+
+
+def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
+    """Return both images as float64, or unchanged if float32.
+
+    Shapes that differ or are not (..., 3) raise `InputError`, a NaN or an infinity
+    `NonFiniteError`.
+    """
+    test, reference = (
+        image if image.dtype == np.float32 else image.astype(np.float64, copy=False)
+        for image in (np.asarray(test), np.asarray(reference))
+    )
+    if test.shape != reference.shape or test.shape[-1:] != (3,):
+        raise InputError(
+            f"images of shapes {test.shape} and {reference.shape} cannot be compared:"
+            " give both as (height, width, 3)."
+        )
+    require_finite(test, "test image")
+    require_finite(reference, "reference image")
+    return test, reference
 
 
 LEADING = METRICS.own(
@@ -65,7 +218,7 @@ LEADING = METRICS.own(
         difference=ciede2000,
     )
 )
-"""The metric that judges scenes: regions, noise targets and prices use it."""
+"""The metric that judges scenes: regions, noise targets and attributions use it."""
 METRICS.own(
     Pixelwise(
         name="dE_ITP",
@@ -125,7 +278,6 @@ METRICS.own(
         map_range=(0.0, 1.0),
         rounding=1e-4,
         function=ldr_flip,
-        stacks=True,
     )
 )
 METRICS.own(
@@ -140,12 +292,8 @@ METRICS.own(
         rounding=1e-4,
         drawn=False,
         function=hdr_flip,
-        stacks=True,
     )
 )
-
-BUILT_IN = METRICS.built_in
-"""Names of the built-in metrics."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +329,7 @@ def delta_e_2000(
     k_L = k_C = k_H = 1. About 1 is just noticeable side by side; black to white is 100.
 
     A display clips, too: two colours brighter than white compare equal, as do two negative
-    (out-of-gamut) ones. Use `delta_e_itp` for differences above white.
+    (out-of-gamut) ones. ``dE_ITP`` is for differences above white.
 
     Source: CIE 142-2001; Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005.
     Raises `NonFiniteError`, and `InputError` for different shapes.
@@ -191,57 +339,7 @@ def delta_e_2000(
     >>> delta_e_2000([[[1, 1, 1], [2, 2, 2]]], [[[0, 0, 0], [1, 1, 1]]]).round(6).tolist()
     [[100.0, 0.0]]
     """
-    return METRICS["dE2000"](test, reference, viewing)
-
-
-def delta_e_itp(test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING) -> Array:
-    """Return ΔE_ITP, for high dynamic range; shape (H, W), range 0 to about 1,000.
-
-    Linear BT.709 × exposure → linear BT.2020 × `white_luminance` cd/m², clipped to
-    [0, 10,000] → ICtCp with the PQ curve (BT.2100-2) → ``720 √(ΔI² + ΔT² + ΔP²)`` with
-    T = Ct/2 and P = Cp. A value of 1 is just noticeable in the most critical adaptation.
-
-    Source: ITU-R BT.2124-0. Raises as `delta_e_2000`.
-
-    One stop above white, which a high dynamic range display shows:
-
-    >>> delta_e_itp([[[2, 2, 2]]], [[[1, 1, 1]]]).round(1).tolist()
-    [[52.9]]
-    """
-    return METRICS["dE_ITP"](test, reference, viewing)
-
-
-def delta_e_cam16ucs(
-    test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-) -> Array:
-    """Return the distance in CAM16-UCS, display-referred; shape (H, W), range 0 to about 120.
-
-    Linear RGB × exposure, clipped to [0, 1] → XYZ → CAM16 (viewing conditions of `Viewing`,
-    D65 white) → J'a'b' → √(ΔJ'² + Δa'² + Δb'²). Black to white is 100.
-
-    Source: Li et al., Color Res. Appl. 42(6), 2017. Raises as `delta_e_2000`.
-
-    >>> delta_e_cam16ucs([[[1, 1, 1]]], [[[0, 0, 0]]]).round(1).tolist()
-    [[100.0]]
-    """
-    return METRICS["dE_CAM16UCS"](test, reference, viewing)
-
-
-def rmse(test: ArrayLike, reference: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """Return the root mean square of the linear RGB difference over the pixels of `mask` (H, W).
-
-    ``√(mean (test − reference)²)`` over pixels and channels, in units of display white, neither
-    exposed nor clipped. 0 for an empty mask. Raises as `delta_e_2000`.
-
-    One channel of four pixels is off by 1, hence √(1/12):
-
-    >>> reference = [[[0, 0, 0]] * 4]
-    >>> round(rmse([[[1, 0, 0]] + [[0, 0, 0]] * 3], reference), 3)
-    0.289
-    """
-    test, reference = checked_pair(test, reference)
-    where = ... if mask is None else np.asarray(mask, bool)
-    return RMSE.mean(RMSE.against(reference, where, DEFAULT_VIEWING)(test))
+    return LEADING(test, reference, viewing)
 
 
 def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
@@ -258,3 +356,8 @@ def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
     test, reference = checked_pair(test, reference)
     lift = [np.maximum(luminance(image), 0.0) + LOG2_EPSILON for image in (test, reference)]
     return np.log2(lift[0] / lift[1])
+
+
+def leading_distance(viewing: Viewing) -> Callable[[Array, Array], Array]:
+    """Return the leading metric, ``(test, reference) -> (N,)``, for colours (N, 3)."""
+    return lambda test, reference: LEADING.against(reference, ..., viewing)(test)

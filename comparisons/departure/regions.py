@@ -1,22 +1,27 @@
-"""Find where the departure is largest: the few boxes of an image with most of its error.
+"""Find where the departure is largest: in which boxes of the image, shapes and materials.
 
 The worth of a box is its error less `CONTRAST` times the image's mean for each of its counted
 pixels. The box of greatest worth is found exactly on a grid of cells (the maximum-sum subarray in
 two dimensions: Kadane's algorithm over the columns, for all pairs of rows). Its cells are then
 removed, and the search repeats. So boxes never overlap, their shares add up to at most 1, and
 evenly spread error has none.
+
+Every counted pixel belongs to the first surface that the ray through its centre hits, so the shares
+of all shapes add up to 1, as do the shares of all materials.
 """
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.effects.nearness import Nearest
-from comparisons.records import Amount, Count, Record, Share, Size
+from comparisons.hybrids.nearness import Nearest
+from reference.records import Amount, Count, Record, Share, Size
+from reference.rendering.gbuffer import ObjectIds
 
 CELLS = 48
 """Cells along the longer side of the image."""
@@ -26,6 +31,9 @@ CONTRAST = 1.25
 
 MOST, LEAST_SHARE = 4, 0.04
 """Number of regions, at most, and the least share of the image's error in each."""
+
+MOST_OBJECTS = 24
+"""Rows of objects; if there are more, the last row holds all others."""
 
 
 class Region(Record):
@@ -43,6 +51,24 @@ class Region(Record):
     nearest: Annotated[
         Nearest | None, Meta(description="The rendering that a picture is nearest to there.")
     ] = None
+
+
+class ObjectShare(Region, kw_only=True):
+    """A shape or a material: the box of its pixels, and its part of the departure.
+
+    Attributes
+    ----------
+    name
+        Its id in the scene.
+    pixels
+        Number of counted pixels that see it.
+    material
+        Id of a shape's material; empty for a material itself.
+    """
+
+    name: str
+    pixels: Size
+    material: str = ""
 
 
 def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
@@ -63,7 +89,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         if not value > 0.0:
             break
         worth[rows, columns] = -total  # no box that touches these is worth anything
-        region = _region(error, counted, _pixels(rows, cell), _pixels(columns, cell), total)
+        down, across = (slice(part.start * cell, part.stop * cell) for part in (rows, columns))
+        region = _region(error, counted, down, across, total)
         if region.share >= LEAST_SHARE:
             found.append(region)
         elif value < LEAST_SHARE * total / MOST:  # only specks are left
@@ -89,17 +116,9 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
         fresh = running <= 0.0
         running, start = np.where(fresh, strip, running + strip), np.where(fresh, column, start)
         pair = int(running.argmax())
-        best = max(best, (float(running[pair]), pair, int(start[pair]), column), key=_first)
+        best = max(best, (float(running[pair]), pair, int(start[pair]), column), key=itemgetter(0))
     value, pair, first, last = best
     return slice(int(top[pair]), int(bottom[pair])), slice(first, last + 1), value
-
-
-def _first(candidate: tuple) -> float:
-    return candidate[0]
-
-
-def _pixels(cells: slice, side: int) -> slice:
-    return slice(cells.start * side, cells.stop * side)
 
 
 def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
@@ -117,3 +136,63 @@ def bounds(mask: NDArray) -> dict[str, Any]:
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
     return {"x": int(x[0]), "y": int(y[0]), "width": width, "height": height}
+
+
+def find_objects(
+    error: NDArray, counted: NDArray, owners: ObjectIds, materials: ObjectIds | None = None
+) -> tuple[tuple[ObjectShare, ...], NDArray]:
+    """Return each object's share in a map of ΔE2000 (H, W), largest first, and a map of them.
+
+    The map (H, W) holds the index of each pixel's object, or -1 if the pixel does not count. If
+    ``materials`` is given, the objects are shapes with their materials.
+    """
+    places = np.where(counted, owners.places, -1)
+    seen = np.unique(places[places >= 0])
+    sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
+    ranked = sorted(seen, key=lambda place: -sums[place])
+    if len(ranked) > MOST_OBJECTS:
+        ranked = ranked[: MOST_OBJECTS - 1]
+    rows = np.full(len(owners.names) + 1, len(ranked))
+    rows[ranked], rows[-1] = np.arange(len(ranked)), -1
+    found = rows[places]
+    names = [owners.names[place] for place in ranked]
+    if len(seen) > len(names):
+        names.append(f"{len(seen) - len(names)} others")
+    total = error[counted].sum(dtype=np.float64)
+    return tuple(
+        _object_share(name, error, found == row, total, materials) for row, name in enumerate(names)
+    ), found
+
+
+def shares(change: NDArray, owners: ObjectIds) -> dict[str, float]:
+    """Return the share of each shape in a change (H, W) ≥ 0 of those seen, the largest first.
+
+    Without change there are no shares.
+    """
+    found, _ = find_objects(change, owners.places >= 0, owners)
+    return {each.name: each.share for each in found if each.share > 0}
+
+
+def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
+    """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
+    sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]
+    return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
+
+
+def _object_share(
+    name: str, error: NDArray, mask: NDArray, total: float, materials: ObjectIds | None
+) -> ObjectShare:
+    held = error[mask].sum(dtype=np.float64)
+    return ObjectShare(
+        name=name,
+        material=_material(mask, materials) if materials else "",
+        pixels=int(mask.sum()),
+        share=float(held / total) if total > 0 else 0.0,
+        mean_dE2000=float(held / mask.sum()),
+        **bounds(mask),
+    )
+
+
+def _material(mask: NDArray, materials: ObjectIds) -> str:
+    own = np.unique(materials.places[mask])
+    return materials.names[own[0]] if len(own) == 1 else "several"

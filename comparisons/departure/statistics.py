@@ -1,29 +1,24 @@
-"""Statistics over an image: summaries, the best exposure and the noise floor.
+"""Statistics over an image: summaries, the best exposure, the noise floor and histograms.
 
 "How far" has two meanings, and both are reported: the plain distance, and the smallest distance
 with an exposure factor on the test image. The second is the *shape* of the departure; the
 difference of the two is its *level*.
-
-A colour difference is never negative, so a noisy reference differs from the truth by ΔE > 0 even
-if the test image is exact. `noise_floor` returns by how much, `comparisons.departure.debiasing`
-removes it from the mean, and `comparisons.departure.marks` finds the pixels that differ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure import debiasing
-from comparisons.departure.metric import Metric, Pixelwise, checked_pair
-from comparisons.departure.metrics import log2_luminance_ratio
-from comparisons.departure.spaces import DEFAULT_VIEWING, Array, Viewing
-from comparisons.records import Amount, Count, Positive, Record, Share
-from reference.rendering.moments import Grouped
+from comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
+from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
+from comparisons.departure.noise import ShareInterval, debiased, exactly, roughly
+from reference.records import Amount, Count, Positive, Record, Share
+from reference.rendering.sums import Grouped
 
 # Pixels measured at a time, to keep temporaries small.
 _BLOCK_PIXELS = 2**18
@@ -39,13 +34,6 @@ class Exposed(Record):
     max: Amount
 
 
-class Between(Record):
-    """A 95 % interval of a share."""
-
-    low: Share
-    high: Share
-
-
 class Summary(Record):
     """A metric over the counted pixels, in the metric's own unit."""
 
@@ -57,7 +45,7 @@ class Summary(Record):
         dict[str, Share], Meta(description="Share of the pixels above each threshold.")
     ]
     visible_between: Annotated[
-        dict[str, Between], Meta(description="95 % intervals of these shares without noise.")
+        dict[str, ShareInterval], Meta(description="95 % intervals of these shares without noise.")
     ]
     debiased: Annotated[Amount, Meta(description="Mean without the reference's noise.")]
     low: Annotated[Amount, Meta(description="Lower end of the 95 % interval of `debiased`.")]
@@ -87,20 +75,12 @@ def summarise(
     """Return the numbers of `metric` over `mask`, and its map over the whole image.
 
     The best exposure is used only if it lowers the mean over all counted pixels, so
-    ``after_exposure.mean <= mean`` always. Raises as `comparisons.departure.metrics.delta_e_2000`.
+    ``after_exposure.mean <= mean`` always.
 
-    Parameters
-    ----------
-    metric, viewing
-        The metric and its viewing conditions.
-    test, reference
-        Linear images (H, W, 3).
-    mask
-        Boolean (H, W): the pixels that count. Without any, all numbers are 0 and the factor is 1.
-    noise
-        A noise image (H, W, 3) as for `noise_floor`; if omitted, the floor is 0.
-    grouped
-        Groups of passes of the difference, for the interval; if omitted, it is wider.
+    ``test`` and ``reference`` are linear (H, W, 3), and ``mask`` (H, W) holds the pixels that
+    count; without any, all numbers are 0 and the factor is 1. ``noise`` is as for `noise_floor`;
+    without it, the floor is 0. ``grouped`` are groups of passes of the difference, for the
+    interval; without them, it is wider.
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
@@ -108,7 +88,8 @@ def summarise(
     grain = np.asarray(noise) if noise is not None and np.any(noise) else None
     maps = _maps(metric, test, reference, mask, viewing, factor, grain)
     values, exposed, noise_alone = (found[mask] for found in maps)
-    numbers = after = _numbers(metric, values)
+    numbers: dict[str, Any] = _numbers(metric, values)
+    after = numbers
     if factor != 1.0:
         after = _numbers(metric, exposed)
         if after["mean"] > numbers["mean"]:
@@ -117,19 +98,16 @@ def summarise(
     visible = dict(zip(metric.thresholds, shares, strict=True))
     clean = None
     if not noise_alone.any():
-        clean = debiasing.exactly(numbers["mean"], visible)
+        clean = exactly(numbers["mean"], visible)
     elif isinstance(metric, Pixelwise) and grouped is not None:
-        clean = debiasing.debiased(metric, test, grouped, viewing, values)
-    clean = clean or debiasing.roughly(metric, values, noise_alone)
+        clean = debiased(metric, test, grouped, viewing, values)
+    clean = clean or roughly(metric, values, noise_alone)
     summary = Summary(
         **numbers,
         visible=visible,
-        visible_between={name: Between(low=a, high=b) for name, (a, b) in clean.visible.items()},
-        debiased=clean.value,
-        low=clean.low,
-        high=clean.high,
         noise_floor=metric.mean(noise_alone),
         after_exposure=Exposed(exposure=factor, **after),
+        **clean,
     )
     return summary, maps[0]
 
@@ -159,9 +137,9 @@ def _maps(
             images[2] = np.add(reference[rows], grain[rows], dtype=wide)
         # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
         measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
-        found = metric.each(list(images.values()), reference[rows], measured, viewing)
-        for place, values in zip(images, found, strict=True):
-            maps[place][rows][measured] = values
+        distances = metric.against(reference[rows], measured, viewing)
+        for place, image in images.items():
+            maps[place][rows][measured] = distances(image)
     return maps
 
 
@@ -189,9 +167,8 @@ def noise_floor(
 ) -> float:
     """Return the mean of `metric` over `mask` between the reference and itself with noise added.
 
-    ``mean difference(reference + noise, reference)``. `noise` (H, W, 3) is distributed like the
-    error of the reference, such as the mean of its independent passes with alternating signs. A
-    result near this value is indistinguishable from 0.
+    `noise` (H, W, 3) is distributed like the error of the reference, such as the mean of its
+    independent passes with alternating signs. A result near this is indistinguishable from 0.
     """
     reference, noise = checked_pair(reference, noise)
     mask = np.asarray(mask, bool)
@@ -249,7 +226,6 @@ def best_exposure(
     with a fixed seed. Whole stops bracket the minimum, a bounded scalar search (Brent) finds it to
     0.001 stop, and the factors 1 and least squares compete with it, so a multiple of the reference
     gives that multiple exactly. 1 if no pixel counts or if either image has no positive value.
-    Raises as `comparisons.departure.metrics.delta_e_2000`.
     """
     from scipy.optimize import minimize_scalar
 

@@ -2,22 +2,16 @@
 
 from typing import Any, Literal
 
-from comparisons.departure.spaces import Viewing
-from comparisons.fit.optimise import Start
-from comparisons.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
+from comparisons.departure.colour import Viewing
+from comparisons.fit.search import SearchStart
+from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
 
 
-class Departure(Record):
-    """Means of a metric over the counted pixels, in its unit.
+class FitDeparture(Record):
+    """Means of a metric over the counted pixels, with the paired and with the fitted parameters.
 
-    The loss was minimised, not this: by this metric other parameters may be better.
-
-    Attributes
-    ----------
-    before, after
-        With the paired parameters, and with the fitted ones.
-    noise_floor
-        Mean that the reference's noise alone would give.
+    The loss was minimised, not this: by this metric other parameters may be better. The noise floor
+    is the mean that the reference's noise alone would give.
     """
 
     before: Amount
@@ -26,8 +20,8 @@ class Departure(Record):
     noise_floor: Amount
 
 
-class Fitted(Record, kw_only=True):
-    """A parameter as the chapters name it, for this form of the lobe.
+class FittedParameter(Record, kw_only=True):
+    """A parameter as the chapters name it.
 
     Attributes
     ----------
@@ -45,17 +39,17 @@ class Fitted(Record, kw_only=True):
         Where the search ended; if the parameter is not identifiable, any value would do.
     interval
         95 %, by the reference's noise alone; null at a bound, or if not identifiable.
-    reason
-        Why it is not identifiable; otherwise empty.
     bounds
         Lower and upper; null if there is none.
+    reason
+        Why it is not identifiable; otherwise empty.
     partners
         Parameters that make up for it.
     """
 
     name: str
     channel: Literal["", "R", "G", "B"] = ""
-    is_factor: bool
+    is_factor: bool = False
     paired: float
     fitted: float | None
     stopped_at: float
@@ -67,7 +61,7 @@ class Fitted(Record, kw_only=True):
     partners: tuple[str, ...] = ()
 
 
-class FittedLight(Fitted, kw_only=True):
+class FittedLight(FittedParameter, kw_only=True):
     """The factor on the intensity of a light."""
 
     light: str
@@ -87,23 +81,23 @@ class FittedMaterial(Record):
     name: str
     reference: dict[str, Any] | None
     pixels: Count
-    parameters: tuple[Fitted, ...]
+    parameters: tuple[FittedParameter, ...]
 
 
-class FormFit(Record):
-    """The best fit of one form of the lobe; a form and its normalised variant are one fit.
+class FormFit(Record, kw_only=True):
+    """The best fit of one form of the lobe, or of a heuristic's own parameters.
 
     Attributes
     ----------
     form
         Of the lobe, ``phong`` or ``blinn``; or the heuristic whose own parameters were fitted.
-    normalised
-        Whether k_s is the lobe's albedo at normal incidence.
     loss
         At the best parameters, in the loss's own unit: the *model error*, which no parameters of
         this form remove.
     parameter_error
         The paired image's loss less the model error: what better parameters remove.
+    departure
+        By metric.
     lights
         Factors on intensities; empty if they were not fitted.
     convergence
@@ -113,14 +107,13 @@ class FormFit(Record):
     """
 
     form: str
-    normalised: bool
     loss: Amount
     parameter_error: float
-    departure: dict[str, Departure]
-    materials: tuple[FittedMaterial, ...]
-    lights: tuple[FittedLight, ...]
-    convergence: tuple[Start, ...]
-    own: tuple[Fitted, ...] = ()
+    departure: dict[str, FitDeparture]
+    materials: tuple[FittedMaterial, ...] = ()
+    lights: tuple[FittedLight, ...] = ()
+    convergence: tuple[SearchStart, ...]
+    own: tuple[FittedParameter, ...] = ()
 
 
 class LossName(Record):
@@ -135,11 +128,6 @@ class FitTimes(Record):
 
     rendering_s: Amount
     fitting_s: Amount
-
-    @property
-    def total(self) -> float:
-        """All of it."""
-        return self.rendering_s + self.fitting_s
 
 
 class FitRecord(Record, kw_only=True):

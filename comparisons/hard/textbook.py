@@ -1,19 +1,49 @@
-"""The illumination model as a textbook prints it, in NumPy, of any precision.
+"""The textbook's reflection as printed, in NumPy of any precision, and rows of hard cases.
 
-In single precision it is the naive form that the hard cases break. In extended precision
-(:data:`EXACT`; on machines without it, double) the same lines are exact enough to judge by, since
-the inputs are of single precision. It shares nothing with the kernel.
+Vectors are (..., 3), numbers (..., 1). Hard cases evaluate it in single precision, the naive form
+that they break, and in extended precision (:data:`EXACT`; on machines without it, double), which is
+exact enough to judge by, since the inputs are of single precision. It shares nothing with the
+kernel. The diagnosis of shaders changes it by one mistake after another.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heuristic.arrays import Array
-
 NAIVE, EXACT = np.float32, np.longdouble
+
+
+def dot(a: NDArray, b: NDArray) -> NDArray:
+    """Return the dot products (..., 1) of vectors."""
+    return (a * b).sum(axis=-1, keepdims=True)
+
+
+def unit(vectors: NDArray) -> NDArray:
+    """Return vectors over their length, without precautions."""
+    return vectors / np.sqrt(dot(vectors, vectors))
+
+
+def mirrored(normal: NDArray, toward: NDArray, view: NDArray) -> NDArray:
+    """Return ``R.V``, where ``R = 2 (N.L) N - L`` (8.7)."""
+    return dot(2 * normal * dot(normal, toward) - toward, view)
+
+
+def halfway(normal: NDArray, toward: NDArray, view: NDArray) -> NDArray:
+    """Return ``N.H`` of Blinn (1977)."""
+    return dot(normal, unit(toward + view))
+
+
+def clamped(cosine: NDArray) -> NDArray:
+    """Return a cosine, or 0 if it is negative."""
+    return np.maximum(cosine, 0)
+
+
+def lobe(cosine: NDArray, n: Any, incidence: NDArray) -> NDArray:
+    """Return ``cosine^n``, 0 where the light is not above the surface."""
+    return np.where(incidence > 0, clamped(cosine) ** n, 0)
 
 
 @dataclass(frozen=True)
@@ -23,54 +53,61 @@ class Setting:
     ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``.
     """
 
-    position: Array = (0.0, 0.0, 0.0)
-    normal: Array = (0.0, 0.0, 1.0)
-    view: Array = (0.0, 0.0, 1.0)
-    light: Array = (0.0, 0.0, 1.0)
-    intensity: Array = 1.0
-    attenuation: Array = (1.0, 0.0, 0.0)
+    position: Any = (0.0, 0.0, 0.0)
+    normal: Any = (0.0, 0.0, 1.0)
+    view: Any = (0.0, 0.0, 1.0)
+    light: Any = (0.0, 0.0, 1.0)
+    intensity: Any = 1.0
+    attenuation: Any = (1.0, 0.0, 0.0)
     k_d: float = 0.0
     k_s: float = 0.0
-    n: Array = 1.0
-    direction: Array = None
+    n: Any = 1.0
+    direction: Any = None
     cutoff: float = 90.0
     m: float = 0.0
 
     def rounded(self) -> "Setting":
         """Return the setting with all numbers rounded to single precision."""
-        rounded: dict[str, Any] = {
+        single: dict[str, Any] = {
             name: np.float32(value) for name, value in vars(self).items() if value is not None
         }
-        return replace(self, **rounded)
+        return replace(self, **single)
 
 
-def shade(
-    setting: Setting, dtype: type[np.floating], horizon: bool = True, unit_normal: bool = True
-) -> NDArray:
-    """Evaluate equation 8.10 for one light, without precautions: an array (N,) of a precision.
+@dataclass(frozen=True)
+class HardCase:
+    """A case: ``naive``, ``ours`` and ``exact`` return arrays of one shape."""
 
-    Without ``horizon``, ``N.L`` and ``R.V`` need not be above 0, as 8.5 and 8.9 are printed;
-    without ``unit_normal``, the normal is taken for a unit vector.
-    """
+    name: str
+    group: str
+    difficulty: str
+    bound: float
+    naive: Callable[[], ArrayLike]
+    ours: Callable[[], ArrayLike]
+    exact: Callable[[], ArrayLike]
+    setting: Setting | None = None
+
+
+def shade(setting: Setting, dtype: Any) -> NDArray:
+    """Evaluate equation 8.10 for one light, without precautions: an array (N,) of a precision."""
     s = setting
     with np.errstate(all="ignore"):
-        normal, view = (_of(vector, dtype) for vector in (s.normal, s.view))
-        normal, view = _unit(normal) if unit_normal else normal, _unit(view)
-        offset = _of(s.light, dtype) - _of(s.position, dtype)
-        distance = np.sqrt(_dot(offset, offset))
-        toward = offset / distance[..., None]
-        cosine = _dot(normal, toward)
-        mirrored = 2 * normal * cosine[..., None] - toward
-        reflection = _dot(mirrored, view)
-        lobe = (np.maximum(reflection, 0) if horizon else reflection) ** _of(s.n, dtype)
+        normal, view, offset = _vectors(s, dtype)
+        normal, view = unit(normal), unit(view)
+        distance = np.sqrt(dot(offset, offset))
+        toward = offset / distance
+        cosine = dot(normal, toward)[..., 0]
+        reflection = mirrored(normal, toward, view)[..., 0]
+        power = clamped(reflection) ** dtype(s.n)
+        distance = distance[..., 0]
         k0, k1, k2 = (dtype(k) for k in s.attenuation)
-        arriving = _of(s.intensity, dtype) / (k0 + k1 * distance + k2 * distance**2)
+        arriving = dtype(s.intensity) / (k0 + k1 * distance + k2 * distance**2)
         if s.direction is not None:
-            cos_axis = -_dot(toward, _unit(_of(s.direction, dtype)))
+            cos_axis = -dot(toward, unit(np.asarray(s.direction).astype(dtype)))[..., 0]
             inside = cos_axis >= np.cos(np.deg2rad(dtype(s.cutoff)))
             arriving = np.where(inside, arriving * np.maximum(cos_axis, 0) ** dtype(s.m), 0)
-        value = arriving * (dtype(s.k_d) * cosine + dtype(s.k_s) * lobe)
-        return np.atleast_1d(np.where(horizon & (cosine <= 0), 0, value))
+        value = arriving * (dtype(s.k_d) * cosine + dtype(s.k_s) * power)
+        return np.atleast_1d(np.where(cosine <= 0, 0, value))
 
 
 def shade_exactly(setting: Setting) -> NDArray:
@@ -80,33 +117,17 @@ def shade_exactly(setting: Setting) -> NDArray:
     ``n = 0`` too.
     """
     value = shade(setting, EXACT)
-    s = setting
-    normal, view = (_unit(_of(vector, EXACT)) for vector in (s.normal, s.view))
-    toward = _unit(_of(s.light, EXACT) - _of(s.position, EXACT))
-    mirrored = 2 * normal * _dot(normal, toward)[..., None] - toward
-    if s.k_d == 0:
-        value = np.where(_dot(mirrored, view) > 0, value, 0)
-    exists = ~(np.isnan(toward).any(-1) | np.isnan(normal).any(-1) | np.isnan(view).any(-1))
+    with np.errstate(all="ignore"):
+        normal, view, toward = (unit(vectors) for vectors in _vectors(setting, EXACT))
+        if setting.k_d == 0:
+            value = np.where(mirrored(normal, toward, view)[..., 0] > 0, value, 0)
+    exists = ~np.isnan(dot(toward, toward) + dot(normal, normal) + dot(view, view))[..., 0]
     return np.where(exists, value, 0)
 
 
-def triangle_normal(
-    p0: ArrayLike, p1: ArrayLike, p2: ArrayLike, dtype: type[np.floating]
-) -> NDArray:
-    """Evaluate equation 6.19 as printed."""
-    a, b, c = (_of(p, dtype) for p in (p0, p1, p2))
-    with np.errstate(all="ignore"):
-        return _unit(np.cross(b - a, c - a))
-
-
-def _of(value, dtype):
-    return np.asarray(value).astype(dtype)
-
-
-def _dot(a, b):
-    return (a * b).sum(-1)
-
-
-def _unit(vector):
-    with np.errstate(all="ignore"):
-        return vector / np.sqrt(_dot(vector, vector))[..., None]
+def _vectors(s: Setting, dtype: Any) -> tuple[NDArray, NDArray, NDArray]:
+    """Return normal, view, and the way to the light."""
+    normal, view, light, position = (
+        np.asarray(each).astype(dtype) for each in (s.normal, s.view, s.light, s.position)
+    )
+    return normal, view, light - position

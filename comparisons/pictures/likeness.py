@@ -1,7 +1,7 @@
 """What a picture seems to lack: the small rendering between the halves that it is nearest to."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import mitsuba as mi
@@ -9,22 +9,17 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from comparisons.compare import guarded
-from comparisons.comparison import ComparisonRecord
-from comparisons.cost.judging import Judge
-from comparisons.cost.methods import Methods
+from comparisons.comparison import Comparison, ComparisonRecord
+from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.regions import Region
-from comparisons.departure.spaces import Viewing
-from comparisons.effects.corners import labels
-from comparisons.effects.lattice import Lattice
-from comparisons.effects.nearness import Effects, Nearest, Renderings, nearest
-from comparisons.effects.noiseless import Noiseless
-from comparisons.effects.shapley import subsets
+from comparisons.hybrids.attribution import ErrorMeter
+from comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels, subsets
+from comparisons.hybrids.nearness import Effects, Nearest, Renderings, nearest
 from comparisons.options import Options
-from comparisons.pictures import pictured
-from comparisons.record import Comparison
-from reference.effects.effect import Effect
+from comparisons.pictures import picture_files
+from comparisons.prepared import guarded
+from reference.planning.effects import Effect
 from reference.rendering.passes import Progress
 from reference.rendering.sums import Estimate
 from reference.scene.source import Source
@@ -49,18 +44,10 @@ FINER = 4
 
 @dataclass(frozen=True)
 class Candidates:
-    """The renderings between the halves of a scene.
+    """The renderings between the halves of a scene, ``{simulated effects: (R, h, w, 3)}``.
 
-    Attributes
-    ----------
-    images
-        ``{simulated effects: (R, h, w, 3)}``.
-    counted
-        (h, w): the pixels that see a surface.
-    rows, columns
-        (h, H) and (w, W): the weights that average a picture down, as the scene's film would.
-    viewing
-        Viewing conditions.
+    ``counted`` (h, w) are the pixels that see a surface; ``rows`` (h, H) and ``columns`` (w, W) the
+    weights that average a picture down, as the scene's film would.
     """
 
     images: dict[Effects, NDArray]
@@ -85,9 +72,9 @@ class Candidates:
         if len(small) >= REPLICATES:
             groups = [small[place::REPLICATES].mean(axis=0) for place in range(REPLICATES)]
         none = np.zeros_like(mean)
-        judge = Judge(Estimate(mean, none, none, REPLICATES), self.counted, self.viewing)
-        noiseless = Noiseless(judge, np.stack(groups))
-        errors = {effects: noiseless.errors(image) for effects, image in self.images.items()}
+        reference = Estimate(mean, none, none, REPLICATES)
+        meter = ErrorMeter(reference, self.counted, self.viewing, groups=np.stack(groups))
+        errors = {effects: meter.without_noise(image) for effects, image in self.images.items()}
 
         def within(mask: NDArray) -> Nearest | None:
             weights = self.reduced(mask.astype(float))[self.counted]
@@ -101,15 +88,13 @@ class Candidates:
     def exposure(self, picture: NDArray) -> str:
         """Return in words by which factor a picture would be much nearer; empty if by none."""
         small = self.reduced(picture)[self.counted]
-        found = []
+        plain, (nearer, factor) = np.inf, (np.inf, 1.0)
         for images in self.images.values():
             image = images.mean(axis=0)[self.counted]
             distance = LEADING.against(image, ..., self.viewing)
-            factor = _factor(small, image)
-            found.append((LEADING.mean(distance(factor * small)), factor))
-            found.append((LEADING.mean(distance(small)), 1.0))
-        nearer, factor = min(found)
-        plain = min(away for away, other in found if other == 1.0)
+            best = _factor(small, image)
+            plain = min(plain, LEADING.mean(distance(small)))
+            nearer, factor = min((nearer, factor), (LEADING.mean(distance(best * small)), best))
         if nearer > BETTER * plain or 1 / LEVEL < factor < LEVEL:
             return ""
         return (
@@ -122,37 +107,31 @@ class Candidates:
 def candidates(
     source: Source, options: Options, shape: tuple[int, ...], progress: Progress | None = None
 ) -> Candidates:
-    """Render the combinations of effects for pictures of a shape (H, W, ...).
-
-    Raises
-    ------
-    InputError
-        See :func:`comparisons.compare.guarded`.
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
-    """
+    """Render the combinations of effects for pictures of a shape (H, W, ...)."""
     height, width = shape[:2]
     size = small_size(width, height)
-    small = replace(options, image=(), transfer=None, resolution=size, spp=None, noise=None)
-    ready = guarded(source, replace(small, allow_empty=False))
-    lattice = Lattice(small, Methods(source, small, ready), REPLICATES, SPP, options.seed)
-    sets = combinations(lattice.effects)
+    small = options.changed(image=(), transfer=None, resolution=size, spp=None, noise=None)
+    ready = guarded(source, small.changed(allow_empty=False))
+    pairs = Pairs(source, small, ready)
+    scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
+    hybrids = HybridImages(pairs, scenes, REPLICATES, SPP, options.seed)
+    sets = combinations(hybrids.effects)
     progress = progress or (lambda *_: None)
     progress("renderings between the halves", 0, 1)
-    lattice.render(key for each in sets for key in lattice.needed(each))
+    hybrids.render(key for each in sets for key in hybrids.needed(each))
     progress("renderings between the halves", 1, 1)
     scene: Any = ready.scene
     rfilter = scene.sensors()[0].film().rfilter()
     return Candidates(
-        images={labels(lattice.effects, each): lattice.simulating(each).images for each in sets},
+        images={labels(hybrids.effects, each): hybrids.simulating(each).images for each in sets},
         counted=ready.counted,
-        rows=_weights(height, size[1], rfilter),
-        columns=_weights(width, size[0], rfilter),
+        rows=filter_weights(height, size[1], rfilter),
+        columns=filter_weights(width, size[0], rfilter),
         viewing=options.viewing,
     )
 
 
-def named(
+def with_nearest(
     comparison: Comparison, source: Source, options: Options, progress: Progress | None = None
 ) -> ComparisonRecord:
     """Return the record of a picture's comparison, with the rendering that it is nearest to.
@@ -160,36 +139,33 @@ def named(
     The picture as a whole, and each region, shape and material name theirs.
     """
     record, images = comparison.record, comparison.images
-    found = candidates(source, options, images.counted.shape, progress)
-    of = found.measured(pictured.read(options))
-    doubt = found.exposure(images.heuristic)
+    between = candidates(source, options, images.counted.shape, progress)
+    of = between.measured(picture_files.read_all(options))
+    doubt = between.exposure(images.heuristic)
     odd = (doubt,) if doubt else ()
 
-    def carried(carriers: Sequence[Any], places: NDArray) -> tuple[Any, ...]:
-        return tuple(
-            structs.replace(c, nearest=of(places == row)) for row, c in enumerate(carriers)
-        )
+    def each_of(shares: Sequence[Any], places: NDArray) -> tuple[Any, ...]:
+        masks = (places == row for row in range(len(shares)))
+        return tuple(structs.replace(s, nearest=of(m)) for s, m in zip(shares, masks, strict=True))
 
-    _, height, width, _ = found.images[()].shape
+    _, height, width, _ = between.images[()].shape
     assert record.picture, "the comparison is of a picture"
-    picture = structs.replace(
-        record.picture,
-        odd=(*record.picture.odd, *odd),
-        nearest=of(images.counted),
-        renderings=Renderings(
-            count=len(found.images), resolution=(width, height), spp=REPLICATES * SPP
-        ),
-    )
+    count, spp = len(between.images), REPLICATES * SPP
     return structs.replace(
         record,
-        picture=picture,
+        picture=structs.replace(
+            record.picture,
+            odd=(*record.picture.odd, *odd),
+            nearest=of(images.counted),
+            renderings=Renderings(count=count, resolution=(width, height), spp=spp),
+        ),
         warnings=(*odd, *record.warnings),
         regions=tuple(
             structs.replace(region, nearest=of(_inside(region, images.counted)))
             for region in record.regions
         ),
-        objects=carried(record.objects, images.objects),
-        materials=carried(record.materials, images.materials),
+        objects=each_of(record.objects, images.objects),
+        materials=each_of(record.materials, images.materials),
     )
 
 
@@ -208,20 +184,20 @@ def small_size(width: int, height: int) -> tuple[int, int]:
     longer, shorter = max(width, height), min(width, height)
     if longer <= LARGEST:
         return width, height
-    wanted = {side: side * shorter / longer for side in range(LARGEST, LARGEST // 2, -1)}
-    sizes = {side: max(1, round(other)) for side, other in wanted.items()}
-    long = min(sizes, key=lambda side: abs(sizes[side] - wanted[side]))
-    return (long, sizes[long]) if width >= height else (sizes[long], long)
+    exact = {side: side * shorter / longer for side in range(LARGEST, LARGEST // 2, -1)}
+    long = min(exact, key=lambda side: abs(max(1, round(exact[side])) - exact[side]))
+    short = max(1, round(exact[long]))
+    return (long, short) if width >= height else (short, long)
 
 
-def _factor(image: NDArray, wanted: NDArray) -> float:
+def _factor(image: NDArray, rendering: NDArray) -> float:
     """Return the factor between two images (N, 3): a median, which lamps do not move."""
-    shown, other = (each @ (0.2126, 0.7152, 0.0722) for each in (image, wanted))
-    lit = np.minimum(shown / max(shown.mean(), 1e-9), other / max(other.mean(), 1e-9)) > 1e-3
-    return float(np.median(other[lit] / shown[lit])) if lit.any() else 1.0
+    shown, other = (each @ (0.2126, 0.7152, 0.0722) for each in (image, rendering))
+    bright = np.minimum(shown / max(shown.mean(), 1e-9), other / max(other.mean(), 1e-9)) > 1e-3
+    return float(np.median(other[bright] / shown[bright])) if bright.any() else 1.0
 
 
-def _weights(large: int, small: int, rfilter: mi.ReconstructionFilter) -> NDArray[np.float64]:
+def filter_weights(large: int, small: int, rfilter: mi.ReconstructionFilter) -> NDArray[np.float64]:
     """Return the weights (small, large) of a film's filter on larger pixels of the same image."""
     if large == small:
         return np.eye(small)

@@ -1,24 +1,23 @@
-"""Reading pictures (EXR and PNG) as linear values, and rejecting all others.
+"""Pictures of other renderers (EXR and PNG) in place of the heuristic half.
 
-Values are in units of display white, with the primaries of BT.709, like all images here. A PNG
-does not state its transfer function, so the user must:
-
-==========  ========================================================================
-Transfer    Linear value of a stored one, ``v`` in 0..1
-==========  ========================================================================
-``linear``  ``v``
-``srgb``    ``v / 12.92`` up to 0.04045, else ``((v + 0.055) / 1.055)^2.4`` (IEC 61966-2-1)
-==========  ========================================================================
+Values are linear, in units of display white, with the primaries of BT.709, like all images here. A
+PNG does not state its transfer function, so the user must. What cannot be compared is rejected.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
+from comparisons.departure.colour import from_srgb
+from comparisons.options import Options
 from heuristic.errors import InputError, NonFiniteError, suggestion, unknown
+from reference.rendering.renderer import Renderer, Times
+from reference.scene.prepare import film_size
+from reference.scene.source import Source
 
 TRANSFERS = ("linear", "srgb")
 SUFFIXES = (".exr", ".png")
@@ -33,23 +32,75 @@ MOST_NEGATIVE = -1e-3
 """Below this, a negative value is more than rounding."""
 
 
+class PictureHalf:
+    """Pictures (H, W, 3) as the passes of a heuristic half, one after another.
+
+    Several are repeats, whose spread gives the noise; a single one serves for every pass. ``half``
+    is the renderer that they replace.
+    """
+
+    def __init__(self, images: list[np.ndarray], half: Renderer) -> None:
+        self.images, self.half = images, half
+        self.variant = half.variant
+        self.times: list[float] = []
+        self.compilation = 0.0
+
+    def render(self, seed: int) -> mi.TensorXf:
+        """Return the next picture; the seed is ignored."""
+        begin = perf_counter()
+        image = mi.TensorXf(self.images[len(self.times) % len(self.images)])
+        self.times.append(perf_counter() - begin)
+        return image
+
+    def pass_times(self) -> Times:
+        """Return the times of reading the pictures."""
+        return Times.of(self.times, 0.0)
+
+
+def read_all(options: Options) -> list[np.ndarray]:
+    """Return the pictures that options name: all of one size, and one or an even number."""
+    images = [read(word, options.transfer) for word in options.image]
+    sizes = {image.shape[:2] for image in images}
+    if len(sizes) > 1:
+        shown = ", ".join(f"{width}x{height}" for height, width in sorted(sizes))
+        raise InputError(f"pictures of {shown}: give repeats of one size.")
+    if len(images) > 1 and options.noise is not None:
+        raise InputError(
+            f"noise = {options.noise:g} and {len(images)} repeats: a noise target may need more"
+            " passes than there are pictures. Give --spp instead of --noise."
+        )
+    if len(images) > 1 and len(images) % 2:
+        raise InputError(
+            f"{len(images)} repeats: give one, or an even number, whose halves give the noise."
+        )
+    return images
+
+
+def at_size_of_pictures(source: Source, options: Options) -> Options:
+    """Return options with the resolution of their pictures, which must be the film's in shape."""
+    height, width = read_all(options)[0].shape[:2]
+    own = film_size(source.parse(), options.sensor)
+    film = options.resolution or own
+    if options.resolution and film != (width, height):
+        raise InputError(
+            f"{options.image[0]}: it has {width}x{height} pixels, and --resolution"
+            f" {film[0]}x{film[1]} is requested. Omit the option."
+        )
+    if abs(width * film[1] - height * film[0]) > max(film):  # more than a pixel
+        raise InputError(
+            f"{options.image[0]}: it has {width}x{height} pixels, an aspect ratio of"
+            f" {width / height:.4g}, and the scene's film {film[0]}x{film[1]},"
+            f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore the"
+            f" film's size with --resolution {width}x{height}."
+        )
+    return options.changed(resolution=(width, height))
+
+
 def read(word: str, transfer: str | None = None) -> np.ndarray:
     """Return a picture as linear RGB, (H, W, 3), float32.
 
-    Parameters
-    ----------
-    word
-        Path of a file; ``FILE.exr:LAYER`` for a layer of an EXR file.
-    transfer
-        One of :data:`TRANSFERS`; if omitted, an EXR is linear.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, is not a picture of opaque colours in BT.709, or is a PNG
-        without a stated transfer function.
-    NonFiniteError
-        When it holds a NaN or an infinity.
+    ``word`` is the path of a file, or ``FILE.exr:LAYER``. Without one of :data:`TRANSFERS`, an EXR
+    is linear.
     """
     if transfer not in (None, *TRANSFERS):
         raise unknown("transfer", transfer, TRANSFERS)
@@ -57,24 +108,21 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file. Give a {' or '.join(SUFFIXES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
-    _require_finite(image, word)
+    wrong = ~np.isfinite(image).all(axis=-1)
+    if wrong.any():
+        raise NonFiniteError(
+            f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture; such pixels are not"
+            " skipped."
+        )
     if transfer == "srgb":
-        image = decoded(image)
-    _require_light(image, word)
+        image = from_srgb(image)
+    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
+    if wrong.any():
+        raise InputError(
+            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"
+            " overshoots of a sharpening filter: write linear BT.709 without either."
+        )
     return np.ascontiguousarray(image, np.float32)
-
-
-def decoded(image: np.ndarray) -> np.ndarray:
-    """Return sRGB-encoded values as linear ones."""
-    low = image <= 0.04045
-    return np.where(low, image / 12.92, ((np.maximum(image, 0.04045) + 0.055) / 1.055) ** 2.4)
-
-
-def encoded(image: np.ndarray) -> np.ndarray:
-    """Return linear values as sRGB-encoded ones."""
-    image = np.maximum(image, 0)
-    low = image <= 0.0031308
-    return np.where(low, 12.92 * image, 1.055 * np.maximum(image, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def path_of(word: str) -> Path:
@@ -92,7 +140,7 @@ def _parts(word: str) -> tuple[Path, str]:
 
 
 def _exr(path: Path, layer: str) -> np.ndarray:
-    import OpenEXR
+    import OpenEXR  # only pictures need it
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
@@ -100,48 +148,46 @@ def _exr(path: Path, layer: str) -> np.ndarray:
             channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
     except Exception as error:  # the library raises many types for a file that is not EXR
         raise InputError(f"{path}: not a readable EXR file: {error}.") from error
-    _require_whole(path, header)
-    _require_bt709(path, header)
+    _require_plain(path, header)
     prefix = f"{layer}." if layer else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
-        layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
-        if layer and {*"RGB"} <= set(channels):
-            raise InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
-        if not layers:
-            raise InputError(
-                f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
-            )
-        where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
-        raise InputError(
-            f"{path}: it has {where}. Its layers are {', '.join(layers)}: give {path}:{layers[0]}."
-        )
+        raise _without_colours(path, layer, channels)
     _require_opaque(path, channels.get(f"{prefix}A"))
     return np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
 
 
-def _require_whole(path: Path, header: Mapping[str, Any]) -> None:
+def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
+    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+    if layer and {*"RGB"} <= set(channels):
+        return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
+    if not layers:
+        return InputError(
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
+        )
+    where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
+    return InputError(
+        f"{path}: it has {where}. Its layers are {', '.join(layers)}: give {path}:{layers[0]}."
+    )
+
+
+def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
+    """Require a whole picture in BT.709."""
     data, display = (np.array(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
     if data != display:
-        raise InputError(
-            f"{path}: it is cropped: its data window is {_box(data)}, its display window"
-            f" {_box(display)}. Save the whole picture."
+        sizes = (
+            f"{right - left + 1}x{bottom - top + 1} from ({left}, {top})"
+            for (left, top), (right, bottom) in (data, display)
         )
-
-
-def _box(window: list[list[int]]) -> str:
-    (left, top), (right, bottom) = window
-    return f"{right - left + 1}x{bottom - top + 1} from ({left}, {top})"
-
-
-def _require_bt709(path: Path, header: Mapping[str, Any]) -> None:
-    found = header.get("chromaticities")
-    if found is None or max(abs(np.subtract(found, BT709))) <= SAME_PRIMARIES:
-        return
-    shown = ", ".join(f"{value:.4g}" for value in found)
-    raise InputError(
-        f"{path}: its primaries and white are ({shown}). Convert it to BT.709 (sRGB):"
-        f" {', '.join(map(str, BT709))}."
-    )
+        raise InputError(
+            f"{path}: it is cropped: its data window is {next(sizes)}, its display window"
+            f" {next(sizes)}. Save the whole picture."
+        )
+    primaries = header.get("chromaticities")
+    if primaries is not None and max(abs(np.subtract(primaries, BT709))) > SAME_PRIMARIES:
+        raise InputError(
+            f"{path}: its primaries and white are ({', '.join(f'{v:.4g}' for v in primaries)})."
+            f" Convert it to BT.709 (sRGB): {', '.join(map(str, BT709))}."
+        )
 
 
 def _png(path: Path, transfer: str | None) -> np.ndarray:
@@ -169,24 +215,6 @@ def _require_opaque(path: Path, alpha: np.ndarray | None) -> None:
         f"{path}: {count} of {alpha.size} pixels have an alpha below 1, and their colours may or"
         " may not be premultiplied. Composite the picture over its background, without alpha."
     )
-
-
-def _require_finite(image: np.ndarray, word: str) -> None:
-    wrong = ~np.isfinite(image).all(axis=-1)
-    if wrong.any():
-        raise NonFiniteError(
-            f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture; such pixels are not"
-            " skipped."
-        )
-
-
-def _require_light(image: np.ndarray, word: str) -> None:
-    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
-    if wrong.any():
-        raise InputError(
-            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"
-            " overshoots of a sharpening filter: write linear BT.709 without either."
-        )
 
 
 def _counted(wrong: np.ndarray) -> str:

@@ -13,13 +13,8 @@ SIGNALS = {
 }
 """Ctrl-C, the end of a job, and the end of a terminal."""
 
-HELD_BACK = SIGNALS | {signal.SIGALRM}
-"""Signals that can interrupt; an alarm stands for a signal that arrived during an import."""
-
 PAUSE_S = 0.02
 """Seconds after which a signal that arrived during an import is tried again."""
-
-_is_held_back = False
 
 
 class Interrupted(KeyboardInterrupt):
@@ -39,17 +34,11 @@ def listen() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Delay interruptions while the block runs; processes that it starts inherit the mask.
-
-    The mask covers this thread alone: another may receive a signal, which is then handled here.
-    """
-    global _is_held_back
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD_BACK)
-    _is_held_back = True
+    """Delay interruptions while the block runs; processes that it starts inherit the mask."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
-        _is_held_back = False
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -62,7 +51,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     for each in SIGNALS:
         if signal.getsignal(each) is _interrupt:
             signal.signal(each, lambda number, _: os._exit(128 + number))
-    if not (_is_held_back or _is_importing(frame)):
+    if not _is_importing(frame):
         raise Interrupted(number)
     # A native module that is loading would crash or swallow the exception, so try again later.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))

@@ -1,22 +1,40 @@
-"""A pool of processes: a task that kills its process harms no other task.
+"""A pool of processes: a task that ends its process, or hangs, harms no other task.
 
 A process does task after task, so its start-up is paid once. A new one replaces one that died, or
-that ran a user's code (:func:`comparisons.processes.worker.end_after_task`).
+that ran a user's code (:func:`end_after_task`). Each leads its own process group, which ends as a
+whole: with the process, when its time is up, or when the parent ends in any way.
 """
 
+import logging
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import islice
 from math import inf
-from multiprocessing import connection
-from time import monotonic
-from typing import Any
+from multiprocessing import connection, get_context, parent_process, resource_tracker
+from time import monotonic, sleep
+from typing import Any, NoReturn
 
-from comparisons.processes.worker import GRACE_S, Task, Worker
+from comparisons.processes.interruption import SIGNALS, held_back
+from heuristic.errors import FotismosError, LostProcessError
 
 LOOK_S = 1.0
 """Seconds between checks that a process lives: its forks may hold its pipe open."""
+
+LOGGER = logging.getLogger(__name__)
+"""Receives the traceback of unexpected errors."""
+
+_is_spent = False
+
+
+def end_after_task() -> None:
+    """End this process of a pool once its task is done: other tasks need a clean one."""
+    global _is_spent
+    _is_spent = True
 
 
 def cores() -> int:
@@ -24,6 +42,20 @@ def cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call of ``function(*arguments)``, both of them picklable.
+
+    ``name`` appears in messages. ``progress``, if given, is called in the parent; the function
+    takes a callable that forwards to it as its last argument.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    progress: Callable[..., None] | None = None
 
 
 class Pool:
@@ -86,50 +118,36 @@ class Pool:
         """End the processes, whatever they are doing."""
         workers, self._idle, self._busy = self._idle + self._busy, [], []
         for worker in workers:
-            worker.pipe.close()
-        until = monotonic() + GRACE_S
-        for worker in workers:
-            worker.end(max(0.0, until - monotonic()))
+            worker.end()
 
     def _fill(self, waiting: Iterator[Task]) -> None:
         """Give tasks to idle and new processes."""
-        for worker in self._idle:
-            if not worker.process.is_alive():
-                worker.end()
-        self._idle = [worker for worker in self._idle if not worker.is_spent]
         for task in islice(waiting, self._count - len(self._busy)):
-            self._give(task)
-
-    def _give(self, task: Task, is_second_try: bool = False) -> None:
-        worker = self._idle.pop() if self._idle else Worker(self._prepare)
-        self._busy.append(worker)
-        worker.give(task, self._limit_s, is_second_try)
+            self._idle = [worker for worker in self._idle if worker.process.is_alive()]
+            worker = self._idle.pop() if self._idle else Worker(self._prepare)
+            self._busy.append(worker)
+            worker.give(task, self._limit_s)
 
     def _finished(self) -> list[tuple[Task, Future[Any]]]:
         """Wait for messages or the next deadline; return the tasks that are over."""
         first = min(worker.deadline for worker in self._busy)
-        ready = connection.wait(
-            [worker.pipe for worker in self._busy],
-            max(0.0, min(LOOK_S, first - monotonic())),
-        )
+        pause = max(0.0, min(LOOK_S, first - monotonic()))
+        ready = connection.wait([worker.pipe for worker in self._busy], pause)
+        over = []
         for worker in self._busy:
             if worker.pipe in ready:
                 worker.receive(self._limit_s)
             elif not worker.process.is_alive():
-                worker.gone()
+                worker.lose()
             elif worker.deadline <= monotonic():
                 worker.lose(f"it made no progress for {self._limit_s:g} s, and was ended.")
-        over = [worker for worker in self._busy if worker.outcome.done()]
+            if worker.outcome.done():
+                over.append(worker)
+                if worker.is_spent:
+                    worker.end()
+                else:
+                    self._idle.append(worker)
         self._busy = [worker for worker in self._busy if worker not in over]
-        killed = [worker for worker in over if worker.was_killed and not worker.is_second_try]
-        over = [worker for worker in over if worker not in killed]
-        for worker in killed:
-            self._give(worker.task, is_second_try=True)
-        for worker in over:
-            if worker.is_spent:
-                worker.end()
-            else:
-                self._idle.append(worker)
         return [(worker.task, worker.outcome) for worker in over]
 
 
@@ -140,3 +158,128 @@ def _done_here(task: Task) -> Future[Any]:
     except Exception as error:
         outcome.set_exception(error)
     return outcome
+
+
+class Worker:
+    """One process, as seen by its parent."""
+
+    task: Task
+    outcome: Future[Any]
+    deadline: float
+
+    def __init__(self, prepare: Callable[[], object]) -> None:
+        context = get_context("spawn")  # a fork would share threads' locks with its parent
+        self.is_spent = False
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        resource_tracker.ensure_running()  # here, because it unblocks signals
+        with held_back():
+            self.process.start()
+        theirs.close()  # the end of the process must be the end of the pipe
+
+    def give(self, task: Task, limit_s: float) -> None:
+        """Send a task, which has ``limit_s`` seconds until its first sign of progress."""
+        self.task, self.outcome, self.deadline = task, Future(), monotonic() + limit_s
+        with suppress(ConnectionError):  # a process that is gone is noticed in `receive`
+            self.pipe.send((task.function, task.arguments, task.progress is not None))
+
+    def receive(self, limit_s: float) -> None:
+        """Take one message, which may be the outcome of the task."""
+        try:
+            kind, content, self.is_spent = self.pipe.recv()
+        except (EOFError, OSError):
+            self.lose()
+            return
+        except Exception as error:  # unpickling can raise anything
+            self.lose(f"its answer cannot be read: {type(error).__name__}: {error}")
+            return
+        self.deadline = monotonic() + limit_s
+        if isinstance(content, LostProcessError):
+            content = LostProcessError(f"{self.task.name}: {content}")
+        if kind != "progress":
+            getattr(self.outcome, kind)(content)
+        elif self.task.progress:
+            self.task.progress(*content)
+
+    def lose(self, reason: str = "") -> None:
+        """End the process, and fail its task for a reason, or because the process ended."""
+        until = monotonic() + (0 if reason else LOOK_S)
+        # Not `join`: it waits forever for a process that closed all its files.
+        while self.process.is_alive() and monotonic() < until:
+            sleep(0.01)
+        code = self.process.exitcode
+        self.end()
+        if code == -signal.SIGKILL:
+            reason = "its process was killed (SIGKILL), usually because memory ran out."
+        elif code is not None and code < 0:
+            reason = f"its process died of {signal.Signals(-code).name} in native code."
+        elif code is not None:
+            reason = f"its process ended with exit code {code}."
+        reason = reason or "its process no longer answered."
+        self.outcome.set_exception(LostProcessError(f"{self.task.name}: {reason}"))
+
+    def end(self) -> None:
+        """End the process and its group."""
+        self.is_spent = True
+        self.pipe.close()
+        assert self.process.pid is not None
+        with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()
+        self.process.join()
+
+
+def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
+    """Do the tasks that come through the pipe, until it is closed."""
+    os.setpgid(0, 0)
+    os.register_at_fork(after_in_child=pipe.close)  # only this process answers
+    os.dup2(2, 1)  # standard output is for the parent's results
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it too, and ends this process
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    preparations = [prepare]
+    while True:
+        try:
+            call = pipe.recv()
+        except (EOFError, OSError):
+            os._exit(0)  # the parent is gone
+        _send(pipe, *_answer(pipe, preparations, *call))
+        del call
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    connection.wait([parent.sentinel])
+    os.killpg(0, signal.SIGKILL)
+
+
+def _answer(
+    pipe: Any,
+    preparations: list[Callable[[], object]],
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    with_progress: bool,
+) -> tuple[str, Any]:
+    """Do a task; return the method of its outcome to call, and the argument."""
+    progress = [lambda *words: _send(pipe, "progress", words)] if with_progress else []
+    try:
+        while preparations:  # until they succeed
+            preparations[0]()
+            preparations.pop()
+        return "set_result", function(*arguments, *progress)
+    except FotismosError as error:
+        return "set_exception", error
+    except BaseException as error:  # Ctrl-C is ignored here: this is the task's own
+        LOGGER.info("a task failed", exc_info=True)
+        return "set_exception", LostProcessError(f"{type(error).__name__}: {error}")
+
+
+def _send(pipe: Any, kind: str, content: Any) -> None:
+    try:
+        pipe.send((kind, content, _is_spent))
+    except OSError:  # the parent is gone, or this is a fork
+        os._exit(0)
+    except Exception as error:  # pickling can raise anything
+        reason = f"its result cannot be sent: {type(error).__name__}: {error}"
+        pipe.send(("set_exception", LostProcessError(reason), _is_spent))

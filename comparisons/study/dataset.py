@@ -1,117 +1,246 @@
-"""Rows as one Parquet file, with units, meanings and provenance in its schema."""
+"""The dataset of a study: its columns, the measures in them, and its Parquet file.
+
+Each field's metadata has ``unit`` and ``description``; the schema's has ``title``, ``study`` (the
+TOML text) and ``versions`` (JSON). No time or place is recorded, so equal studies give equal files.
+"""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
+from math import isclose
 from pathlib import Path
-from typing import TypeGuard
+from typing import Any, TypeAlias
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from msgspec.structs import replace
 
-from comparisons import atomic
+from comparisons.atomic import require_regular
+from comparisons.departure import statistics
+from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import (
+    LEADING,
+    METRICS,
+    RATIO,
+    Pixelwise,
+    checked_pair,
+    log2_luminance_ratio,
+)
 from comparisons.record import versions
-from comparisons.store import require_regular
-from comparisons.study.columns import IDENTITY, PARAMETERS, Column, Row, results
-from comparisons.study.design import OWN, Study
-from heuristic.errors import InputError
+from comparisons.study.design import OWN, StudyFile
+from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
+from heuristic.errors import InputError, unknown
+from reference.pairing.factors import Miss
+from reference.planning.effects import EFFECTS
 
-TYPES = {str: pa.string(), int: pa.int64(), float: pa.float64()}
+Row: TypeAlias = dict[str, Any]
+"""Values by column."""
 
 
-def table(study: Study, rows: list[Row]) -> pa.Table:
-    """Return the rows of a study as a ``pyarrow.Table``.
+Column: TypeAlias = tuple[str, str, type]
+"""A column's unit (``1`` for pure numbers), its meaning, and its Python type."""
 
-    Each field's metadata has ``unit`` and ``description``; the schema's has ``title``, ``study``
-    (the TOML text) and ``versions`` (JSON). Columns without any value are omitted; other missing
-    values are null. No time or place is recorded, so equal studies give equal tables.
+STEPPED = tuple(effect for effect in EFFECTS if effect.step)
+STEPS = ("form", *(effect.label for effect in STEPPED))
+"""The steps between the halves, in the order in which they are added to the heuristic image: the
+form of BSDFs and lights, then one effect after another."""
+
+DIMMED = {"quarter": 1 / 4, "sixteenth": 1 / 16}
+"""Further light levels at which the departure is measured: visibility depends on the level."""
+
+LUMINANCE = "display-linear, 1 for a white diffuse surface that faces the light"
+IDENTITY: dict[str, Column] = {
+    "part": ("", "part of the study", str),
+    "point": ("", "number of the point in its part", int),
+}
+PARAMETERS: dict[str, Column] = {
+    name: (parameter.unit, parameter.meaning, float)
+    for scene in SCENES.values()
+    for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
+}
+HALVES = {
+    "specular": ("1", "the {}'s specular part (scene lobe: in the mirror direction)"),
+    "albedo": ("1", "share of the light that the {} reflects"),
+    "specular_albedo": ("1", "share that the {}'s specular part reflects"),
+    "peak": ("deg", "view angle at which the {}'s specular part peaks, in the plane of incidence"),
+}
+"""Unit and meaning of columns that both halves have."""
+
+
+def results() -> dict[str, Column]:
+    """Return the columns of results, including the departure in each metric."""
+    name, label = LEADING.name, LEADING.label
+    numbers = {
+        "heuristic": f"mean of the heuristic image, {LUMINANCE}",
+        "reference": f"mean of the reference, {LUMINANCE}",
+        name: LEADING.heading,
+        f"{name}_p95": f"{label}, 95th percentile",
+        f"{name}_noise": f"{label} that the noise of the comparison alone would cause",
+        f"{name}_shape": f"{label}, mean, after the best exposure",
+        **{f"{name}_{part}": f"{label}, mean, under a {part} of the light" for part in DIMMED},
+        "exposure": f"factor on the heuristic image that minimises {label}",
+        **{name: metric.heading for name, metric in METRICS.items()},
+    }
+    changes = {
+        STEPS[0]: "RMS change by the physical BSDFs and lights, without shadows",
+        **{effect.label: f"RMS change by {effect.step}" for effect in STEPPED},
+    }
+    return {
+        **{key: ("1", meaning, float) for key, meaning in numbers.items()},
+        RATIO.name: (RATIO.unit, "mean ratio of luminances, heuristic to reference", float),
+        **{key: ("1", meaning, float) for key, meaning in changes.items()},
+        "dominant": ("", f"the largest of {', '.join(STEPS[:-1])} and {STEPS[-1]}", str),
+        **{
+            f"{key}_{half}": (unit, meaning.format(half), float)
+            for key, (unit, meaning) in HALVES.items()
+            for half in ("heuristic", "reference")
+        },
+        "miss": ("1", "largest relative miss of the pairing, 0 if it is exact", float),
+        "error": ("", "why there is no result; empty if there is one", str),
+    }
+
+
+# --- Measures -------------------------------------------------------------------------------------
+
+
+def measure(
+    heuristic: np.ndarray,
+    reference: np.ndarray,
+    counted: np.ndarray,
+    noise: np.ndarray | None = None,
+) -> Row:
+    """Return the columns that all images have.
+
+    The images (H, W, 3) are linear; ``noise`` is that of their difference, ``counted`` (H, W).
     """
+    summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
+    ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
+    test, truth = heuristic[counted], reference[counted]
+    means = {
+        name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
+        for name, metric in METRICS.items()
+    }
+    return {
+        "heuristic": float(test.mean()),
+        "reference": float(truth.mean()),
+        **means,
+        f"{LEADING.name}_p95": summary.p95,
+        f"{LEADING.name}_noise": summary.noise_floor,
+        f"{LEADING.name}_shape": summary.after_exposure.mean,
+        **{name: float(values.mean()) for name, values in _dimmed(test, truth).items()},
+        "exposure": summary.after_exposure.exposure,
+        RATIO.name: ratio.mean,
+    }
+
+
+def measure_each(heuristic: np.ndarray, reference: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of single grey values (N,), one array each.
+
+    The shape column is missing: the best exposure would remove all departure of a single value.
+    """
+    test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
+    pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}
+    return {
+        "heuristic": heuristic,
+        "reference": reference,
+        **{name: metric(test, truth) for name, metric in pixelwise.items()},
+        **_dimmed(test, truth),
+        RATIO.name: log2_luminance_ratio(test, truth),
+    }
+
+
+def _dimmed(test: np.ndarray, truth: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the leading metric of each pixel (N, 3) under the light levels :data:`DIMMED`.
+
+    Both models are linear in the light: less light is a lower exposure on both images.
+    """
+    return {
+        f"{LEADING.name}_{part}": LEADING(test, truth, replace(DEFAULT_VIEWING, exposure=factor))
+        for part, factor in DIMMED.items()
+    }
+
+
+def largest_miss(misses: Iterable[Miss]) -> float:
+    """Return the largest relative miss of a pairing, 0 if it is exact."""
+    return max((abs(miss.reached / miss.wanted - 1) for miss in misses if miss.wanted), default=0.0)
+
+
+# --- The file -------------------------------------------------------------------------------------
+
+
+def table(study: StudyFile, rows: list[Row]) -> pa.Table:
+    """Return the rows of a study; columns without any value are omitted."""
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
-    paths = sorted(present - {*IDENTITY, *PARAMETERS, *results()})
-    own = {path: Column("", _meaning(path)) for path in paths}
+    meanings = {True: "parameter that the heuristic declares",
+                False: "parameter of the scene, by its path"}  # fmt: skip
+    own = {
+        path: ("", meanings[path.startswith(OWN)], float)
+        for path in sorted(present - {*IDENTITY, *PARAMETERS, *results()})
+    }
     columns = IDENTITY | PARAMETERS | own | results()
     columns = {name: column for name, column in columns.items() if name in present}
-    schema = pa.schema(
-        [
-            pa.field(
-                name,
-                TYPES[column.kind],
-                metadata={"unit": column.unit, "description": column.meaning},
-            )
-            for name, column in columns.items()
-        ],
-        metadata={
-            "title": study.title,
-            "study": study.text,
-            "versions": json.dumps(versions(), ensure_ascii=False),
-        },
-    )
+    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64()}
+    fields = [
+        pa.field(name, kinds[kind], metadata={"unit": unit, "description": meaning})
+        for name, (unit, meaning, kind) in columns.items()
+    ]
+    software = json.dumps(versions(), ensure_ascii=False)
+    schema = pa.schema(fields, {"title": study.title, "study": study.text, "versions": software})
     return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in rows], schema)
 
 
-def _meaning(path: str) -> str:
-    if path.startswith(OWN):
-        return "parameter that the heuristic declares"
-    return "parameter of the scene, by its path"
-
-
-def fits(rows: object, points: Sequence[dict[str, float]]) -> TypeGuard[list[Row]]:
-    """Return whether an object read from a file is rows of these points, fit for :func:`table`."""
-    if not isinstance(rows, list) or len(rows) != len(points):
-        return False
-    known = IDENTITY | PARAMETERS | results()
-    for row, point in zip(rows, points, strict=True):
-        if not isinstance(row, dict) or not {*IDENTITY, *point, "error"} <= row.keys():
-            return False
-        columns = known | dict.fromkeys(point, Column("", "a parameter"))
-        if any(row[name] != value for name, value in point.items()):
-            return False
-        if not all(name in columns and _is_of(columns[name], row[name]) for name in row):
-            return False
-    return True
-
-
-def _is_of(column: Column, value: object) -> bool:
-    if column.kind is float and type(value) is int:
-        return abs(value) < 2**53
-    return value is None or type(value) is column.kind
-
-
-def write(path: str | Path, data: pa.Table) -> None:
-    """Write a table to a Parquet file, atomically.
-
-    Raises
-    ------
-    OutputError
-        When it cannot be written.
-    """
-    atomic.write(Path(path), file_of(data))
-
-
 def file_of(data: pa.Table) -> bytes:
-    """Return the Parquet file of a table as bytes."""
+    """Return the Parquet file of a table."""
     stream = pa.BufferOutputStream()
     pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
     return stream.getvalue().to_pybytes()
 
 
 def read(path: str | Path) -> pa.Table:
-    """Read a dataset.
-
-    Raises
-    ------
-    InputError
-        When it is missing, or is not a Parquet file.
-    """
+    """Read a dataset; ``InputError`` if it is missing, damaged, or not one of a study."""
     try:
         require_regular(path)
-        found = pq.read_table(path, page_checksum_verification=True)
-        found.validate(full=True)
-        missing = {"part", "point", "error"} - set(found.column_names)
+        data = pq.read_table(path, page_checksum_verification=True)
+        data.validate(full=True)
+        missing = {"part", "point", "error"} - set(data.column_names)
         if missing:
             raise pa.ArrowInvalid(f"it has no column {', '.join(sorted(missing))}")
-        return found
+        return data
     except (OSError, pa.ArrowException) as error:
         raise InputError(
             f"{path} cannot be read as a dataset: {error}. Run the study again."
         ) from error
+
+
+def rows(data: pa.Table, part: str, where: dict[str, Any] | None = None) -> list[Row]:
+    """Return the rows of a part that have a result.
+
+    ``where`` maps columns to a value or a list of values; numbers match to six digits.
+    """
+    for name in where or {}:
+        require(data, name)
+    own = [row for row in data.to_pylist() if row["part"] == part and row["error"] is None]
+    matching = [row for row in own if all(_matches(row[k], v) for k, v in (where or {}).items())]
+    if not matching:
+        raise InputError(f"no point of part {part!r} has {where or 'a result'}.")
+    return matching
+
+
+def require(data: pa.Table, column: str) -> None:
+    """Ensure that a column exists."""
+    if column not in data.column_names:
+        raise unknown("column", column, data.column_names)
+
+
+def unit(data: pa.Table, column: str) -> str:
+    """Return the unit of a column, from its metadata."""
+    return data.schema.field(column).metadata[b"unit"].decode()
+
+
+def _matches(value: Any, allowed: Any) -> bool:
+    if isinstance(allowed, list):
+        return any(_matches(value, one) for one in allowed)
+    if isinstance(value, float):
+        return isclose(value, allowed, rel_tol=1e-6, abs_tol=1e-9)
+    return bool(value == allowed)

@@ -16,119 +16,155 @@
     light_angle = [0, 30, 60]
     int_ior = 1.5
 
+    [[figure]]
+    name = "departure"             # of the file
+    title = "Departure over roughness and incidence"
+    part = "lobe"
+    kind = "map"                   # or "lines"
+    x = "light_angle"
+    y = "alpha"                    # maps
+    values = ["dE2000"]            # one column for a map, one or more for lines
+    series = "int_ior"             # lines: one for each value of this parameter
+    where = { int_ior = [1.5, 2] } # the points that are shown
+    rule = 1.0                     # lines: a horizontal line
+    log = ["x", "y"]               # lines: logarithmic axes
+
 Omitted keys have their defaults; ``heuristic.NAME`` is a parameter that the heuristic declares. A
-part whose scene is rendered may also set ``resolution`` and ``spp``. The figures (``[[figure]]``)
-are read by :mod:`reports.charts.study_charts`.
+part whose scene is rendered may also set ``resolution``, ``spp`` (over all passes) and ``seed``.
 """
 
 import tomllib
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
+from math import isfinite
+from numbers import Real
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
 from scipy.stats import qmc
 
+from comparisons import atomic
 from comparisons.case import SUFFIXES
-from comparisons.study.levels import Fixed, Listed, Span, values
-from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES, UNLIMITED, Parameter, Point
+from comparisons.options import Options
+from comparisons.study.scenes import (
+    PHONG,
+    ROUGHPLASTIC,
+    SCENES,
+    UNLIMITED,
+    Point,
+    StudyParameter,
+)
 from heuristic import heuristics
 from heuristic.errors import InputError, unknown
-from reference.pairing.factors import Convention
+from reference.records import Count, Record
 
-DESIGNS = ("grid", "random", "sobol")
 LARGEST = 1_000_000
-KEYS = {"name", "scene", "design", "points", "pairing", "heuristic", "resolution", "spp", "seed"}
-KEYS |= {"parameters"}
+"""Most points of a part."""
 
-Table: TypeAlias = dict[str, Any]
-"""A table of TOML."""
+SETTABLE = ("pairing", "heuristic", "resolution", "spp", "seed")
+"""The options of a comparison that a part may set."""
+
+DEFAULTS = Options(resolution=(64, 64), spp=64)
+
+OWN = "heuristic."
+"""Prefix of the names of a heuristic's own parameters."""
+
+Design = Literal["grid", "random", "sobol"]
 
 
 @dataclass(frozen=True)
-class Part:
+class Levels:
+    """The values of one parameter: a list, or a range, of which drawn designs use all values."""
+
+    values: tuple[float, ...]
+    is_range: bool = False
+    is_log: bool = False
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """Return the values at ``u``, an array of numbers in [0, 1); listed ones equally often."""
+        if not self.is_range:
+            return np.array(self.values)[(u * len(self.values)).astype(int)]
+        low, high = self.values[0], self.values[-1]
+        return low * (high / low) ** u if self.is_log else low + (high - low) * u
+
+
+@dataclass(frozen=True)
+class StudyPart:
     """One design over one scene.
 
-    Attributes
-    ----------
-    name
-        In the dataset's column ``part``.
-    scene
-        Name in :data:`comparisons.study.scenes.SCENES`, name of a built-in scene, or path of a
-        file.
-    design
-        ``grid``: all combinations; ``random``: independent and uniform (in the logarithm if the
-        scale is ``log``); ``sobol``: the scrambled Sobol sequence, with a power of 2 of points.
-    spans
-        The values of each parameter; in a grid, the first varies slowest.
-    count
-        Number of points of a random or Sobol design.
-    heuristic
-        Name of the heuristic; see :func:`heuristic.heuristics.named`.
-    seed
-        Seed of the design and of the renderings.
-    resolution, spp
-        For rendered scenes; ``spp`` is over all passes.
+    ``grid`` has all combinations of the levels, the first varying slowest; ``random`` is
+    independent and uniform (in the logarithm if the scale is ``log``); ``sobol`` is the scrambled
+    Sobol sequence. The seed of the options is also the design's.
     """
 
     name: str
     scene: str
-    spans: dict[str, Listed | Span]
-    design: str = "grid"
-    count: int = 0
-    convention: Convention = Convention.MATCHED
-    heuristic: str = heuristics.PHONG.name
-    seed: int = 0
-    resolution: tuple[int, int] = (64, 64)
-    spp: int = 64
+    levels: dict[str, Levels]
+    design: Design
+    count: int
+    options: Options
 
     def points(self) -> list[Point]:
         """Return the points in order."""
-        names = list(self.spans)
+        levels = self.levels.values()
         if self.design == "grid":
-            table: Iterable[tuple[float, ...]] = product(
-                *(span.values() for span in self.spans.values())
-            )
+            rows: Any = product(*(each.values for each in levels))
         else:
-            unit = _unit_points(self.design, len(names), self.count, self.seed)
-            table = zip(
-                *(span.at(u) for span, u in zip(self.spans.values(), unit.T, strict=True)),
-                strict=True,
-            )
-        return [dict(zip(names, map(float, row), strict=True)) for row in table]
-
-    @property
-    def reads_files(self) -> bool:
-        """Whether its points need the user's files."""
-        return bool(Path(self.scene).suffix in SUFFIXES or heuristics.in_file(self.heuristic))
+            rng = np.random.default_rng(self.options.seed)
+            if self.design == "sobol":
+                unit = qmc.Sobol(len(levels), rng=rng).random(self.count)
+            else:
+                unit = rng.random((self.count, len(levels)))
+            rows = zip(*(each.at(u) for each, u in zip(levels, unit.T, strict=True)), strict=True)
+        return [dict(zip(self.levels, map(float, row), strict=True)) for row in rows]
 
     @property
     def varying(self) -> tuple[str, ...]:
         """The parameters that take more than one value."""
-        return tuple(name for name, span in self.spans.items() if not isinstance(span, Fixed))
+        return tuple(name for name, each in self.levels.items() if len(each.values) > 1)
 
 
-@dataclass(frozen=True)
-class Study:
-    """A study: its title, parts, figures as written, and the file's text."""
+class StudyFigure(Record):
+    """A figure of a study; for its keys see above."""
 
     name: str
     title: str
-    parts: tuple[Part, ...]
+    part: str
+    kind: Literal["map", "lines"]
+    x: str
+    values: tuple[str, ...]
+    y: str | None = None
+    series: str | None = None
+    where: dict[str, Any] = msgspec.field(default_factory=dict)
+    rule: float | None = None
+    log: tuple[Literal["x", "y"], ...] = ()
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """A study: its title, parts and figures, and the file's text."""
+
+    name: str
+    title: str
+    parts: tuple[StudyPart, ...]
     text: str
-    figures: tuple[dict[str, Any], ...] = field(default=())
+    figures: tuple[StudyFigure, ...] = ()
 
 
-def read(path: str | Path) -> Study:
-    """Read a study from a TOML file.
+class PartTable(Record):
+    """A part as written, without its options of the rendering."""
 
-    Raises
-    ------
-    InputError
-        When there is no such file, it is not TOML, or something in it is not allowed.
-    """
+    scene: str
+    parameters: dict[str, Any]
+    name: str | None = None
+    design: Design = "grid"
+    points: Count = 0
+
+
+def read(path: str | Path) -> StudyFile:
+    """Read a study from a TOML file; ``InputError`` says what in it is not allowed."""
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
@@ -141,148 +177,146 @@ def read(path: str | Path) -> Study:
         raise InputError(f"{path}: {error}") from error
 
 
-def parse(text: str, name: str = "study", folder: Path = Path()) -> Study:
-    """Make a study from the text of a TOML file; scene files are relative to ``folder``.
-
-    Raises
-    ------
-    InputError
-        See :func:`read`.
-    """
+def parse(text: str, name: str = "study", folder: Path = Path()) -> StudyFile:
+    """Make a study from the text of a TOML file; its files are relative to ``folder``."""
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(text)
+    # Numbers too long for Python and values nested too deeply raise other errors.
+    except (ValueError, RecursionError) as error:
         raise InputError(f"this is not TOML: {error}.") from error
-    _known(table, {"title", "part", "figure"}, "the study")
-    found = table.get("part")
-    if not isinstance(found, list) or not found:
+    for key in content:
+        if key not in ("title", "part", "figure"):
+            raise unknown("the study:", key, ("title", "part", "figure"))
+    title = _converted(content.get("title", name), str, "title")
+    figures = _converted(content.get("figure", []), tuple[StudyFigure, ...], "the figures")
+    tables = _converted(content.get("part", []), list[dict[str, Any]], "the parts")
+    parts = {}
+    for number, raw in enumerate(tables, start=1):
+        part = _part(raw, f"part {raw.get('name', number)!r}", folder)
+        if part.name in parts:
+            raise InputError(f"two parts have the name {part.name!r}: give each its own.")
+        parts[part.name] = part
+    if not parts:
         raise InputError("there are no parts: give at least one [[part]] table.")
-    parts = tuple(_part(part, folder) for part in found)
-    names = [part.name for part in parts]
-    if len(set(names)) < len(names):
-        raise InputError(f"parts are named {', '.join(names)}: give each its own name.")
-    return Study(name, table.get("title", name), parts, text, tuple(table.get("figure", ())))
+    for figure in figures:
+        _check_figure(figure, parts)
+    return StudyFile(name, title, tuple(parts.values()), text, figures)
 
 
-def _part(table: Table, folder: Path) -> Part:
-    scene = table.get("scene")
-    if not isinstance(scene, str):
-        raise InputError(f"a part has no scene. Study scenes are {', '.join(SCENES)}.")
-    name = table.get("name", scene)
-    where = f"part {name!r}"
-    _known(table, KEYS, where)
-    design = _choice(table, "design", DESIGNS, where)
-    given = table.get("parameters", {})
-    if not isinstance(given, dict) or not given:
-        raise InputError(f"{where}: no parameters are given. Name some in [part.parameters].")
-    given = _flat(given)
-    heuristic = table.get("heuristic", heuristics.PHONG.name)
-    _check_heuristic(heuristic, scene, where)
-    own = {name: UNLIMITED for name in given if name.startswith(OWN)}
-    known = _parameters(scene, {k: v for k, v in given.items() if k not in own}, where) | own
-    spans = {}
-    for key, parameter in known.items():
-        raw = given.get(key, parameter.default)
-        spans[key] = values(raw, parameter, design == "grid", f"{where}: {key}")
-    part = Part(
-        name=name,
-        scene=str(folder / scene) if Path(scene).suffix in SUFFIXES else scene,
-        spans=spans,
-        design=design,
-        count=_whole(table, "points", 0, where),
-        heuristic=_placed(heuristic, folder),
-        convention=Convention(_choice(table, "pairing", ("matched", "literal"), where)),
-        seed=_whole(table, "seed", 0, where),
-        resolution=_resolution(table, where),
-        spp=_whole(table, "spp", 64, where, least=4),
-    )
-    _check_size(part, where)
-    return part
+def _converted(content: Any, kind: Any, where: str) -> Any:
+    try:
+        return msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {error}.") from error
 
 
-OWN = "heuristic."
-"""Prefix of the names of a heuristic's own parameters."""
-
-
-def _flat(given: Table) -> Table:
-    """Return parameters by full name; TOML reads ``heuristic.gloss`` as a nested table."""
-    own = given.get(OWN[:-1], {})
-    if not isinstance(own, dict):
-        return given
-    others = {name: value for name, value in given.items() if name != OWN[:-1]}
-    return others | {f"{OWN}{name}": value for name, value in own.items()}
-
-
-def _check_heuristic(name: object, scene: str, where: str) -> None:
-    if not isinstance(name, str):
-        raise InputError(
-            f"{where}: heuristic = {name!r}: give a name, FILE.py:FUNCTION or FILE.glsl."
-        )
-    if name != heuristics.PHONG.name and scene in SCENES and SCENES[scene].make is None:
+def _part(raw: dict[str, Any], where: str, folder: Path) -> StudyPart:
+    chosen = {name: value for name, value in raw.items() if name in SETTABLE}
+    rest = {name: value for name, value in raw.items() if name not in SETTABLE}
+    table = _converted(rest, PartTable, where)
+    scene, is_file = table.scene, Path(table.scene).suffix in SUFFIXES
+    try:
+        options = DEFAULTS.changed(**chosen)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    name = options.heuristic
+    if name != DEFAULTS.heuristic and scene in SCENES and SCENES[scene].make is None:
         rendered = [each for each, one in SCENES.items() if one.make is not None]
         raise InputError(
             f"{where}: the scene {scene} is not rendered, and supports Phong's model alone. Study"
             f" {name} on {' or '.join(rendered)}, or on your own scene."
         )
+    if in_file := heuristics.in_file(name):
+        file, function = in_file
+        options = options.changed(heuristic=f"{folder / file}:{function}".rstrip(":"))
+    part = StudyPart(
+        name=atomic.file_name(table.name or Path(scene).stem, "a part"),
+        scene=str(folder / scene) if is_file else scene,
+        levels=_all_levels(table, where),
+        design=table.design,
+        count=table.points,
+        options=options,
+    )
+    _check_size(part, where)
+    return part
 
 
-def _placed(heuristic: str, folder: Path) -> str:
-    file, function = heuristics.in_file(heuristic) or ("", "")
-    return f"{folder / file}:{function}".rstrip(":") if file else heuristic
-
-
-def _parameters(scene: str, given: Table, where: str) -> dict[str, Parameter]:
-    """Return the parameters of a part's scene, the most structural first."""
-    if scene not in SCENES:
-        return dict.fromkeys(given, UNLIMITED)
-    phong, plastic = (set(given) & set(material) for material in (PHONG, ROUGHPLASTIC))
-    if phong and plastic:
-        raise InputError(
-            f"{where}: {', '.join(sorted(phong | plastic))} belong to two materials. Give those of"
-            " one; pairing derives the other."
-        )
-    known = (PHONG if phong else ROUGHPLASTIC) | SCENES[scene].parameters
-    _known(given, {*PHONG, *ROUGHPLASTIC, *SCENES[scene].parameters}, where)
-    return known
-
-
-def _known(table: Table, names: Collection[str], where: str) -> None:
-    for key in table:
-        if key not in names:
-            raise unknown(f"{where}:", key, sorted(names))
-
-
-def _choice(table: Table, key: str, choices: tuple[str, ...], where: str) -> str:
-    chosen = table.get(key, choices[0])
-    if chosen not in choices:
-        raise unknown(f"{where}: {key} =", chosen, choices)
-    return chosen
-
-
-def _whole(table: Table, key: str, default: int, where: str, least: int = 0) -> int:
-    value = table.get(key, default)
-    if not isinstance(value, int) or isinstance(value, bool) or value < least:
-        raise InputError(f"{where}: {key} = {value!r}: give an integer of at least {least}.")
-    return value
-
-
-def _resolution(table: Table, where: str) -> tuple[int, int]:
-    value = table.get("resolution", [64, 64])
-    fits = isinstance(value, list) and len(value) == 2
-    if not fits or not all(isinstance(side, int) and 1 <= side <= 4096 for side in value):
-        raise InputError(
-            f"{where}: resolution = {value!r}: give [width, height], from 1 to 4096 each."
-        )
-    width, height = value
-    return width, height
-
-
-def _check_size(part: Part, where: str) -> None:
-    """Reject a design with no points, too many points, or no range to draw from."""
-    if part.design == "grid":
-        size = int(np.prod([len(span.values()) for span in part.spans.values()], dtype=float))
+def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
+    """Return the values of all parameters of a part, the most structural first."""
+    raw = dict(table.parameters)
+    # TOML reads `heuristic.gloss` as a nested table.
+    if isinstance(own := raw.get(OWN[:-1]), dict):
+        del raw[OWN[:-1]]
+        raw |= {f"{OWN}{name}": value for name, value in own.items()}
+    if not raw:
+        raise InputError(f"{where}: no parameters are given. Name some in [part.parameters].")
+    known = {name: UNLIMITED for name in raw if name.startswith(OWN)}
+    if table.scene in SCENES:
+        phong, plastic = (set(raw) & set(material) for material in (PHONG, ROUGHPLASTIC))
+        if phong and plastic:
+            raise InputError(
+                f"{where}: {', '.join(sorted(phong | plastic))} belong to two materials. Give those"
+                " of one; pairing derives the other."
+            )
+        known = (PHONG if phong else ROUGHPLASTIC) | SCENES[table.scene].parameters | known
+        for name in raw:
+            if name not in known:
+                raise unknown(f"{where}:", name, sorted(known))
     else:
-        size = part.count
+        known = dict.fromkeys(raw, UNLIMITED)
+    return {
+        name: _levels(raw.get(name, one.default), one, table.design == "grid", f"{where}: {name}")
+        for name, one in known.items()
+    }
+
+
+def _levels(raw: object, parameter: StudyParameter, is_grid: bool, where: str) -> Levels:
+    """Read the values of a parameter, and ensure that they are in its range.
+
+    ``raw`` is a number, a list of numbers, or a table with ``from``, ``to``, ``scale`` (``linear``
+    or ``log``) and, for a grid, ``steps``. Those of a range are rounded to six digits: 0.1 is 0.1.
+    """
+    if not isinstance(raw, dict):
+        listed = raw if isinstance(raw, list) else [raw]
+        if not listed:
+            raise InputError(f"{where} = []: give at least one value.")
+        return Levels(tuple(_checked(value, parameter, where) for value in listed))
+    needed = {"from", "to", "steps"} if is_grid else {"from", "to"}
+    if not needed <= set(raw) <= {*needed, "scale"}:
+        raise InputError(
+            f"{where} has {', '.join(raw)}: give a range {', '.join(sorted(needed))} and, if you"
+            " like, scale (linear or log)."
+        )
+    low, high = (_checked(raw[end], parameter, f"{where}, {end}") for end in ("from", "to"))
+    scale, steps = raw.get("scale", "linear"), raw.get("steps", 2)
+    if scale not in ("linear", "log"):
+        raise InputError(f"{where}: scale = {scale!r}: choose linear or log.")
+    if not isinstance(steps, int) or not 2 <= steps <= LARGEST:
+        raise InputError(f"{where}: steps = {steps!r}: give an integer from 2 to {LARGEST}.")
+    is_log = scale == "log"
+    if not low < high or (is_log and low <= 0):
+        least = "above 0 and " if is_log else ""
+        raise InputError(f"{where} runs from {low:g} to {high:g}: begin {least}below the end.")
+    if not is_grid:
+        return Levels((low, high), True, is_log)
+    spaced = (np.geomspace if is_log else np.linspace)(low, high, steps)
+    return Levels(tuple(float(f"{value:.6g}") for value in spaced), True, is_log)
+
+
+def _checked(value: Any, parameter: StudyParameter, where: str) -> float:
+    is_number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+    if not is_number or not parameter.low <= value <= parameter.high:
+        span = f"number from {parameter.low:g} to {parameter.high:g} {parameter.unit}"
+        allowed = span if isfinite(parameter.low) else "finite number"
+        raise InputError(f"{where} = {value!r}: give a {allowed.removesuffix(' 1').strip()}.")
+    return float(value)
+
+
+def _check_size(part: StudyPart, where: str) -> None:
+    """Reject a design with no points, too many points, or no range to draw from."""
+    size = part.count
+    if part.design == "grid":
+        size = int(np.prod([len(each.values) for each in part.levels.values()], dtype=float))
     if not 1 <= size <= LARGEST:
         raise InputError(
             f"{where}: the design {part.design!r} has {size} points: give 1 to {LARGEST}."
@@ -294,14 +328,21 @@ def _check_size(part: Part, where: str) -> None:
             f"{where}: points = {size}: give a Sobol design a power of 2, such as {lower}"
             f" or {2 * lower}."
         )
-    if part.design != "grid" and not any(isinstance(span, Span) for span in part.spans.values()):
+    if part.design != "grid" and not any(each.is_range for each in part.levels.values()):
         raise InputError(f"{where}: no parameter has a range (from, to) to draw from.")
 
 
-def _unit_points(design: str, dimensions: int, count: int, seed: int) -> np.ndarray:
-    """Return points of the unit cube, (count, dimensions)."""
-    if design == "sobol":
-        return qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
-            count.bit_length() - 1
-        )
-    return np.random.default_rng(seed).random((count, dimensions))
+def _check_figure(figure: StudyFigure, parts: dict[str, StudyPart]) -> None:
+    """Ensure that a figure is complete, and that its part and parameters exist."""
+    where = f"figure {figure.name!r}"
+    atomic.file_name(figure.name, "a figure")
+    if figure.part not in parts:
+        raise unknown(f"{where}: part =", figure.part, parts)
+    if figure.kind == "map" and (figure.y is None or len(figure.values) != 1):
+        raise InputError(f"{where}: a map needs y, and one column in values.")
+    if not figure.values:
+        raise InputError(f"{where}: values = []: give at least one column.")
+    levels = parts[figure.part].levels
+    for name in (figure.x, figure.y, figure.series, *figure.where):
+        if name is not None and name not in levels:
+            raise unknown(f"{where}: parameter", name, levels)

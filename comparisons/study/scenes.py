@@ -29,7 +29,7 @@ ROOM, CEILING = 4.0, 3.9
 
 
 @dataclass(frozen=True)
-class Parameter:
+class StudyParameter:
     """A parameter: its unit, inclusive range, default, and meaning."""
 
     unit: str
@@ -40,21 +40,23 @@ class Parameter:
 
 
 ROUGHPLASTIC = {
-    "alpha": Parameter("1", 0.02, 1, 0.3, "roughness of roughplastic: root mean square slope"),
-    "int_ior": Parameter("1", 1.05, 4, 1.5, "index of refraction of roughplastic"),
-    "reflectance": Parameter("1", 0, 1, 0.5, "diffuse reflectance of roughplastic"),
+    "alpha": StudyParameter("1", 0.02, 1, 0.3, "roughness of roughplastic: root mean square slope"),
+    "int_ior": StudyParameter("1", 1.05, 4, 1.5, "index of refraction of roughplastic"),
+    "reflectance": StudyParameter("1", 0, 1, 0.5, "diffuse reflectance of roughplastic"),
 }
 PHONG = {
-    "n": Parameter("1", 0, 1e4, 9, "Phong's exponent"),
-    "k_d": Parameter("1", 0, 1, 0.5, "diffuse coefficient of Phong's model"),
-    "k_s": Parameter("1", 0, 1e4, 0.5, "specular coefficient of Phong's model"),
+    "n": StudyParameter("1", 0, 1e4, 9, "Phong's exponent"),
+    "k_d": StudyParameter("1", 0, 1, 0.5, "diffuse coefficient of Phong's model"),
+    "k_s": StudyParameter("1", 0, 1e4, 0.5, "specular coefficient of Phong's model"),
 }
-LIGHT_ANGLE = Parameter("deg", 0, 89, 45, "angle between the light and the normal")
-VIEW_ANGLE = Parameter("deg", 0, 89, 45, "angle between the viewer and the normal")
-AZIMUTH = Parameter("deg", 0, 180, 0, "azimuth of the viewer; 0 is the side of the mirror image")
-PHASE_ANGLE = Parameter("deg", 0, 90, 45, "angle between the light and the viewer at the centre")
-LIGHT_SIZE = Parameter("deg", 0.1, 120, 2, "angular diameter of the lamp, from the centre")
-WALL_ALBEDO = Parameter("1", 0, 0.95, 0.5, "reflectance of the walls")
+LIGHT_ANGLE = StudyParameter("deg", 0, 89, 45, "angle of the light to the normal")
+VIEW_ANGLE = StudyParameter("deg", 0, 89, 45, "angle between the viewer and the normal")
+AZIMUTH = StudyParameter("deg", 0, 180, 0, "azimuth of the viewer; 0 is the mirror image's")
+PHASE_ANGLE = StudyParameter(
+    "deg", 0, 90, 45, "angle between the light and the viewer at the centre"
+)
+LIGHT_SIZE = StudyParameter("deg", 0.1, 120, 2, "angular diameter of the lamp, from the centre")
+WALL_ALBEDO = StudyParameter("1", 0, 0.95, 0.5, "reflectance of the walls")
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class StudyScene:
     """
 
     title: str
-    parameters: dict[str, Parameter]
+    parameters: dict[str, StudyParameter]
     make: Callable[[Point, Dict], Dict] | None = None
     together: tuple[str, ...] = ()
 
@@ -169,5 +171,5 @@ SCENES = {
 }
 """The study scenes by name. Other scenes are studied through paths to their parameters."""
 
-UNLIMITED = Parameter("", -inf, inf, 0, "a parameter of the scene, by its path")
+UNLIMITED = StudyParameter("", -inf, inf, 0, "a parameter of the scene, by its path")
 """Any parameter of a user's scene."""

@@ -5,6 +5,7 @@ surface lies in the plane z = 0, and the light in the plane y = 0 at negative x,
 is at azimuth 0. Directions point away from the surface.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import heuristic
+from comparisons.study.dataset import Row, largest_miss, measure, measure_each
 from comparisons.study.scenes import Point
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
@@ -27,18 +29,22 @@ HEIGHTS, AZIMUTHS = 240, 120
 
 VIEW_HEIGHTS, VIEW_AZIMUTHS = 96, 64
 
+PEAK_STEP = 0.05
+"""Degrees between the directions searched for a lobe's peak."""
+
 
 @dataclass(frozen=True)
-class Material:
+class StudyMaterial:
     """A material in both models, with the misses of the pairing."""
 
     phong: Phong
     plastic: RoughPlastic
     misses: tuple[Miss, ...]
 
-    def values(self) -> dict[str, float]:
-        """Return a study's parameters of both models."""
+    def columns(self) -> Row:
+        """Return the columns of a material: its parameters in both models, and its miss."""
         return {
+            "miss": largest_miss(self.misses),
             "alpha": self.plastic.alpha,
             "int_ior": self.plastic.int_ior,
             "reflectance": self.plastic.diffuse_reflectance[0],
@@ -48,18 +54,7 @@ class Material:
         }
 
 
-@dataclass(frozen=True)
-class Radiance:
-    """The radiance of the surface, (N,) each: in all, and of the specular part alone.
-
-    Display-linear: a white diffuse surface that faces the light has the value 1.
-    """
-
-    total: np.ndarray
-    specular: np.ndarray
-
-
-def material(point: Point, convention: Convention) -> Material:
+def material(point: Point, convention: Convention) -> StudyMaterial:
     """Return the material of a point, which has the parameters of one of the models."""
     if "n" in point:
         k_d, k_s = ((point[name],) * 3 for name in ("k_d", "k_s"))
@@ -69,18 +64,17 @@ def material(point: Point, convention: Convention) -> Material:
 
 
 @lru_cache(maxsize=256)
-def _of_phong(phong: Phong, convention: Convention) -> Material:
+def _of_phong(phong: Phong, convention: Convention) -> StudyMaterial:
     if not any(phong.k_s):
         # Pairing makes it plain diffuse, not roughplastic.
-        return Material(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
+        return StudyMaterial(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
     plastic, misses = factors.to_roughplastic(phong, convention)
-    return Material(phong, plastic, tuple(misses))
+    return StudyMaterial(phong, plastic, misses)
 
 
 @lru_cache(maxsize=256)
-def _of_plastic(plastic: RoughPlastic, convention: Convention) -> Material:
-    phong, misses = factors.to_phong(plastic, convention)
-    return Material(phong, plastic, tuple(misses))
+def _of_plastic(plastic: RoughPlastic, convention: Convention) -> StudyMaterial:
+    return StudyMaterial(factors.to_phong(plastic, convention), plastic, ())
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
@@ -90,10 +84,13 @@ def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
 
 
-def heuristic_radiance(phong: Phong, light: np.ndarray, view: np.ndarray) -> Radiance:
-    """Return the kernel's radiance, for directions (3, N) of light and viewer.
+def heuristic_radiance(
+    phong: Phong, light: np.ndarray, view: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the kernel's radiance (N,), in all and of the specular part alone.
 
-    All numbers are opaque, so one kernel serves all materials and directions.
+    Directions (3, N) are of light and viewer. Display-linear: a white diffuse surface that faces
+    the light has the value 1. All numbers are opaque, so one kernel serves all materials.
     """
     number = dr.leaf_t(mi.Float)
     k_d, k_s, n = (dr.opaque(number, v) for v in (phong.k_d[0], phong.k_s[0], phong.n))
@@ -111,11 +108,14 @@ def heuristic_radiance(phong: Phong, light: np.ndarray, view: np.ndarray) -> Rad
         )
         for coefficients in ((k_d, k_s), (0, k_s))
     ]
-    return Radiance(*(np.array(part, float) for part in parts))
+    total, specular = (np.array(part, float) for part in parts)
+    return total, specular
 
 
-def reference_radiance(plastic: RoughPlastic, light: np.ndarray, view: np.ndarray) -> Radiance:
-    """Return the radiance of Mitsuba's BSDF, for directions (3, N) of light and viewer."""
+def reference_radiance(
+    plastic: RoughPlastic, light: np.ndarray, view: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radiance of Mitsuba's BSDF, as :func:`heuristic_radiance` does."""
     bsdf = _bsdf(plastic)
     si = dr.zeros(mi.SurfaceInteraction3f, light.shape[1])
     si.wi = mi.Vector3f(view)
@@ -128,7 +128,7 @@ def reference_radiance(plastic: RoughPlastic, light: np.ndarray, view: np.ndarra
         IRRADIANCE_PER_INTENSITY * np.atleast_2d(np.array(value, float))[0]
         for value in (total, diffuse)
     )
-    return Radiance(total, total - diffuse)
+    return total, total - diffuse
 
 
 @lru_cache(maxsize=8)
@@ -147,27 +147,20 @@ def _bsdf(plastic: RoughPlastic) -> Any:
     )
 
 
-@dataclass(frozen=True)
-class Hemisphere:
-    """Directions of the viewer over half the hemisphere, with weights for means and albedos.
-
-    ``weight`` is proportional to the projected solid angle, and sums to 1.
-    """
-
-    view: np.ndarray
-    weight: np.ndarray
-
-
 @lru_cache(maxsize=1)
-def hemisphere() -> Hemisphere:
-    """Return the Gauss-Legendre nodes in polar angle and azimuth."""
+def hemisphere() -> tuple[np.ndarray, np.ndarray]:
+    """Return directions (3, N) over half the hemisphere, with weights (N,) for means and albedos.
+
+    These are the Gauss-Legendre nodes in polar angle and azimuth; weights are proportional to the
+    projected solid angle, and sum to 1.
+    """
     x, w = np.polynomial.legendre.leggauss(HEIGHTS)
     w = w / 2
     y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
     v = v / 2
     theta, phi = np.meshgrid((x + 1) * 45, (y + 1) * 90)
     weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
-    return Hemisphere(direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum())
+    return direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum()
 
 
 @lru_cache(maxsize=1)
@@ -188,4 +181,56 @@ def albedo(radiance: np.ndarray, light_angle: float) -> float:
     ``pi mean(L) / (pi cos(theta))``, the mean over projected solid angle: exitance over
     irradiance.
     """
-    return float(hemisphere().weight @ radiance / np.cos(np.deg2rad(light_angle)))
+    return float(hemisphere()[1] @ radiance / np.cos(np.deg2rad(light_angle)))
+
+
+# --- Rows -----------------------------------------------------------------------------------------
+
+
+def patch(points: Sequence[Point], convention: Convention) -> list[Row]:
+    """Return the columns of views of a surface of one material, one direction per point."""
+    made = material(points[0], convention)
+    light_angle, view_angle, azimuth = (
+        np.array([point[name] for point in points])
+        for name in ("light_angle", "view_angle", "azimuth")
+    )
+    light, view = direction(light_angle, 180.0), direction(view_angle, azimuth)
+    heuristic = heuristic_radiance(made.phong, light, view)
+    reference = reference_radiance(made.plastic, light, view)
+    columns = measure_each(heuristic[0], reference[0])
+    columns |= {"specular_heuristic": heuristic[1], "specular_reference": reference[1]}
+    columns = {name: np.broadcast_to(values, len(points)) for name, values in columns.items()}
+    return [
+        {name: float(values[number]) for name, values in columns.items()} | made.columns()
+        for number in range(len(points))
+    ]
+
+
+def lobe(point: Point, convention: Convention) -> Row:
+    """Return the departure over all views, the albedos, and the peak of the specular part.
+
+    Statistics are over views of equal projected solid angle.
+    """
+    made, angle = material(point, convention), point["light_angle"]
+    plane, mirror = direction(np.arange(0, 90, PEAK_STEP), 0.0), direction(angle, 0.0)
+    parts = (views(), hemisphere()[0], plane, mirror)
+    view = np.concatenate(parts, axis=1)
+    light = np.broadcast_to(direction(angle, 180.0), view.shape)
+    splits = np.cumsum([part.shape[1] for part in parts])[:-1]
+    result: Row = made.columns()
+    images = []
+    for half, (total, lobe_alone) in (
+        ("heuristic", heuristic_radiance(made.phong, light, view)),
+        ("reference", reference_radiance(made.plastic, light, view)),
+    ):
+        seen, everywhere, _, _ = np.split(total, splits)
+        _, specular, in_plane, mirrored = np.split(lobe_alone, splits)
+        images.append(np.repeat(seen[None, :, None], 3, axis=2))
+        result[f"albedo_{half}"] = albedo(everywhere, angle)
+        result[f"specular_albedo_{half}"] = albedo(specular, angle)
+        result[f"specular_{half}"] = float(mirrored[0])
+        highest = in_plane > in_plane.max() * (1 - 1e-6)
+        if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
+            result[f"peak_{half}"] = float(np.argmax(in_plane)) * PEAK_STEP
+    test, truth = images
+    return result | measure(test, truth, np.ones(test.shape[:2], bool))

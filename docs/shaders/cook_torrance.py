@@ -1,6 +1,6 @@
 """Microfacets as engines write them: GGX, Smith's masking after Schlick, Schlick's Fresnel."""
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

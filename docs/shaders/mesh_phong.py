@@ -5,7 +5,7 @@ lobe reflects. F is Schlick's, with Karis' power of two for (1 - V.H)^5 ("Real s
 Engine 4", 2013).
 """
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

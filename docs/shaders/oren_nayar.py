@@ -1,6 +1,6 @@
 """Rough diffuse surfaces after Oren and Nayar (SIGGRAPH 1994), the qualitative model."""
 
-from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
+from fotismos import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

@@ -1,6 +1,6 @@
 """The chapters' model (8.10): what the built-in heuristic `phong` computes."""
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

@@ -6,7 +6,7 @@ document (google.github.io/filament). What differs is the base's share of the li
 
 from types import SimpleNamespace
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

@@ -1,6 +1,6 @@
 """A toon ramp: the cosine in steps, and a dark outline."""
 
-from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
+from fotismos import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

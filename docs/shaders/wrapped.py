@@ -1,6 +1,6 @@
 """Wrapped diffuse: light reaches beyond the horizon, as if it were scattered below the surface."""
 
-from heuristic import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
+from fotismos import Range  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 

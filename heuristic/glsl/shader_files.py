@@ -1,6 +1,8 @@
 """Heuristics in GLSL files, which a command names as ``FILE.glsl``."""
 
-from dataclasses import replace
+import os
+import threading
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -9,11 +11,72 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import trial
-from heuristic.errors import InputError
-from heuristic.glsl import gpu, shader_text
+from heuristic import program, user_shaders
+from heuristic.errors import InputError, InstallationError
+from heuristic.glsl import shader_text
 from heuristic.heuristics import Heuristic, Parameter
 from heuristic.points import INPUTS, LightAtPoint, Point
+
+VERSION = 430
+"""OpenGL 4.3, the first with compute shaders."""
+
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+"""Parts of the names of OpenGL renderers that do not use a graphics card."""
+
+_kept = threading.local()
+
+
+@dataclass(frozen=True, eq=False)
+class Device:
+    """An OpenGL context of moderngl, the renderer's name, and buffers kept for reuse."""
+
+    context: Any
+    renderer: str
+    kept: dict[int, Any] = field(default_factory=dict)
+
+    def buffer(self, number: int, size: int) -> Any:
+        """Return a binding's buffer of at least ``size`` bytes; making a new one is slow."""
+        found = self.kept.get(number)
+        if found is None or found.size < size:
+            if found is not None:
+                found.release()
+            found = self.kept[number] = self.context.buffer(reserve=size)
+        return found
+
+    @property
+    def is_software(self) -> bool:
+        """Whether the processor does the work of a graphics card."""
+        return any(name in self.renderer.lower() for name in SOFTWARE)
+
+
+def opengl() -> Device:
+    """Return this thread's device, made at the first call."""
+    pid, found = getattr(_kept, "device", (None, None))
+    if found is None or pid != os.getpid():  # a context does not outlive a fork
+        found = _created()
+        _kept.device = os.getpid(), found
+    return found
+
+
+def _created() -> Device:
+    try:
+        import moderngl
+    except ImportError as error:
+        raise InstallationError(
+            "moderngl is not installed, and heuristics in GLSL need it. Install it:"
+            f" {program.installation('moderngl')}"
+        ) from error
+    try:
+        options: Any = {"backend": "egl"}  # moderngl annotates all options as one
+        context = moderngl.create_context(standalone=True, require=VERSION, **options)
+    except Exception as error:  # its type depends on which library is missing
+        raise InstallationError(
+            f"EGL finds no OpenGL {VERSION / 100:.1f}, and heuristics in GLSL need it:"
+            f" {str(error).strip().rstrip('.')}. Install a driver; Mesa's works without a"
+            " graphics card (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)."
+        ) from error
+    return Device(context, context.info["GL_RENDERER"])
+
 
 SIGNATURE = "vec3 shade(Point point)"
 
@@ -29,26 +92,19 @@ FLOATS = 1 << 24
 POINTS = 1 << 20
 """Points shaded at once, at most; OpenGL allows 65,535 work groups."""
 
-_opened: dict[tuple[str, Path], Heuristic] = {}
+_known: dict[tuple[str, Path], Heuristic] = {}
 
 
-def opened(word: str) -> Heuristic:
-    """Return the heuristic in a GLSL file, after a trial; a file that changed is read again.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or function, it does not compile, or it fails the trial.
-    InstallationError
-        If there is no OpenGL to run it.
-    """
+def from_file(word: str) -> Heuristic:
+    """Return the heuristic in a GLSL file, after a trial; a file that changed is read again."""
     path = Path(word)
     content = _content(path)
     code = sha256(content).hexdigest()
     key = word, path.resolve()
-    if key not in _opened or _opened[key].code != code:
-        _opened[key] = replace(tried(word, _text(word, content)), code=code)
-    return _opened[key]
+    if key not in _known or _known[key].code != code:
+        files = (path.resolve(),)
+        _known[key] = replace(of_text(word, _text(word, content)), files=files, code=code)
+    return _known[key]
 
 
 class Shader:
@@ -63,7 +119,7 @@ class Shader:
         self.words = shader_text.words(text)
         self.line = shader_text.line_of_shade(text)
         self.__qualname__ = f"{file}, line {self.line}"  # its name in messages
-        self._programs: dict[int, tuple[gpu.Device, Any]] = {}
+        self._programs: dict[int, tuple[Device, Any]] = {}
 
     def __call__(self, point: Point) -> Any:
         """Return the colours (3, points) as a Dr.Jit colour; raise InputError if it cannot run."""
@@ -78,17 +134,20 @@ class Shader:
                 " have. Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb."
             )
         lights = point.lights if "lights" in self.words else ()
-        floats = self._floats(point, lights)
-        count = dr.width(point.given.position)
+        fields = shader_text.values(self.text, max(len(lights), 1))
+        values = {name: _value(point, lights, name) for name in fields}
+        dr.eval(list(values.values()))
+        rows = [row for name, size in fields.items() for row in _rows(values[name], size)]
+        count = dr.width(point.arguments.position)
         program, device = self._program(max(len(lights), 1))
         for name, value in vars(point.parameters).items():
             if name in program:  # compilers drop unused names
                 program[name] = float(np.ravel(value)[0])
         colours = np.empty((count, 3), np.float32)
-        step = max(min(POINTS, FLOATS // len(floats)), 1)
+        step = max(min(POINTS, FLOATS // max(len(rows), 1)), 1)
         for start in range(0, count, step):
             part = slice(start, min(start + step, count))
-            chunk = [each if len(each) == 1 else each[part] for each in floats]
+            chunk = [np.broadcast_to(row, count)[part] for row in rows]
             colours[part] = _run(device, program, chunk, part.stop - start)
         return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
 
@@ -96,8 +155,8 @@ class Shader:
         """Compile it for a number of lights; raise InputError with the faulty lines."""
         self._program(lights)
 
-    def _program(self, lights: int) -> tuple[Any, gpu.Device]:
-        device = gpu.device()
+    def _program(self, lights: int) -> tuple[Any, Device]:
+        device = opengl()
         known, made = self._programs.get(lights, (None, None))
         if known is device:
             return made, device
@@ -116,30 +175,18 @@ class Shader:
         self._programs[lights] = device, made
         return made, device
 
-    def _floats(self, point: Point, lights: tuple[LightAtPoint, ...]) -> list[np.ndarray]:
-        """Return the arrays of a point, float by float; length 1 where all points agree."""
-        fields = shader_text.values(max(len(lights), 1))
-        found = [self._value(point, lights, each) for each in fields]
-        dr.eval([each for each in found if each is not None])
-        columns = [_columns(one, each.size) for one, each in zip(found, fields, strict=True)]
-        return [column for several in columns for column in several]
 
-    def _value(
-        self, point: Point, lights: tuple[LightAtPoint, ...], value: shader_text.Value
-    ) -> Any:
-        """Return a field of the record as a Dr.Jit value; None if the shader does not read it."""
-        owner, _, field = value.name.rpartition(".")
-        if field not in self.words:
-            return None
-        if not owner:
-            return getattr(point, field)
-        if owner == "material":
-            return getattr(point.material, field)
-        number = int(owner[len("lights[") : -1])
-        if number >= len(lights):
-            return None  # a scene without lights gets a dark one
-        found = getattr(lights[number], field)
-        return dr.select(found(), mi.Float(1), 0) if field == "visible" else found
+def _value(point: Point, lights: tuple[LightAtPoint, ...], name: str) -> Any:
+    """Return a field of the record as a Dr.Jit value; a scene without lights gets a dark one."""
+    owner, _, field = name.rpartition(".")
+    if not owner:
+        return getattr(point, field)
+    if owner == "material":
+        return getattr(point.material, field)
+    if not lights:
+        return mi.Float(0)
+    found = getattr(lights[int(owner[len("lights[") : -1])], field)
+    return dr.select(found(), mi.Float(1), 0) if field == "visible" else found
 
 
 def _content(path: Path) -> bytes:
@@ -153,7 +200,7 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def tried(word: str, text: str) -> Heuristic:
+def of_text(word: str, text: str) -> Heuristic:
     """Return the heuristic of a text, after a trial; raises the errors of :func:`opened`."""
     if shader_text.line_of_shade(text) is None:
         raise InputError(
@@ -164,7 +211,7 @@ def tried(word: str, text: str) -> Heuristic:
         raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
     shader = Shader(word, text)
     shader.compile()
-    label, remarks = _told(word)
+    label, remarks = _label(word)
     found = Heuristic(
         word,
         shader,
@@ -174,8 +221,8 @@ def tried(word: str, text: str) -> Heuristic:
         traced=False,
         remarks=remarks,
     )
-    with mi.scoped_set_variant(trial.DEFAULT_VARIANT):
-        return replace(found, reads=trial.examine(found))
+    with mi.scoped_set_variant(user_shaders.DEFAULT_VARIANT):
+        return replace(found, reads=user_shaders.examine(found))
 
 
 def _text(word: str, content: bytes) -> str:
@@ -185,42 +232,35 @@ def _text(word: str, content: bytes) -> str:
         raise InputError(f"{word} is not text in UTF-8: {error}.") from error
 
 
-def _told(word: str) -> tuple[str, tuple[str, ...]]:
+def _label(word: str) -> tuple[str, tuple[str, ...]]:
     """Return the label, and the remarks of records; both mention a software GPU."""
-    device, label = gpu.device(), Path(word).stem
+    device, label = opengl(), Path(word).stem
     if not device.is_software:
         return label, ()
     remark = f"{word} ran on {device.renderer}, a software GPU: its times are not those of a"
     return f"{label}, software GPU", (f"{remark} graphics card.",)
 
 
-def _columns(value: Any, size: int) -> list[np.ndarray]:
-    """Return a value as arrays of floats, one per component; zeros for None."""
-    if value is None:
-        return [np.zeros(1, np.float32)] * size
+def _rows(value: Any, size: int) -> list[np.ndarray]:
+    """Return a value as arrays of floats, one per component."""
     value = dr.detach(value)
     is_vector = dr.is_array_v(value) and dr.depth_v(value) == 2
     parts = list(value) if is_vector else [value] * size
     return [np.array(part, np.float32).reshape(-1) for part in parts]
 
 
-def _run(device: gpu.Device, program: Any, floats: list[np.ndarray], count: int) -> np.ndarray:
+def _run(device: Device, program: Any, rows: list[np.ndarray], count: int) -> np.ndarray:
     """Return the colours (points, 3) of a chunk of points."""
-    context = device.context
-    lengths = np.array([len(each) for each in floats])
-    offsets = np.concatenate([[0], np.cumsum(lengths)[:-1]])
-    places = np.stack([offsets, lengths > 1], axis=1).astype(np.int32)
-    sizes = 4 * int(lengths.sum()), places.nbytes, 12 * count
-    values, at, colours = (device.buffer(number, size) for number, size in enumerate(sizes))
-    for column, offset in zip(floats, offsets, strict=True):  # saves one copy
-        values.write(column, offset=4 * int(offset))
-    at.write(places)
-    for number, buffer in enumerate((values, at, colours)):
+    values = device.buffer(0, max(4 * count * len(rows), 4))
+    colours = device.buffer(1, 12 * count)
+    for number, row in enumerate(rows):  # saves one copy
+        values.write(np.ascontiguousarray(row), offset=4 * count * number)
+    for number, buffer in enumerate((values, colours)):
         buffer.bind_to_storage_buffer(number)
     program["fotismos_count"] = count
     program.run(group_x=-(-count // shader_text.GROUP))
-    context.memory_barrier()
-    found = np.frombuffer(colours.read(sizes[-1]), np.float32).reshape(count, 3)
-    if (said := context.error) != "GL_NO_ERROR":
+    device.context.memory_barrier()
+    found = np.frombuffer(colours.read(12 * count), np.float32).reshape(count, 3)
+    if (said := device.context.error) != "GL_NO_ERROR":
         raise InputError(f"the shader failed on the graphics card: {said}. Does it end?")
     return found

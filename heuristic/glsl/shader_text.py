@@ -1,7 +1,6 @@
 """The text of a compute shader around a user's function, and the compiler's messages about it."""
 
 import re
-from dataclasses import dataclass
 
 GROUP = 64
 """Points that one work group shades."""
@@ -36,14 +35,6 @@ _REFUSED = {
 }
 
 
-@dataclass(frozen=True)
-class Value:
-    """A field of the record that a shader reads, such as ``lights[0].toward``, and its floats."""
-
-    name: str
-    size: int
-
-
 def bare(text: str) -> str:
     """Return GLSL without its comments, with the same lines."""
     return _COMMENT.sub(lambda found: "\n" * found[0].count("\n") or " ", text)
@@ -61,27 +52,32 @@ def words(text: str) -> frozenset[str]:
     return frozenset(re.findall(r"\b[A-Za-z_]\w*", bare(text)))
 
 
-def values(lights: int) -> tuple[Value, ...]:
-    """Return the fields of a point under some lights, in the order of the buffer."""
+def values(text: str, lights: int) -> dict[str, int]:
+    """Return the fields that a shader may read of a point, in the order of the buffer.
+
+    They are such as ``lights[0].toward``, each with the number of its floats.
+    """
+    known = words(text)
     owners = [("", POINT), ("material.", MATERIAL)]
     owners += [(f"lights[{number}].", LIGHT) for number in range(lights)]
-    return tuple(
-        Value(owner + name, size) for owner, fields in owners for name, size in fields.items()
-    )
+    return {
+        owner + name: size
+        for owner, fields in owners
+        for name, size in fields.items()
+        if name in known
+    }
 
 
 def program(text: str, lights: int) -> str:
     """Return the compute shader that calls a user's ``shade`` for all points.
 
-    Each float has a place ``(offset, stride)`` in one buffer: the stride is 0 if all points have
-    the same value, else 1.
+    One buffer holds the floats, each for all points before the next.
     """
     whole = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
     return f"""#version 430
 layout(local_size_x = {GROUP}) in;
 layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values[]; }};
-layout(std430, binding = 1) readonly buffer fotismos_At {{ ivec2 fotismos_places[]; }};
-layout(std430, binding = 2) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
+layout(std430, binding = 1) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
 uniform int fotismos_count;
 {_structure("Material", MATERIAL)}
 {_structure("Light", LIGHT).replace("float visible", "bool visible")}
@@ -91,14 +87,13 @@ uniform int fotismos_count;
 
 #line {_OURS}
 float fotismos_read(int number, int point) {{
-    ivec2 place = fotismos_places[number];
-    return fotismos_values[place.x + place.y * point];
+    return fotismos_values[number * fotismos_count + point];
 }}
 void main() {{
     int index = int(gl_GlobalInvocationID.x);
     if (index >= fotismos_count) return;
     Point point;
-{_readings(lights)}
+{_readings(text, lights)}
     vec3 colour = shade(point);
     for (int part = 0; part < 3; ++part) fotismos_colours[3 * index + part] = colour[part];
 }}
@@ -156,13 +151,13 @@ def _structure(name: str, fields: dict[str, int], more: str = "") -> str:
     return f"struct {name} {{ {declared} {more} }};"
 
 
-def _readings(lights: int) -> str:
+def _readings(text: str, lights: int) -> str:
     """Return the statements that fill a point."""
     lines, number = [], 0
-    for value in values(lights):
-        parts = [f"fotismos_read({number + part}, index)" for part in range(value.size)]
-        whole = f"{_TYPES[value.size]}({', '.join(parts)})"
-        is_mask = value.name.endswith(".visible")
-        lines.append(f"    point.{value.name} = {whole}{' > 0.5' if is_mask else ''};")
-        number += value.size
+    for name, size in values(text, lights).items():
+        parts = [f"fotismos_read({number + part}, index)" for part in range(size)]
+        whole = f"{_TYPES[size]}({', '.join(parts)})"
+        is_mask = name.endswith(".visible")
+        lines.append(f"    point.{name} = {whole}{' > 0.5' if is_mask else ''};")
+        number += size
     return "\n".join(lines)

@@ -45,9 +45,8 @@ import mitsuba as mi
 
 from heuristic import numerics, terms, vectors
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.light import Light
-from heuristic.lights import UNATTENUATED, DirectionalLight, PointLight, SpotLight
-from heuristic.plugins.spectra import coefficient, emitted
+from heuristic.lights import UNATTENUATED, DirectionalLight, Light, PointLight, SpotLight
+from heuristic.plugins.textures import coefficient, emitted
 
 FAR = 1e8
 """Where shadow rays of parallel light end: outside any scene. A Python plugin does not learn the

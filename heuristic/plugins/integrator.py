@@ -8,7 +8,7 @@ Parameter           Type (default)      Meaning
 ``ambient``         spectrum (0)        ``I_a`` of 8.2
 ``interpolation``   string (phong)      ``phong`` shades every point, with the normal that Mitsuba
                                         interpolates; ``gouraud`` the vertices and ``flat`` the
-                                        faces of meshes (:mod:`heuristic.plugins.interpolated`)
+                                        faces of meshes
 ``occlusion``       boolean (false)     hide lights behind surfaces by shadow rays, which the
                                         chapters' model does not
 ``prune``           boolean (true)      trace only the terms that some material of the scene has
@@ -27,20 +27,27 @@ equal rays. Python::
 """
 
 from dataclasses import dataclass
-from functools import cache
 from operator import is_
 from time import perf_counter
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic import heuristics
+from heuristic.convention import Position
 from heuristic.errors import InputError
-from heuristic.interpolation import Interpolation
+from heuristic.interpolation import (
+    Interpolation,
+    MeshCorners,
+    shade_mesh,
+    shading_points,
+    stored_shade,
+)
 from heuristic.plugins.emitters import FAR
-from heuristic.plugins.scene_materials import SceneMaterials
-from heuristic.plugins.spectra import emitted, may_be_nonzero
-from heuristic.points import Given
+from heuristic.plugins.phong import SceneMaterials
+from heuristic.plugins.textures import emitted, may_be_nonzero
+from heuristic.points import ShadingArguments
 
 LAYERS = 64
 """Surfaces that a camera ray passes at most: a bound for stacks of empty ones."""
@@ -138,7 +145,7 @@ def define() -> None:
             """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
             prepared = self.known(scene).prepared
             return lambda *given: self.model.evaluate(
-                Given(*given), si.uv, self.parameters, prepared, si.wavelengths
+                ShadingArguments(*given), si.uv, self.parameters, prepared, si.wavelengths
             )
 
         def known(self, scene):
@@ -196,15 +203,11 @@ def define() -> None:
         def to_string(self):
             return f"HeuristicIntegrator[model = {self.model.name}, ambient = {self.ambient}]"
 
-    @cache
-    def interpolating_class():
-        from heuristic.plugins.interpolated import interpolating
-
-        return interpolating(HeuristicIntegrator)
+    interpolating = _interpolating(HeuristicIntegrator)
 
     def make(props):
         is_phong = props.get("interpolation", "phong") == "phong"
-        return (HeuristicIntegrator if is_phong else interpolating_class())(props)
+        return (HeuristicIntegrator if is_phong else interpolating)(props)
 
     mi.register_integrator("heuristic", make)
 
@@ -262,3 +265,93 @@ def _lights(scene):
                 " makes."
             )
     return lights
+
+
+def _interpolating(base: type) -> type:
+    """Return the class for the current variant with ``flat`` or ``gouraud`` (6.35, 6.36).
+
+    In RGB variants the heuristic runs once per vertex or face before the rendering, for the sensor
+    that renders, and Mitsuba interpolates the stored values. Spectral variants draw other
+    wavelengths for each ray; there it runs at the corners of the face that a ray hits.
+    """
+
+    class InterpolatingIntegrator(base):
+        """See the module's docstring."""
+
+        def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+            if not mi.is_spectral:
+                self._store(scene, scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
+            return super().render(scene, sensor, seed, spp, develop, evaluate)
+
+        def surface_colour(self, scene, si, view, active):
+            if mi.is_spectral:
+                return self._at_corners(scene, si, view, active)
+            twosided = any(shape.bsdf().twosided for shape in scene.shapes())
+            values = stored_shade(si, self.interpolation, twosided=twosided, active=active)
+            return mi.Color3f(values) if mi.is_rgb else mi.Spectrum(values[0])
+
+        def _store(self, scene, sensor):
+            viewer = viewpoint(sensor)
+            for mesh in _meshes(scene):
+                at = shading_points(mesh, self.interpolation)
+                shade_mesh(
+                    mesh,
+                    self.interpolation,
+                    viewer,
+                    mesh.bsdf().material(
+                        at, True, self.prune, self.model.form, not self.model.is_own
+                    ),
+                    self.lights(scene, at, True),
+                    self.ambient_at(at, True),
+                    self.visibility(scene, at, True),
+                    # Stored for all, because reading cannot distinguish the shapes.
+                    twosided=any(shape.bsdf().twosided for shape in scene.shapes()),
+                    model=self.model_at(scene, at),
+                )
+
+        def _at_corners(self, scene, si, view, active):
+            _meshes(scene)
+            corners = MeshCorners(scene).at(si, active)
+            viewer = si.p + view * si.t
+            front = dr.dot(si.n, view) > 0
+            if self.interpolation is Interpolation.FLAT:
+                corners = [(mi.Float(1), _centroid(si, corners))]
+            colour = mi.Spectrum(0)
+            for weight, corner in corners:
+                normal = dr.select(front, mi.Vector3f(corner.sh_frame.n), -corner.sh_frame.n)
+                value = self.shaded(scene, corner, viewer - corner.p, normal, active)
+                colour += weight * value
+            twosided = self.twosided(scene, si, active)
+            return dr.select(active & (twosided | front), colour, 0)
+
+    return InterpolatingIntegrator
+
+
+def _meshes(scene):
+    """Return the scene's shapes; reject those that are not meshes."""
+    for shape in scene.shapes():
+        if not shape.is_mesh():
+            raise InputError(
+                f"shape {shape.id()!r} is a {shape.class_name()}: flat and Gouraud shading need"
+                " triangle meshes. Make one with heuristic.meshes.to_mesh; fotismos does so itself."
+            )
+    return scene.shapes()
+
+
+def viewpoint(sensor: Any) -> Position:
+    """Return the viewer's position; reject cameras without one."""
+    if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
+        raise InputError(
+            f"sensor {sensor.id()!r} ({sensor.class_name()}) has no single viewpoint, which flat"
+            " and Gouraud shading need: use perspective or thinlens, or phong interpolation."
+        )
+    return sensor.world_transform().translation()
+
+
+def _centroid(si, corners):
+    """Return the interaction at the centroid of the face, with the face's own normal."""
+    point = mi.SurfaceInteraction3f(si)
+    point.p = sum(corner.p for _, corner in corners) / 3
+    point.uv = sum(corner.uv for _, corner in corners) / 3
+    point.sh_frame.n = point.n = si.n
+    return point

@@ -1,15 +1,12 @@
 """Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing."""
 
-from dataclasses import asdict, dataclass
-from functools import lru_cache
-from typing import Any
+from dataclasses import asdict
 
 import mitsuba as mi
 
-from reference.pairing import albedo, factors
-from reference.pairing.factors import Convention, Phong
-from reference.pairing.nearest import WRAPPERS, nearest_of, simple
-from reference.pairing.nearest.material import Nearest
+from reference.pairing import factors
+from reference.pairing.factors import Convention, Phong, Replacements
+from reference.pairing.nearest import WRAPPERS, Context
 from reference.scene import values
 from reference.scene.graph import Graph, properties
 
@@ -27,22 +24,6 @@ PLASTICS = (1.3, 1.8)
 """Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
 
 
-@dataclass(frozen=True)
-class PairedBSDF:
-    """The replacement of a BSDF, the quantities that it misses, and what it has no form for.
-
-    ``note`` describes anything odd about the replacement.
-    """
-
-    name: str
-    given: str
-    derived: str
-    parameters: dict
-    misses: tuple = ()
-    lost: tuple = ()
-    note: str = ""
-
-
 def give_default(graph: Graph) -> None:
     """Give shapes without a BSDF Mitsuba's default, so it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -53,119 +34,64 @@ def give_default(graph: Graph) -> None:
 
 
 def check(graph: Graph) -> None:
-    """Reject coefficients that are not reflectances.
-
-    Raises
-    ------
-    InputError
-        Naming the coefficient and its value.
-    """
+    """Reject coefficients that are not reflectances."""
     for index in graph.nodes(BSDF):
         values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
 
 
-def to_heuristic(graph: Graph, convention: Convention) -> list[PairedBSDF]:
+def to_heuristic(graph: Graph, convention: Convention, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong`` (:mod:`reference.pairing.nearest`).
 
-    Returns
-    -------
-    list of PairedBSDF
-        One per BSDF that was not ``phong``, including nested ones, without those around them.
+    Those that were not ``phong`` are recorded, also nested ones, but not those around others.
     """
     nodes = graph.nodes(BSDF)
-    simple.prepare(graph, convention)
-    found: dict[int, Nearest] = {}
+    context = Context(graph, convention)
     for shape in graph.nodes(mi.ObjectType.Shape):
         for _, index in graph.children(shape, BSDF):
-            nearest_of(graph, index, convention, found)
-    records = [
-        PairedBSDF(
-            graph.label(index),
-            graph.plugin(index),
-            "phong",
-            _shown(graph, index, material),
-            material.misses,
-            material.lost,
-        )
-        for index, material in sorted(found.items())
-        if graph.plugin(index) not in ("phong", *WRAPPERS)
-    ]
+            context.nearest(index)
+    for index, material in sorted(context.found.items()):
+        label, plugin = graph.label(index), graph.plugin(index)
+        if plugin not in ("phong", *WRAPPERS):
+            is_diffuse = plugin == "diffuse"
+            parameters = {"k_d": "reflectance"} if is_diffuse else material.parameters()
+            replaced.bsdf(label, plugin, "phong", parameters)
+            for lost, rule in material.lost:
+                replaced.lose(label, plugin, lost, rule)
     for index in nodes:
-        if index in found:
-            graph.replace(index, found[index].properties())
-    return records
+        if index in context.found:
+            graph.replace(index, context.found[index].properties())
 
 
-def to_physical(graph: Graph, convention: Convention) -> list[PairedBSDF]:
+def to_physical(graph: Graph, convention: Convention, replaced: Replacements) -> None:
     """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
-    glossy = [
-        phong(graph, index)
-        for index in graph.nodes(BSDF)
-        if graph.plugin(index) == "phong" and any(values.colour(graph, index, "k_s", 0.0))
-    ]
-    factors.prepare(glossy, convention)
-    records = []
-    for index in graph.nodes(BSDF):
-        converted = _physical_properties(graph, index, convention)
-        if converted is not None:
-            props, record = converted
-            graph.replace(index, props)
-            records.append(record)
-    for index in graph.nodes(BSDF):
-        if graph.plugin(index) not in WRAPPERS:
-            _unfold_twosided(graph, index)
-    return records
+    phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
+    glossy = [index for index in phongs if any(values.colour(graph, index, "k_s", 0.0))]
+    for index in phongs:
+        label, props = graph.label(index), physical_partner(graph, index, convention)
+        if index in glossy:
+            plastic, misses = factors.to_roughplastic(phong(graph, index), convention)
+            replaced.bsdf(label, "phong", "roughplastic", asdict(plastic), _unreal(plastic))
+            replaced.misses += misses
+        else:
+            replaced.bsdf(label, "phong", "diffuse", {"reflectance": _base(graph.props(index))})
+        is_twosided = graph.props(index).get("twosided", False)
+        graph.replace(index, mi.Properties("twosided") if is_twosided else props)
+        if is_twosided:
+            graph.attach(index, "bsdf", graph.add(BSDF, props))
 
 
-def _shown(graph, index, material):
-    if graph.plugin(index) == "diffuse":
-        return {"k_d": "reflectance"}
-    return material.parameters()
-
-
-def _unfold_twosided(graph, index):
-    """Turn the mark left by a replaced phong into Mitsuba's ``twosided``."""
-    props = graph.props(index)
-    if "twosided" in props:
-        del props["twosided"]
-        inner = mi.Properties(props)
-        inner.set_id("")
-        outer = mi.Properties("twosided")
-        graph.replace(index, outer)
-        graph.attach(index, "bsdf", graph.add(BSDF, inner))
-
-
-def _physical_properties(graph, index, convention):
-    if graph.plugin(index) != "phong":
-        return None
-    given = graph.props(index)
-    k_s = values.colour(graph, index, "k_s", 0.0)
-    if not any(k_s):
-        is_lit = "k_d" in given and values.may_be_nonzero(given["k_d"])
-        source = "k_d" if is_lit else "k_a"
-        reflectance = given.get(source, 0.0)
-        props = properties("diffuse", reflectance=reflectance)
-        record = PairedBSDF(graph.label(index), "phong", "diffuse", {"reflectance": source})
-    else:
-        plastic, misses = _roughplastic_of(phong(graph, index), convention)
-        props = properties("roughplastic", **asdict(plastic))
-        record = PairedBSDF(
-            graph.label(index),
-            "phong",
-            "roughplastic",
-            asdict(plastic),
-            tuple(misses),
-            note=_unreal(plastic),
-        )
-    if given.get("twosided"):
-        props["twosided"] = True
-    return props, record
-
-
-def physical_partner(graph: Graph, index: int, convention: Convention) -> Any:
+def physical_partner(graph: Graph, index: int, convention: Convention) -> mi.Properties:
     """Return the properties of the physical BSDF that replaces a ``phong``."""
-    props, _ = _physical_properties(graph, index, convention)
-    return props
+    if any(values.colour(graph, index, "k_s", 0.0)):
+        plastic, _ = factors.to_roughplastic(phong(graph, index), convention)
+        return properties("roughplastic", **asdict(plastic))
+    given = graph.props(index)
+    return properties("diffuse", reflectance=given.get(_base(given), 0.0))
+
+
+def _base(given: mi.Properties) -> str:
+    """Return the coefficient of a phong without a lobe that becomes its reflectance."""
+    return "k_d" if "k_d" in given and values.may_be_nonzero(given["k_d"]) else "k_a"
 
 
 def _unreal(plastic):
@@ -178,13 +104,7 @@ def _unreal(plastic):
 
 
 def phong(graph: Graph, index: int) -> Phong:
-    """Read the parameters of a ``phong``, with the plugin's defaults.
-
-    Raises
-    ------
-    InputError
-        If a coefficient is a texture or a tabulated spectrum, or not allowed.
-    """
+    """Read the parameters of a ``phong``, with the plugin's defaults."""
     props = graph.props(index)
     return Phong(
         k_d=values.colour(graph, index, "k_d", 0.0),
@@ -193,8 +113,3 @@ def phong(graph: Graph, index: int) -> Phong:
         form=props.get("form", "phong"),
         normalised=props.get("normalised", False),
     )
-
-
-@lru_cache(maxsize=albedo.KEPT)
-def _roughplastic_of(phong: Phong, convention: Convention):
-    return factors.to_roughplastic(phong, convention)

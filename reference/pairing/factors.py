@@ -29,19 +29,20 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 ``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import lru_cache
 from math import sqrt
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.terms import normalisation
-from reference.pairing import albedo, refraction
-from reference.pairing.albedo import Albedo, RoughPlastic
-from reference.pairing.coat import keep
-from reference.pairing.refraction import LITERAL_IOR
+from reference.pairing import albedo
+from reference.pairing.albedo import LITERAL_IOR, Albedo, RoughPlastic
+from reference.records import Record
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
@@ -80,13 +81,80 @@ class Phong:
     normalised: bool = False
 
 
-@dataclass(frozen=True)
-class Miss:
-    """A quantity that no parameter of the other model reaches, and the nearest value."""
+class Miss(Record):
+    """A quantity that no partner reaches."""
 
     what: str
     wanted: float
     reached: float
+
+
+class BsdfPair(Record):
+    """A BSDF and its partner; grey colours are one value. The note says what is odd."""
+
+    name: str
+    given: str
+    derived: str
+    parameters: dict[str, Any]
+    note: str = ""
+
+
+class EmitterPair(Record):
+    """A light and its partner, and the factor between their intensities."""
+
+    name: str
+    given: str
+    derived: str
+    factor: float
+    exact: bool
+    note: str = ""
+
+
+class Unrepresentable(Record):
+    """Something that the heuristic model cannot represent; compared nevertheless."""
+
+    name: Annotated[str, Meta(description="Id, or place in the file.")]
+    plugin: str
+    lost: str
+    nearest: Annotated[str, Meta(description="What replaces it, and by which rule.")]
+
+
+@dataclass
+class Replacements:
+    """What pairing replaces, misses and loses, recorded as it goes."""
+
+    bsdfs: list[BsdfPair] = field(default_factory=list)
+    emitters: list[EmitterPair] = field(default_factory=list)
+    misses: list[Miss] = field(default_factory=list)
+    lost: list[Unrepresentable] = field(default_factory=list)
+
+    def lose(self, name: str, plugin: str, lost: str, nearest: str) -> None:
+        """Record what has no form in the heuristic model, and what replaces it."""
+        self.lost.append(Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest))
+
+    def bsdf(self, name: str, given: str, derived: str, parameters: dict, note: str = "") -> None:
+        """Record the partner of a BSDF."""
+        short = {key: _short(value) for key, value in parameters.items()}
+        self.bsdfs.append(
+            BsdfPair(name=name, given=given, derived=derived, parameters=short, note=note)
+        )
+
+    def emitter(
+        self, name: str, given: str, derived: str, factor: float, exact: bool = True, note: str = ""
+    ) -> None:
+        """Record the partner of a light."""
+        self.emitters.append(
+            EmitterPair(
+                name=name, given=given, derived=derived, factor=factor, exact=exact, note=note
+            )
+        )
+
+
+def _short(value: Any) -> Any:
+    """Turn a tuple of equal components into one number, for readability."""
+    if isinstance(value, tuple):
+        return value[0] if len(set(value)) == 1 else list(value)
+    return value
 
 
 def alpha_of(n: float, form: str = "phong") -> float:
@@ -95,10 +163,8 @@ def alpha_of(n: float, form: str = "phong") -> float:
     At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
     ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
-    the half vector: it needs a quarter of the exponent for the same width, ``alpha = sqrt(1 / (2 n
-    + 1))``. Both forms are 1 at ``n = 0``. The match holds near the top: at half their height the
-    widths of Phong's lobe and the microfacets' agree within 3 % from ``n = 30`` on, and differ by 9
-    % at ``n = 9``.
+    the half vector: hence ``alpha = sqrt(1 / (2 n + 1))``. Both are 1 at ``n = 0``. The match holds
+    near the top: at half the height, widths agree within 3 % from ``n = 30`` on.
 
     >>> alpha_of(12)
     0.2
@@ -131,7 +197,8 @@ def specular_albedo(phong: Phong) -> np.ndarray:
     return np.asarray(phong.k_s) * scale
 
 
-def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, list[Miss]]:
+@lru_cache(maxsize=albedo.KEPT)
+def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, tuple[Miss, ...]]:
     """Return the :class:`RoughPlastic` that corresponds to a :class:`Phong`, and its misses.
 
     It uses the current variant of Mitsuba, whose plugin determines the albedo:
@@ -139,75 +206,57 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
     >>> grey = (0.5, 0.5, 0.5)
     >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
     >>> misses, round(plastic.alpha, 9)
-    ([], 0.2)
+    ((), 0.2)
     >>> _, misses = to_roughplastic(Phong(grey, (0.7, 0.7, 0.7), 3), Convention.MATCHED)
     >>> [miss.what for miss in misses]
     ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
     """
     if convention is Convention.LITERAL:
-        rho, misses = _at_most_one("diffuse reflectance", phong.k_d)
-        return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
+        red, green, blue = (min(component, 1.0) for component in phong.k_d)
+        misses = tuple(
+            Miss(what="diffuse reflectance", wanted=component, reached=1.0)
+            for component in dict.fromkeys(phong.k_d)
+            if component > 1
+        )
+        return RoughPlastic((red, green, blue), alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
-    if phong not in _whites:
-        prepare([phong], convention)
-    white, wanted = _whites[phong], _wanted(phong)
+    albedos = Albedo(np.array(phong.k_d), specular_albedo(phong))
+    strength = max(phong.k_s)
+    red, green, blue = (k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic(
+        (1.0, 1.0, 1.0),
+        alpha_of(phong.n, phong.form),
+        LITERAL_IOR,
+        specular_reflectance=(red, green, blue),
+    )
+    white = replace(white, int_ior=albedo.ior_of_lobe(white, max(albedos.specular)))
+    if any(albedos.diffuse > albedo.of_roughplastic(white).diffuse):
+        white = replace(white, int_ior=albedo.nearest_ior(white, albedos))
     passed = albedo.of_roughplastic(white).diffuse
-    red, green, blue = np.minimum(wanted.diffuse / passed, 1).tolist()  # it is linear in rho
+    red, green, blue = np.minimum(albedos.diffuse / passed, 1).tolist()  # it is linear in rho
     plastic = replace(white, diffuse_reflectance=(red, green, blue))
-    return plastic, _misses(wanted, albedo.of_roughplastic(plastic))
+    return plastic, _misses(albedos, albedo.of_roughplastic(plastic))
 
 
-_whites: dict[Phong, RoughPlastic] = {}
-
-
-def prepare(phongs: Iterable[Phong], convention: Convention) -> None:
-    """Find together the white plastics that :func:`to_roughplastic` then colours."""
-    if convention is Convention.LITERAL:
-        return
-    found = {phong: _white(phong) for phong in phongs if phong not in _whites}
-    albedo.prepare(found.values())
-    dark = [
-        phong
-        for phong, white in found.items()
-        if any(_wanted(phong).diffuse > albedo.of_roughplastic(white).diffuse)
-    ]
-    iors = refraction.nearest([found[phong] for phong in dark], [_wanted(one) for one in dark])
-    for phong, int_ior in zip(dark, iors, strict=True):
-        found[phong] = replace(found[phong], int_ior=int_ior)
-    keep(_whites, found)
-
-
-def to_phong(plastic: RoughPlastic, convention: Convention) -> tuple[Phong, list[Miss]]:
-    """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`, and its misses.
+@lru_cache(maxsize=albedo.KEPT)
+def to_phong(plastic: RoughPlastic, convention: Convention) -> Phong:
+    """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`; nothing is missed.
 
     By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
 
     >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
-    >>> phong, misses = to_phong(plastic, Convention.LITERAL)
+    >>> phong = to_phong(plastic, Convention.LITERAL)
     >>> phong.k_d, phong.n
     ((0.5, 0.4, 0.3), 6.0)
     """
     if convention is Convention.LITERAL:
         n = exponent_of(plastic.alpha, "blinn")
-        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n), []
+        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n)
     n = exponent_of(plastic.alpha)
     reflected = albedo.of_roughplastic(plastic)
     k_s = reflected.specular * normalisation("phong", n)
     (red, green, blue), lobe = reflected.diffuse.tolist(), k_s.tolist()
-    return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n), []
-
-
-def _white(phong):
-    """Return the white plastic with a phong's lobe, with the same specular albedo if possible."""
-    alpha = alpha_of(phong.n, phong.form)
-    strength = max(phong.k_s)
-    tint = tuple(k_s / strength for k_s in phong.k_s)
-    white = RoughPlastic((1.0, 1.0, 1.0), alpha, LITERAL_IOR, specular_reflectance=tint)
-    return replace(white, int_ior=refraction.of_lobe(white, max(specular_albedo(phong))))
-
-
-def _wanted(phong):
-    return Albedo(np.array(phong.k_d), specular_albedo(phong))
+    return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n)
 
 
 def _misses(wanted, reached):
@@ -216,18 +265,6 @@ def _misses(wanted, reached):
     for part in ("diffuse", "specular"):
         for want, value in zip(getattr(wanted, part), getattr(reached, part), strict=True):
             if abs(value - want) > MATCHING_TOLERANCE * max(want, 1e-3):
-                misses[part, want] = Miss(
-                    f"{part} albedo at normal incidence", float(want), float(value)
-                )
-    return list(misses.values())
-
-
-def _at_most_one(what, colour):
-    """Return a colour limited to 1, and the excess."""
-    limited = tuple(min(component, 1.0) for component in colour)
-    misses = [
-        Miss(what, wanted, reached)
-        for wanted, reached in dict(zip(colour, limited, strict=True)).items()
-        if wanted > reached
-    ]
-    return limited, misses
+                what = f"{part} albedo at normal incidence"
+                misses[part, want] = Miss(what=what, wanted=float(want), reached=float(value))
+    return tuple(misses.values())

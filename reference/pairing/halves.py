@@ -5,55 +5,63 @@ replaces physical parts, the physical half replaces heuristic parts, and parts o
 stay. Both keep the scene's geometry, cameras and films.
 """
 
-from contextlib import contextmanager
+import shutil
+import weakref
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
 
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import FotismosError, InputError
+from heuristic import meshes
+from heuristic.convention import Scene
+from heuristic.errors import FotismosError, InputError, OutputError
 from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
+from heuristic.plugins.integrator import viewpoint
 from reference.pairing import bsdfs, lights
-from reference.pairing.factors import Convention, Miss, specular_albedo
+from reference.pairing.factors import (
+    BsdfPair,
+    Convention,
+    EmitterPair,
+    Miss,
+    Replacements,
+    Unrepresentable,
+    specular_albedo,
+)
 from reference.pairing.lights import areas, environments
+from reference.records import Record
 from reference.rendering.gbuffer import gbuffer
-from reference.scene import preparation
-from reference.scene.graph import Graph, properties
-from reference.scene.preparation import Overridden
+from reference.scene.graph import Graph, Reference, properties
+from reference.scene.prepare import Override, prepare
 from reference.scene.source import Source
 
-BSDF, INTEGRATOR, SENSOR = (
-    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Sensor")
+BSDF, INTEGRATOR, MEDIUM, SHAPE = (
+    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Medium", "Shape")
 )
+
+
+class Pairing(Record):
+    """How heuristic and physical materials and lights correspond."""
+
+    convention: str
+    bsdfs: tuple[BsdfPair, ...]
+    emitters: tuple[EmitterPair, ...]
+    misses: tuple[Miss, ...]
 
 
 @dataclass(frozen=True)
 class Pair:
     """Two scenes that show the same thing, and how each was derived.
 
-    Attributes
-    ----------
-    name
-        The scene's name.
-    heuristic, physical
-        Graphs of the two halves; :meth:`Graph.instantiate` makes the Mitsuba scenes.
-    hide_emitters
-        Whether camera rays do not see lights and environment; the same in both halves.
-    max_depth
-        The scene's own limit on path length, -1 for none.
-    convention, bsdfs, emitters, misses, warnings
-        The replacements.
-    integrator, rr_depth
-        The scene's own integrator and where it begins Russian roulette, None if omitted.
-    media
-        Labels and plugins of participating media.
-    overridden
-        What the scene requests and does not get, :class:`reference.scene.preparation.Overridden`.
-    shading
-        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
+    ``heuristic`` and ``physical`` are the graphs of the two halves, to be copied before an edit. In
+    both, camera rays do not see lights and environment with ``hide_emitters``. ``max_depth``,
+    ``integrator`` and ``rr_depth`` are the scene's own: -1 for no limit, None if omitted.
+    ``media`` are labels and plugins of participating media, ``shading`` names the declaration that
+    shades the heuristic half (:mod:`heuristic.heuristics`).
     """
 
     name: str
@@ -61,15 +69,13 @@ class Pair:
     physical: Graph
     hide_emitters: bool
     max_depth: int
-    convention: Convention
-    bsdfs: tuple
-    emitters: tuple
-    misses: tuple[Miss, ...]
-    warnings: tuple[str, ...]
+    pairing: Pairing
+    unrepresentable: tuple[Unrepresentable, ...] = ()
+    warnings: tuple[str, ...] = ()
     integrator: str | None = None
     rr_depth: int | None = None
     media: tuple[tuple[str, str], ...] = ()
-    overridden: tuple[Overridden, ...] = ()
+    overridden: tuple[Override, ...] = ()
     shading: str = PHONG.name
 
 
@@ -86,52 +92,23 @@ def pair(
 ) -> Pair:
     """Derive both halves of a scene, for the current variant.
 
-    Parameters
-    ----------
-    source
-        The scene.
-    convention
-        How roughplastic and phong are paired.
-    resolution
-        Width and height in place of the film's.
-    interpolation
-        Interpolation of the heuristic half. FLAT and GOURAUD make meshes of its shapes.
-    tessellation
-        How fine those meshes are (:func:`heuristic.meshes.to_mesh`), 16 if omitted. If given, PHONG
-        gets meshes too.
-    prune
-        Whether the kernel leaves out the terms that no material has.
-    sensor
-        Number of the scene's sensor.
-    heuristic
-        Name of the declaration that shades the heuristic half (:mod:`heuristic.heuristics`).
-    with_partners
-        Whether its materials know their physical partners (:mod:`reference.pairing.partners`), as
-        they do for every user's heuristic.
-
-    Raises
-    ------
-    InputError
-        If Mitsuba cannot read or make the scene, it has no such sensor, or the heuristic is not
-        declared.
+    ``resolution`` replaces the film's. FLAT and GOURAUD make meshes of the heuristic half's shapes,
+    by ``tessellation`` (:func:`heuristic.meshes.to_mesh`); if that is given, PHONG gets meshes too.
+    ``prune`` lets the kernel leave out the terms that no material has. ``heuristic`` names the
+    declaration that shades the heuristic half (:mod:`heuristic.heuristics`); ``with_partners`` lets
+    its materials know their physical partners (:mod:`reference.pairing.partners`), as they do for
+    every user's heuristic.
     """
     register()
     graph = source.parse()
-    settings = preparation.prepare(graph, resolution, sensor)
-    with _refused_by_mitsuba(graph):
-        chosen = interpolation, tessellation, prune, heuristic, with_partners
-        return _paired(graph, settings, convention, *chosen)
-
-
-@contextmanager
-def _refused_by_mitsuba(graph):
-    """Prefer Mitsuba's message for a scene that breaks pairing, if it rejects it too."""
+    settings = prepare(graph, resolution, sensor)
+    chosen = interpolation, tessellation, prune, heuristic, with_partners
     try:
-        yield
+        return _paired(graph, settings, convention, *chosen)
     except FotismosError:
         raise
     except Exception:
-        graph.instantiate()
+        graph.instantiate()  # Mitsuba's message is better, if it rejects the scene too
         raise
 
 
@@ -140,48 +117,51 @@ def _paired(
 ):
     geometry = cache(_bare(graph).instantiate)
 
-    model, half = named(heuristic), graph.copy()
+    model, half, replaced = named(heuristic), graph.copy(), Replacements()
     if model.is_own and not with_partners:
-        given_physical = bsdfs.to_heuristic(half, convention)
+        bsdfs.to_heuristic(half, convention, replaced)
     else:
         from reference.pairing import partners
 
-        asked = partners.read(half, convention)
-        given_physical = bsdfs.to_heuristic(half, convention)
-        partners.give(half, asked)
+        known = partners.read(half, convention)
+        bsdfs.to_heuristic(half, convention, replaced)
+        partners.give(half, known)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form
-    emitters, radiance = lights.to_heuristic(half, geometry, settings.hide_emitters)
+    radiance = lights.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(half, ambient, settings, interpolation, prune, model)
     if interpolation is not Interpolation.PHONG or tessellation is not None:
-        from reference.pairing import meshing
-
-        meshing.replace_shapes(half, geometry(), tessellation, interpolation)
+        replace_shapes(half, geometry(), tessellation, interpolation)
 
     physical = graph.copy()
-    emitters += areas.add_glowing_shapes(physical)
-    given_heuristic = bsdfs.to_physical(physical, convention)
-    emitters += lights.to_physical(physical, lambda: gbuffer(geometry()))
+    areas.add_glowing_shapes(physical, replaced)
+    bsdfs.to_physical(physical, convention, replaced)
+    lights.to_physical(physical, lambda: gbuffer(geometry()), replaced)
     if settings.ambient is not None:
-        emitters.append(environments.add_environment(physical, graph, settings.ambient, convention))
+        environments.add_environment(physical, graph, settings.ambient, convention, replaced)
 
-    records = (*given_physical, *given_heuristic)
+    media = tuple((graph.label(index), graph.plugin(index)) for index in graph.nodes(MEDIUM))
+    for label, plugin in media:
+        replaced.lose(label, plugin, "participating medium", "left out")
     return Pair(
         name=graph.name,
         heuristic=half,
         physical=physical,
         hide_emitters=settings.hide_emitters,
         max_depth=settings.max_depth,
-        convention=convention,
-        bsdfs=records,
-        emitters=tuple(emitters),
-        misses=tuple(miss for record in records for miss in record.misses),
+        pairing=Pairing(
+            convention=convention.value,
+            bsdfs=tuple(replaced.bsdfs),
+            emitters=tuple(replaced.emitters),
+            misses=tuple(replaced.misses),
+        ),
+        unrepresentable=tuple(dict.fromkeys(replaced.lost)),
         warnings=(*_energy_warnings(half), *model.remarks),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
-        media=tuple((graph.label(i), graph.plugin(i)) for i in preparation.media(graph)),
+        media=media,
         overridden=tuple(settings.overridden),
         shading=model.name,
     )
@@ -190,8 +170,8 @@ def _paired(
 def _bare(graph):
     """Return a copy of a graph without materials, which can be slow to make."""
     copy = graph.copy()
-    for shape in copy.nodes(mi.ObjectType.Shape):
-        for kind in (mi.ObjectType.BSDF, mi.ObjectType.Medium):
+    for shape in copy.nodes(SHAPE):
+        for kind in (BSDF, MEDIUM):
             for key, _ in copy.children(shape, kind):
                 copy.detach(shape, key)
     return copy
@@ -226,3 +206,53 @@ def _energy_warnings(graph):
                 f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives"
                 " at normal incidence (k_d and the lobe's albedo): no physical material does."
             )
+
+
+def replace_shapes(
+    graph: Graph, scene: Scene, resolution: int | None, interpolation: Interpolation
+) -> None:
+    """Replace every shape of a graph by a mesh of the same place, name, material and light.
+
+    ``scene`` has the same shapes, instantiated; ids identify them. The graph keeps the folder that
+    the meshes are written to until it is deleted. Gouraud shading needs one normal per vertex,
+    hence separate faces if the mesh has ``face_normals``.
+    """
+    if interpolation is not Interpolation.PHONG:
+        viewpoint(scene.sensors()[0])  # raises before anything renders
+    folder = _Folder()
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    for index in graph.nodes(SHAPE):
+        given = graph.props(index)
+        if given.id() not in shapes or graph.plugin(index) == "instance":
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
+                " separate meshes. Use --interpolation phong."
+            )
+        mesh = meshes.to_mesh(shapes[given.id()], resolution or meshes.RESOLUTION)
+        if mesh.has_face_normals():
+            if interpolation is Interpolation.GOURAUD:
+                mesh = meshes.split_faces(mesh)
+        elif not mesh.has_vertex_normals():
+            mesh = meshes.with_vertex_normals(mesh)
+        path = folder.path / f"{index}.ply"
+        try:
+            mesh.write_ply(str(path))
+        except RuntimeError as error:
+            raise OutputError(
+                f"{graph.name}: {error}. Free some space, or set TMPDIR to another folder."
+            ) from error
+        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
+        # The file holds world coordinates; a mesh without vertex normals has flat faces.
+        derived = properties("ply", filename=str(path), **children)
+        if mesh.has_face_normals():
+            derived["face_normals"] = True
+        graph.replace(index, derived)
+    graph.folders.append(folder)
+
+
+class _Folder:
+    """A temporary folder that goes away with the last graph; ``TemporaryDirectory`` would warn."""
+
+    def __init__(self):
+        self.path = Path(mkdtemp(prefix="fotismos-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

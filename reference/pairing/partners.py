@@ -35,11 +35,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.plugins.mapped import SMALLEST_ALPHA
-from reference.pairing import bsdfs
+from heuristic.plugins.textures import SMALLEST_ALPHA
+from reference.pairing import bsdfs, probe
 from reference.pairing.factors import Convention
-from reference.pairing.nearest import operations, probe
-from reference.pairing.nearest.material import Context
+from reference.pairing.nearest import Context
 from reference.scene import values
 from reference.scene.graph import Graph
 
@@ -51,7 +50,7 @@ LARGEST_IOR = 4.0
 
 @dataclass(frozen=True)
 class Partner:
-    """The parameters of a physical material; values as in `nearest.operations`."""
+    """The parameters of a physical material; values as in `reference.scene.values`."""
 
     base_color: Any = 0.0
     alpha: Any = 1.0
@@ -95,9 +94,9 @@ def _wrapped(graph: Graph, index: int, plugin: str, inner: list[Partner]) -> Par
         return inner[0]
     pairs = {each.name: [getattr(one, each.name) for one in inner[:2]] for each in fields(Partner)}
     if plugin == "twosided":
-        return Partner(**{k: operations.sides(graph, *pair) for k, pair in pairs.items()})
+        return Partner(**{k: values.sides(graph, *pair) for k, pair in pairs.items()})
     weight = graph.props(index).get("weight", 0.5)
-    return Partner(**{k: operations.blend(graph, a, b, weight) for k, (a, b) in pairs.items()})
+    return Partner(**{k: values.blend(graph, a, b, weight) for k, (a, b) in pairs.items()})
 
 
 def _of_phong(graph: Graph, index: int, convention: Convention) -> Partner:
@@ -115,8 +114,8 @@ def _plastic(context: Context, index: int) -> Partner:
 
 def _conductor(context: Context, index: int) -> Partner:
     tint = context.value(index, "specular_reflectance", 1.0)
-    white = probe.measured(context, index, specular_reflectance=1.0)
-    base = operations.product(context.graph, white.reflected, tint)
+    white = probe.measured(context.graph, index, specular_reflectance=1.0)
+    base = values.product(context.graph, white.reflected, tint)
     return Partner(base, _alpha(context, index), metallic=1.0)
 
 
@@ -126,22 +125,22 @@ def _dielectric(context: Context, index: int) -> Partner:
 
 def _principled(context: Context, index: int) -> Partner:
     roughness = context.value(index, "roughness", 0.5)
-    specular = operations.plain(context.value(index, "specular", 0.5))
+    specular = values.plain(context.value(index, "specular", 0.5))
     # Mitsuba's reading of `specular`, F0 = 0.08 specular, as an index.
     ior = 2 / (1 - sqrt(0.08 * specular)) - 1 if isinstance(specular, float) else 1.5
     return Partner(
         context.value(index, "base_color", 0.5),
-        _at_least(operations.product(context.graph, roughness, roughness)),
+        _at_least(values.product(context.graph, roughness, roughness)),
         context.value(index, "eta", ior),
         context.value(index, "metallic", 0.0),
     )
 
 
 def _measured(context: Context, index: int) -> Partner:
-    found = probe.with_values(context, index)
+    found = probe.with_values(context.graph, index)
     if found is None:
         return Partner(0.5)
-    level = operations.plain(found.specular)
+    level = values.plain(found.specular)
     root = sqrt(min(float(np.mean(level)) if level is not None else 0.04, 0.99))
     ior = min((1 + root) / (1 - root), LARGEST_IOR)
     return Partner(found.diffuse, min(max(found.alpha, SMALLEST_ALPHA), 1.0), ior)
@@ -155,7 +154,7 @@ def _alpha(context: Context, index: int) -> Any:
 
 
 def _at_least(alpha: Any) -> Any:
-    known = operations.plain(alpha)
+    known = values.plain(alpha)
     return alpha if known is None else max(known, SMALLEST_ALPHA)
 
 

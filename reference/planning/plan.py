@@ -12,14 +12,13 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
-thousands of lights, in any case        ``direct_all``, which picks some of them for each sample in
-                                        proportion to their light; ``path`` picks them evenly
+curved shapes behind hidden lamps       ``volpath`` in place of ``path`` and ``direct``, which err
 a BSDF that may let light through       ``path``, whatever the depth
 participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
                                         or its extinction is coloured
 ======================================  ===========================================================
 
-All take the sampler of :mod:`reference.scene.sampler`: stratified, with the right mean at any
+All take the sampler of :mod:`reference.rendering.sampler`: stratified, with the right mean at any
 number of samples. Samples are stratified within a pass, so few passes of many samples are better
 than many of few; eight passes are enough for standard errors. If neither lights nor lens need
 random numbers, only the pixel filter is sampled, and four passes are enough to see the remaining
@@ -27,131 +26,159 @@ noise.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import mitsuba as mi
+from msgspec import Meta
+from msgspec.structs import replace
 
+from heuristic.convention import Scene
 from heuristic.interpolation import Interpolation
 from heuristic.plugins.phong import COEFFICIENTS
-from reference.effects import EFFECTS
-from reference.effects.effect import Decision, Effect
-from reference.effects.obstacles import (
-    INTERREFLECTION,
-    NO_SECOND_REFLECTION,
-    NO_SHADOWS,
-    OCCLUSION,
-)
 from reference.pairing import lights
 from reference.pairing.halves import Pair
-from reference.pairing.nearest.operations import plain
-from reference.planning.facts import BSDF, Facts, examine
-from reference.planning.light_by_light import EVERY_LIGHT, LIGHT_BY_LIGHT
-from reference.planning.premises import Pruning, Ruling
-from reference.planning.tabulation import TABULATED_ENVIRONMENT
-from reference.rendering.direct import RR_DEPTH
-from reference.rendering.light_choice import PICKS
+from reference.planning.effects import (
+    EFFECTS,
+    INTERREFLECTION,
+    OCCLUSION,
+    Decision,
+    Effect,
+    PrunedEffect,
+)
+from reference.planning.facts import BSDF, Facts
+from reference.planning.rules import (
+    LIGHT_BY_LIGHT,
+    RULES,
+    TABULATED_ENVIRONMENT,
+    RuleResult,
+)
+from reference.records import Amount, Count, Record, Size
+from reference.rendering import direct
+from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER
 from reference.scene.graph import Graph
-from reference.scene.sampler import SAMPLER, STOCK_SAMPLER
+from reference.scene.prepare import PATHS
+from reference.scene.values import plain
+
+Depth = Annotated[
+    int, Meta(ge=-1, description="As Mitsuba counts: 2 is direct light alone, -1 is unlimited.")
+]
 
 STOCK_RR_DEPTH = 5
 SPP, PASSES = 512, 8
-"""64 samples per pass take half the time of 16 for the same noise (``./run bench samplers``)."""
+"""64 samples per pass take half the time of 16 for the same noise."""
 
 EXACT_SPP, EXACT_PASSES = 64, 4
 """Of plans whose only random numbers are the places of camera rays: only edges have noise, and four
 times as many samples move mean departures by 1e-5."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """How both halves are rendered.
+class Guard(Record):
+    """The result of probing a plan that leaves something out, against everything.
 
     Attributes
     ----------
-    decisions
-        One per effect, in their order.
+    state
+        If it disagreed, everything was simulated; not needed if nothing is left out.
+    rays
+        Camera rays that were traced both ways.
+    departure, error
+        Relative difference of the plan's mean from the full one, and its standard error.
+    seconds
+        Time of the probe, which no other time includes.
+    """
+
+    state: Literal["agreed", "disagreed", "not needed"] = "not needed"
+    rays: Count = 0
+    departure: float = 0.0
+    error: Amount = 0.0
+    seconds: Amount = 0.0
+
+    @property
+    def words(self) -> str:
+        """The result as a sentence."""
+        return (
+            f"the plan's mean is {self.departure:+.2%} off the mean of everything simulated, with a"
+            f" standard error of {self.error:.2%}, over {self.rays} camera rays"
+        )
+
+
+class Plan(Record):
+    """How both halves are rendered, and the effects that the scene calls for.
+
+    Attributes
+    ----------
     kernel_terms
-        The terms in the heuristic kernel.
-    integrator, max_depth
-        Integrator of the reference; ``max_depth`` counts like Mitsuba's: 2 is direct light, -1 no
-        limit.
+        Coefficients whose terms the heuristic kernel holds.
+    integrator
+        Mitsuba integrator of the reference.
     stock_integrator, scene_depth
-        The integrator that Mitsuba's users get by default, and the scene's own limit of path
-        length.
-    sampler, spp, passes
-        For both halves; ``spp`` over all passes, unless the user gives another.
+        The integrator and the depth of paths that Mitsuba's users get.
+    sampler
+        Mitsuba sampler of both renderings.
+    spp
+        Samples per pixel, over all passes.
     exact
         Whether only camera rays are random: both halves are then functions of the ray alone, and
         their difference has no noise.
     rr_depth
-        Depth at which Russian roulette of ``path`` begins.
-    shadows, bsdf_samples, tabulate_environment, light_samples
-        Parameters of ``direct_all``.
-    rulings
-        For each of :data:`RULES`: whether it applies, and if not, which premise failed.
+        Depth at which Russian roulette of paths begins.
+    shadows
+        Whether the reference traces shadow rays.
+    bsdf_samples
+        Samples of the BSDF that look for lights.
+    tabulated_environment
+        Whether a constant environment comes from a table of albedos.
+    rules
+        Which rules of pruning apply.
+    heuristic_reads
+        What the heuristic reads of each point that it shades.
     """
 
-    decisions: tuple[Decision, ...]
+    effects: tuple[Decision, ...]
     kernel_terms: tuple[str, ...]
     integrator: str
-    max_depth: int
+    max_depth: Depth
     stock_integrator: str
-    scene_depth: int
+    scene_depth: Depth
     sampler: str = SAMPLER
-    spp: int = SPP
-    passes: int = PASSES
+    spp: Size = SPP
+    passes: Size = PASSES
     exact: bool = False
     rr_depth: int = STOCK_RR_DEPTH
     shadows: bool = True
-    bsdf_samples: int = 1
-    tabulate_environment: bool = False
-    light_samples: int = 0
-    rulings: tuple[Ruling, ...] = ()
-
-    @property
-    def simulated(self) -> tuple:
-        """What distinguishes its integrator from another plan's for the same scene."""
-        own: tuple[Any, ...] = (
-            self.shadows,
-            self.bsdf_samples,
-            self.tabulate_environment,
-            self.light_samples,
-        )
-        if self.integrator != "direct_all":
-            own = (self.rr_depth,)
-        return self.integrator, self.max_depth, *own
+    bsdf_samples: Count = 1
+    tabulated_environment: bool = False
+    rules: tuple[RuleResult, ...] = ()
+    heuristic_reads: tuple[str, ...] = ()
+    guard: Guard | None = None
 
     def calls_for(self, effect: Effect) -> bool:
         """Return whether the scene needs an effect."""
-        return next(d.called_for for d in self.decisions if d.effect is effect)
+        return next(d.called_for for d in self.effects if d.name == effect.label)
 
     def simulating(self, effects: Collection[Effect], max_depth: int | None = None) -> "Plan":
         """Return this plan with only some of its effects.
 
-        A plan covers only the integrator's part: other effects change the scene
-        (:meth:`comparisons.effects.between.Between.of`). Leaving out an effect that is not needed
-        changes nothing.
-
-        Parameters
-        ----------
-        effects
-            Effects to simulate.
-        max_depth
-            Depth of paths, in place of the plan's own; at 2 interreflection is left out.
+        A plan covers only the integrator's part: other effects change the scene. Leaving out an
+        effect that is not needed changes nothing. ``max_depth`` takes the place of the plan's own;
+        at 2 interreflection is left out.
         """
         if max_depth == 2:
             effects = set(effects) - {INTERREFLECTION}
-        omitted = [e for e in EFFECTS if e.without and e not in effects and self.calls_for(e)]
+        omitted = [
+            effect
+            for effect in EFFECTS
+            if isinstance(effect, PrunedEffect) and effect not in effects and self.calls_for(effect)
+        ]
         plan = self.directly() if omitted else self
         for effect in omitted:
-            assert effect.without  # as checked above
-            plan = effect.without(plan)
+            plan = replace(plan, **effect.without)
         is_limited = self.calls_for(INTERREFLECTION) and INTERREFLECTION not in omitted
         if max_depth in (None, plan.max_depth) or not is_limited:
             return plan
+        paths = self.integrator if self.integrator in PATHS else "path"
         # `path` always has shadows.
-        return replace(plan, integrator="direct_all" if omitted else "path", max_depth=max_depth)
+        return replace(plan, integrator="direct_all" if omitted else paths, max_depth=max_depth)
 
     def directly(self) -> "Plan":
         """Return this plan with ``direct_all``, which can leave out more than ``path``."""
@@ -164,12 +191,9 @@ class Plan:
         )
 
     def unpruned(self, rule: str = "asked", evidence: str = "--everything") -> "Plan":
-        """Return the plan that prunes nothing: Mitsuba's default.
-
-        ``rule`` and ``evidence`` give the reason, in place of each effect's.
-        """
+        """Return the plan that prunes nothing, Mitsuba's default, and the reason for it."""
         return Plan(
-            decisions=tuple(Decision(effect, True, rule, evidence) for effect in EFFECTS),
+            effects=tuple(effect.decision(True, rule, evidence) for effect in EFFECTS),
             kernel_terms=COEFFICIENTS,
             integrator=self.stock_integrator,
             max_depth=self.scene_depth,
@@ -178,9 +202,6 @@ class Plan:
             sampler=STOCK_SAMPLER,
         )
 
-
-RULES = (LIGHT_BY_LIGHT, EVERY_LIGHT, NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT)
-"""The rules of pruning."""
 
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 
@@ -196,57 +217,58 @@ def plan(
     interpolation: Interpolation = Interpolation.PHONG,
     everything: bool = False,
 ) -> Plan:
-    """Decide on each effect, and choose the reference.
+    """Decide on each effect, and choose the reference; ``scene`` is the physical half.
 
-    Parameters
-    ----------
-    pair
-        Both halves.
-    scene
-        The physical half, instantiated.
-    interpolation
-        Of the heuristic half.
-    everything
-        Switch all pruning off, for Mitsuba's default: ``path`` with the independent sampler.
+    ``everything`` switches all pruning off, for Mitsuba's default with the independent sampler.
     """
-    facts = Facts(pair, examine(pair.physical, scene), interpolation)
-    decisions = tuple(effect.decide(facts) for effect in EFFECTS)
-    chosen = _reference(facts, decisions)
+    chosen = _reference(Facts.of(pair, scene, interpolation))
     return chosen.unpruned() if everything else chosen
 
 
-def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
+def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
+    """Make the integrator that a plan names, for the physical half's scene."""
+    direct.register()
+    description = {"type": plan.integrator, "hide_emitters": hide_emitters}
+    if plan.integrator == "direct":
+        return mi.load_dict(description)
+    description["max_depth"] = plan.max_depth
+    if plan.integrator in PATHS:
+        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
+    own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
+    integrator = mi.load_dict(description | own)
+    # The effect left out may be the environment itself.
+    if plan.tabulated_environment and scene.environment() is not None:
+        integrator.environment_albedo = direct.AlbedoTable(scene.shapes()[0].bsdf())
+    return integrator
+
+
+def _reference(facts: Facts) -> Plan:
     """Return the cheapest correct plan, by the table of the module's docstring."""
     pair, graph = facts.pair, facts.pair.physical
     stock = Plan(
-        decisions=decisions,
+        effects=tuple(effect.decide(facts) for effect in EFFECTS),
         kernel_terms=facts.kernel_terms,
-        integrator=_stock(pair),
+        integrator=_stock(facts),
         max_depth=pair.max_depth,
-        stock_integrator=_stock(pair),
+        stock_integrator=_stock(facts),
         scene_depth=pair.max_depth,
-        rr_depth=pair.rr_depth or RR_DEPTH,
-        rulings=tuple(rule.judge(facts) for rule in RULES),
+        rr_depth=pair.rr_depth or direct.RR_DEPTH,
+        rules=tuple(rule.check(facts) for rule in RULES),
     )
-    if not _holds(stock, LIGHT_BY_LIGHT):
+    if not LIGHT_BY_LIGHT.check(facts).applies:
         return stock
-    if not _holds(stock, EVERY_LIGHT):
-        stock = replace(stock, light_samples=PICKS)
+    kinds = [lights.of(light.kind) for light in facts.lights]
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
-        exact = [light for light in facts.structure.lights if lights.of(light.kind).exact]
-        if stock.light_samples or (len(exact) > 1 and _diffuse(graph)):
+        is_diffuse = all(graph.plugin(i) in ("diffuse", "twosided") for i in graph.nodes(BSDF))
+        if sum(kind.exact for kind in kinds) > 1 and is_diffuse:
             return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
-        return replace(stock, integrator="path")
-    tabulated = _holds(stock, TABULATED_ENVIRONMENT)
-    has_lens = facts.structure.camera.plugin not in ("perspective", "orthographic")
+        # Behind hidden lamps only the stock integrator is right.
+        return stock if facts.sees_through_lamps else replace(stock, integrator="path")
+    tabulated = TABULATED_ENVIRONMENT.check(facts).applies
     is_random = (
-        stock.light_samples > 0
-        or has_lens
-        or mi.is_spectral
-        or any(
-            not (kind := lights.of(light.kind)).exact and not (tabulated and kind.uniform)
-            for light in facts.structure.lights
-        )
+        mi.is_spectral
+        or facts.camera.plugin not in ("perspective", "orthographic")
+        or not all(kind.exact or (tabulated and kind.uniform) for kind in kinds)
     )
     return replace(
         stock.directly(),
@@ -254,19 +276,18 @@ def _reference(facts: Facts, decisions: tuple[Decision, ...]) -> Plan:
         spp=SPP if is_random else EXACT_SPP,
         passes=PASSES if is_random else EXACT_PASSES,
         exact=not is_random,
-        tabulate_environment=tabulated,
+        tabulated_environment=tabulated,
     )
 
 
-def _holds(made: Plan, rule: Pruning) -> bool:
-    return next(ruling.holds for ruling in made.rulings if ruling.rule is rule)
-
-
-def _stock(pair: Pair) -> str:
-    """Return Mitsuba's integrator for a scene: the one that it names, if it supports media.
+def _stock(facts: Facts) -> str:
+    """Return Mitsuba's integrator for a scene: the one that it names, if it is right there.
 
     ``direct`` is not a ``path`` of depth 2, which loses light at masks.
     """
+    pair = facts.pair
+    if facts.sees_through_lamps and not pair.media and pair.integrator != "volpathmis":
+        return "volpath"
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator
     if not pair.media:
@@ -296,7 +317,3 @@ def wants_spectra(graph: Graph) -> bool:
         for index in graph.nodes_in_use()
         for _, value in graph.props(index).items()
     )
-
-
-def _diffuse(graph: Graph) -> bool:
-    return all(graph.plugin(index) in ("diffuse", "twosided") for index in graph.nodes(BSDF))

@@ -5,8 +5,11 @@ Indirect light is added if requested.
 Mitsuba's ``direct`` picks one emitter at random for each sample, so even two point lights make
 noise. This one evaluates each emitter in turn: point, spot and directional lights, which need no
 random number, are then exact at each camera ray, and only lights with an extent are sampled, by
-emitter and by BSDF, with the balance heuristic. From thousands of lights it can pick some, in
-proportion to their contribution. BSDFs, emitters and visibility are Mitsuba's.
+emitter and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mitsuba's.
+
+Up to :data:`UNROLLED` lights are unrolled: each has its own code in the kernel. For more, LLVM's
+time would grow faster than their number, so they become the targets of one call in a loop. Dr.Jit
+merges targets with the same code: the kernel grows with the kinds of lights, not with their number.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning
@@ -18,24 +21,28 @@ Parameter           Type (default)      Meaning
                                         ray hits what hides a light: without shadows, 0 if something
                                         does. Mirrors and glass still take theirs, since nothing
                                         else finds a light in them
-``light_samples``   integer (0)         lights picked at random for each sample, of points
-                                        and directions and of the others, if there are more, and
-                                        more than 16 (:mod:`reference.rendering.light_choice`); 0
-                                        evaluates each
 ``max_depth``       integer (2)         as in Mitsuba's ``path``: more than 2, or -1 for no limit,
                                         adds indirect light (:func:`indirect_light`)
 ==================  ==================  ===========================================================
 """
 
-from operator import is_
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from heuristic.arrays import Colour, Interaction, Mask, Scene
-from reference.rendering import light_sums
-from reference.rendering.light_choice import LightChoice
+from heuristic import numerics
+from heuristic.convention import Colour, Interaction, Mask, Number, Scene
+from reference.pairing.probe import lattice
+
+UNROLLED = 16
+"""Lights of a kind that have their own code."""
+
+NODES, SAMPLES = 256, 8192
+"""Cosines of an :class:`AlbedoTable`, and samples of the BSDF at each."""
 
 _registered: set[str] = set()
 
@@ -56,77 +63,44 @@ def _define():
             self.shadows = props.get("shadows", True)
             self.bsdf_samples = props.get("bsdf_samples", 1)
             self.max_depth = props.get("max_depth", 2)
-            self.light_samples = props.get("light_samples", 0)
-            self._choices = {}
             self.environment_albedo = None
             """An `AlbedoTable` to replace sampling of the environment, for a scene with one BSDF
             and nothing that hides it; set after construction."""
 
-        def prepare(self, scene):
-            """Find the probabilities of lights; otherwise the first sample does."""
-            delta, others = _parted(scene.emitters())
-            for lights in (delta, [e for e in others if not self._is_tabulated(e)]):
-                self._choice(scene, lights)
-            if self.max_depth != 2:
-                self._choice(scene, scene.emitters(), 1)
-
         def sample(self, scene, sampler, ray, medium=None, active=True):
-            delta, others = _parted(scene.emitters())
-            si = self._first_surface(scene, ray, active)
+            delta, lamps, others = [], [], []
+            for emitter in scene.emitters():
+                is_delta = mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
+                (delta if is_delta else others).append(emitter)
+                if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface):
+                    lamps.append(emitter)
+            if self.hide_emitters and lamps:
+                si = _beyond_lamps(scene, mi.Ray3f(ray), mi.Bool(active))
+            else:
+                si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
             colour = mi.Spectrum(0)
-            if others or len(delta) <= light_sums.UNROLLED:  # rays never hit points or directions
+            if others or len(delta) <= UNROLLED:  # rays never hit points or directions
                 seen = active & (si.is_valid() | (not self.hide_emitters))
                 colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
             hit = active & si.is_valid()
             bsdf = si.bsdf(ray)
             given = scene, si, bsdf, sampler, hit, self.shadows, self.bsdf_samples
-            extended = [e for e in others if not self._is_tabulated(e)]
-            if len(delta) > light_sums.UNROLLED:
-                colour += light_sums.of_many(delta, True, *given, self._choice(scene, delta))
-            for emitter in scene.emitters() if len(delta) <= light_sums.UNROLLED else others:
-                if _is_delta(emitter):
-                    colour += light_sums.of_one(emitter, True, *given)
-                elif self._is_tabulated(emitter):
+            extended = []
+            for emitter in others:
+                if self.environment_albedo is not None and emitter.is_environment():
                     albedo = self.environment_albedo.at(si.wi.z)
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
-            choice = self._choice(scene, extended)
-            if len(extended) > light_sums.UNROLLED:
-                colour += light_sums.of_many(extended, False, *given, choice)
-            else:
-                for emitter in extended:
-                    colour += light_sums.of_one(emitter, False, *given)
+                else:
+                    extended.append(emitter)
+            colour += _of_all(delta, True, *given)
+            colour += _of_all(extended, False, *given)
             if extended and (self.bsdf_samples or _has_delta(scene)):
-                colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples, choice)
+                colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples)
             if self.max_depth != 2:
                 parameters = self.max_depth, hit, self.shadows, self.bsdf_samples
-                choice = self._choice(scene, scene.emitters(), 1)
-                colour += indirect_light(scene, sampler, si, bsdf, *parameters, choice)
+                colour += indirect_light(scene, sampler, si, bsdf, *parameters)
             environment = scene.environment() is not None and not self.hide_emitters
             return colour, active if environment else hit, []
-
-        def _first_surface(self, scene, ray, active):
-            pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-            if self.hide_emitters:
-                skip = active & pi.is_valid() & (pi.shape.emitter() != None)  # noqa: E711 lane-wise
-                si = pi.compute_surface_interaction(ray, mi.RayFlags.Minimal, skip)
-                beyond = self.skip_area_emitters(scene, si.spawn_ray(ray.d), True, skip)
-                pi[skip] = beyond
-            return pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
-
-        def _is_tabulated(self, emitter):
-            return self.environment_albedo is not None and emitter.is_environment()
-
-        def _choice(self, scene, lights, picks=None):
-            """Return the choice among the lights of a list, None if each is evaluated."""
-            most = max(self.light_samples, light_sums.UNROLLED)
-            if not self.light_samples or len(lights) <= most:
-                return None
-            key = picks, len(lights), _is_delta(lights[0])
-            known = self._choices.get(key)
-            if known is None or not all(map(is_, known.lights, lights)):
-                known = LightChoice(scene, lights, picks or self.light_samples)
-                self._choices[key] = known
-            return known
 
         def to_string(self):
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
@@ -134,14 +108,20 @@ def _define():
     mi.register_integrator("direct_all", DirectAllIntegrator)
 
 
-def _is_delta(emitter):
-    return mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
+@dr.syntax
+def _beyond_lamps(scene, ray, active):
+    """Return the first surface that does not shine.
 
-
-def _parted(emitters):
-    """Return the points and directions, and the other emitters."""
-    delta = [emitter for emitter in emitters if _is_delta(emitter)]
-    return delta, [emitter for emitter in emitters if not _is_delta(emitter)]
+    Mitsuba's own integrators go on with the first ray after the last one has hit: its origin is
+    another, so on spheres, disks and cylinders they find another point.
+    """
+    si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
+    skip = active & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise
+    while skip:
+        ray[skip] = si.spawn_ray(ray.d)
+        si[skip] = scene.ray_intersect(ray, mi.RayFlags.All, False, skip)
+        skip &= si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise
+    return si
 
 
 def _has_delta(scene):
@@ -150,7 +130,51 @@ def _has_delta(scene):
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
-def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples, choice):
+def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
+    """Return the contribution of lights; points and directions need no random numbers."""
+
+    def one(sample_direction, sampler):
+        sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
+        point, direction, density, weight = sample_direction(si, sample, active)
+        seen = active & (density > 0)
+        if shadows:
+            seen &= ~scene.ray_test(si.spawn_ray_to(point), seen)
+        wo, context = si.to_local(direction), mi.BSDFContext()
+        if is_delta or not bsdf_samples:
+            return dr.select(seen, bsdf.eval(context, si, wo, seen) * weight, 0)
+        # The balance heuristic: a sample of the BSDF can also find the light.
+        value, bsdf_density = bsdf.eval_pdf(context, si, wo, seen)
+        return dr.select(seen, value * weight * density / (density + bsdf_density), 0)
+
+    targets = [partial(_sampled, light) for light in lights]
+    if len(lights) > UNROLLED:
+        return _looped(targets, one, sampler)
+    return sum((one(target, sampler) for target in targets), mi.Spectrum(0))
+
+
+def _sampled(light, si, sample, active):
+    ds, weight = light.sample_direction(si, sample, active)
+    return ds.p, ds.d, ds.pdf, weight
+
+
+@dr.syntax
+def _looped(targets: Sequence[Callable], one: Callable, sampler: Any) -> Colour:
+    """Sum over lights in a loop.
+
+    Through the emitters' pointers Dr.Jit would trace every live emitter, including the heuristic
+    half's. The sampler is an argument since it changes in the loop.
+    """
+    number = mi.UInt32(0)
+    # A sum of thousands would lose terms below its last digit (Neumaier).
+    total, lost = mi.Spectrum(0), mi.Spectrum(0)
+    while number < len(targets):
+        given = one(partial(dr.switch, number, targets), sampler)
+        total, lost = numerics.add(total, lost, given)
+        number += 1
+    return numerics.summed(total, lost)
+
+
+def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples):
     """One sample of the BSDF, for the emitter that it happens to hit.
 
     Without ``bsdf_samples`` only directions that emitter sampling never takes count.
@@ -163,8 +187,6 @@ def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples, choice):
     ds = mi.DirectionSample3f(scene, hit, si)
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
-    if choice is not None:
-        emitter_pdf *= choice.expected(emitter, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     active &= is_delta | (bsdf_samples > 0)
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
@@ -189,27 +211,12 @@ def indirect_light(
     active: Mask,
     shadows: bool = True,
     bsdf_samples: int = 1,
-    choice: LightChoice | None = None,
 ) -> Colour:
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Paths begin with a sample of the BSDF there. Direct light takes every light in turn; this picks
-    one at random at each later vertex, as Mitsuba's ``path`` does everywhere, or by a choice.
-
-    Parameters
-    ----------
-    scene, sampler, si, bsdf, active
-        Same as in Mitsuba's integrators.
-    max_depth
-        As Mitsuba counts: 2 is direct light, for which the result is 0; -1 is no limit.
-    shadows, bsdf_samples
-        Parameters of the integrator, at every later vertex too.
-    choice
-        :class:`reference.rendering.light_choice.LightChoice` of one pick among all emitters.
-
-    Returns
-    -------
-    mitsuba.Spectrum
+    one at random at each later vertex, as Mitsuba's ``path`` does everywhere. ``max_depth`` counts
+    like Mitsuba's: 2 is direct light, for which the result is 0; -1 is no limit.
     """
     context = mi.BSDFContext()
     limit = mi.UInt32(max_depth if max_depth >= 0 else 0xFFFFFFFF)
@@ -231,22 +238,18 @@ def indirect_light(
         ds = mi.DirectionSample3f(scene, si, previous)
         seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
         # Emitter samples never take the direction that a mirror, glass or a mask needs.
-        emitter_pdf = light_sums.density(scene, previous, ds, seen & ~previous_delta, choice)
+        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        sample = sampler.next_2d(direct)
-        direction, emitter_pdf, is_delta, weight = light_sums.any_one(
-            scene, si, sample, shadows, direct, choice
-        )
-        direct &= emitter_pdf > 0
-        wo = si.to_local(direction)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
+        direct &= ds.pdf > 0
+        wo = si.to_local(ds.d)
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
-        share = emitter_pdf / (emitter_pdf + bsdf_pdf)
-        share = dr.select(is_delta | (bsdf_samples == 0), 1, share)
+        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
         light += dr.select(direct, throughput * value * weight * share, 0)
 
         bs, weight = vertex.sample(
@@ -263,3 +266,45 @@ def indirect_light(
         active &= (largest > 0) & (sampler.next_1d(active) < survival)
         throughput *= dr.rcp(dr.maximum(survival, 1e-6))
     return light
+
+
+class AlbedoTable:
+    """The albedo of a uniform, isotropic BSDF over the cosine of the view direction, RGB.
+
+    If nothing stands between a surface and a constant environment of radiance ``L``, the reflected
+    radiance is ``L a(mu)``, with the albedo for the view direction of cosine ``mu``. It is
+    tabulated once, by Mitsuba's sampling of the BSDF on a rank-1 lattice, and looked up at each
+    camera ray, without Monte Carlo in the image.
+
+    Nodes are even in ``sqrt(mu)``: Fresnel's terms bend most towards grazing. A BSDF that also
+    reflects on its back does so in the same way.
+    """
+
+    DRJIT_STRUCT: ClassVar = {"table": Any}  # what dr.freeze must know of
+
+    def __init__(self, bsdf: Any):
+        self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+        mu = np.linspace(1e-3, 1, NODES) ** 2
+        # Spread out in the kernel: millions of numbers need not be sent.
+        places = dr.arange(mi.UInt32, NODES * SAMPLES)
+        grid_mu = dr.gather(mi.Float, mi.Float(mu), places // SAMPLES)
+        rows = lattice(SAMPLES)[:3]
+        points = [dr.gather(mi.Float, mi.Float(row), places % SAMPLES) for row in rows]
+        si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
+        si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
+        _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))
+        # Thousands of equal terms lose four digits in single precision.
+        means = [
+            mi.Float(dr.block_sum(mi.Float64(channel), SAMPLES) / SAMPLES) for channel in weight
+        ]
+        self.table = dr.ravel(mi.Color3f(*means))
+        dr.eval(self.table)
+
+    def at(self, mu: Number) -> Colour:
+        """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
+        mu = abs(mu) if self.has_back else mu
+        place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
+        place = dr.clip(place, 0, NODES - 1)
+        below = dr.minimum(mi.UInt32(place), NODES - 2)
+        low, high = (dr.gather(mi.Color3f, self.table, below + i) for i in (0, 1))
+        return dr.select(mu > 0, dr.lerp(low, high, place - mi.Float(below)), 0)

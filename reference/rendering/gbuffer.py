@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.arrays import Scene
+from heuristic.convention import Scene
 from heuristic.errors import InputError
 
 GRID = 192
@@ -20,7 +20,7 @@ UNNAMED = "unnamed"
 
 
 @dataclass(frozen=True)
-class Owners:
+class ObjectIds:
     """The object seen by each pixel (H, W), as its position among ids; -1 for none."""
 
     places: np.ndarray
@@ -44,8 +44,8 @@ class GBuffer:
     position: np.ndarray
     normal: np.ndarray
     hit: np.ndarray
-    shape: Owners
-    bsdf: Owners
+    shape: ObjectIds
+    bsdf: ObjectIds
 
     def mean_irradiance(
         self,
@@ -66,13 +66,7 @@ class GBuffer:
 
 
 def require_surface(hit: np.ndarray, name: str) -> None:
-    """Reject an empty picture, whose difference would be 0 whatever is wrong with it.
-
-    Raises
-    ------
-    InputError
-        If no pixel (H, W) sees a surface; the message names the scene.
-    """
+    """Reject a picture (H, W) in which no pixel sees a surface: nothing could differ in it."""
     if not hit.any():
         height, width = hit.shape
         raise InputError(
@@ -116,11 +110,13 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
     )
     seen = np.array(hit).reshape(height, width)
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
-    shapes = _owners(shape, seen)
-    return GBuffer(points, normals, seen, shapes, _told_apart(_owners(si.bsdf(), seen), shapes))
+    shapes = _object_ids(shape, seen)
+    return GBuffer(
+        points, normals, seen, shapes, _named_apart(_object_ids(si.bsdf(), seen), shapes)
+    )
 
 
-def _told_apart(materials: Owners, shapes: Owners) -> Owners:
+def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
     """Name a material without an id, or with another's, after the first shape that shows it."""
     seen, unseen, times = materials.places >= 0, len(shapes.names), Counter(materials.names)
     first = np.full(len(materials.names), unseen)
@@ -134,13 +130,13 @@ def _told_apart(materials: Owners, shapes: Owners) -> Owners:
     return replace(materials, names=tuple(map(named, materials.names, first)))
 
 
-def _owners(pointers, seen):
-    """Return the :class:`Owners` of an array of pointers, one per pixel."""
+def _object_ids(pointers, seen):
+    """Return the :class:`ObjectIds` of an array of pointers, one per pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
     named = zip(found, first, strict=True)
     names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
-    return Owners(np.where(seen, places.reshape(seen.shape), -1), names)
+    return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 
 
 def pixel_rays(

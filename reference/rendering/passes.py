@@ -50,31 +50,17 @@ def passes(
     seed: int,
     count: int,
     *,
-    first: int = 0,
     stream: Stream = Stream.COMPARED,
     progress: Progress | None = None,
     stage: str = "rendering",
 ) -> Generator[Pass, None, None]:
-    """Render passes ``first`` to ``count - 1`` of each renderer, and yield each as it is done.
+    """Render ``count`` passes of each renderer, in its own variant, and yield each as it is done.
 
-    Parameters
-    ----------
-    renderers
-        Each renders in its own variant.
-    seed
-        Seed of the run.
-    count
-        Total number of passes.
-    first
-        Number of passes rendered before.
-    stream
-        Purpose of the passes.
-    progress, stage
-        Called before each pass, and once more when all are done or the caller stops.
+    ``progress`` is called before each pass, and once more when all are done or the caller stops.
     """
-    done = first
+    done = 0
     try:
-        for number in range(first, count):
+        for number in range(count):
             if progress:
                 progress(stage, number, count)
             own = pass_seed(seed, number, stream)

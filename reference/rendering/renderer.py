@@ -7,10 +7,11 @@ standard error here comes from the spread of passes.
 """
 
 import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from copy import copy
-from dataclasses import dataclass
+from math import isqrt
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -19,63 +20,62 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.arrays import Scene
+from heuristic.convention import Scene
 from heuristic.errors import FotismosError, InputError, NonFiniteError
-from reference.planning.plan import Plan
-from reference.rendering import direct
-from reference.rendering.albedo_table import AlbedoTable
+from reference.records import Amount, Record, Size
 from reference.rendering.gbuffer import image_size, resize
-from reference.scene.preparation import PATHS
 
 LARGEST_PASS = 2**26
-"""Samples of one pass, and pixels of an image; `reference.rendering.memory` may allow fewer."""
+"""Samples of one pass, and pixels of an image; memory may allow fewer."""
+
+BYTES_A_PIXEL = 550
+"""At the peak of a comparison: 525 measured between 512 x 512 and 1400 x 1400 pixels."""
+
+BASE = 200 * 2**20
+"""Memory that a comparison of any size takes, in addition to the process before it."""
 
 
 ROUNDING = 1e-5
 """A value below 0 by less than this is a rounding error, in units of display white."""
 
 
-@dataclass(frozen=True)
-class PassTimes:
-    """Times of the passes of one half, in seconds.
+class Times(Record):
+    """Wall times of one rendering in seconds, evaluated and synchronised.
 
-    ``first`` is the time of the first pass, which traces and compiles; ``compilation`` the part
-    that LLVM took, almost nothing for kernels in Dr.Jit's cache on disk. ``median`` is of the
-    passes after the first (or of the first if it is alone).
+    Attributes
+    ----------
+    median_s
+        Median time per pass, once compiled.
+    first_s
+        The first pass, with compilation.
+    compile_s
+        Code generation and back end: almost nothing for kernels in Dr.Jit's cache on disk.
     """
 
-    median: float
-    first: float
-    total: float
-    compilation: float
-    passes: int
+    median_s: Amount
+    passes: Size
+    first_s: Amount
+    total_s: Amount
+    compile_s: Amount | None
+
+    @classmethod
+    def of(cls, passes: Sequence[float], compilation: float) -> "Times":
+        """Return the times of some passes; the median is of those after the first, if any."""
+        return cls(
+            median_s=median(passes[1:] or passes),
+            passes=len(passes),
+            first_s=passes[0],
+            total_s=sum(passes),
+            compile_s=compilation,
+        )
 
 
 class Renderer:
     """One half of a pair, ready to render passes in the variant that it was made in.
 
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene.
-    integrator
-        A Mitsuba integrator; None takes the scene's own.
-    spp
-        Samples per pixel and pass.
-    label
-        Name in error messages.
-    size
-        Width and height to render in place of the film's, of the same shape; None keeps the film's.
-
-    Attributes
-    ----------
-    replays
-        Whether passes after the first replay its kernels, without tracing again.
-
-    Raises
-    ------
-    InputError
-        When rendering, for more samples in a pass than :data:`LARGEST_PASS`.
+    ``integrator`` None takes the scene's own; ``spp`` are samples per pixel and pass; ``label`` is
+    its name in messages; ``size`` is a width and height to render in place of the film's, of the
+    same shape.
     """
 
     def __init__(
@@ -102,18 +102,18 @@ class Renderer:
     def render(self, seed: int) -> Any:
         """Render one pass and return it as a tensor (H, W, 3), noting the time.
 
-        Raises
-        ------
-        InputError
-            With Mitsuba's own reason if it cannot render the scene.
-        NonFiniteError
-            With the first pixel that is NaN or infinite, and their number.
-        InputError
-            Likewise if a user's heuristic gives negative light.
+        ``InputError`` has Mitsuba's own reason if it cannot render the scene, ``NonFiniteError``
+        the first pixel that is NaN or infinite. A user's heuristic may not give negative light.
         """
         if self.size:
             resize(self.scene, self.size)
-        self._require_room()
+        width, height = image_size(self.scene)
+        if width * height * self.spp > LARGEST_PASS:
+            raise InputError(
+                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once"
+                f" are too many: at most {LARGEST_PASS} samples per pass are allowed."
+                " Give fewer with --spp, or a smaller image with --resolution."
+            )
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             begin = perf_counter()
@@ -135,15 +135,20 @@ class Renderer:
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
+        layer = f"{self.label}, pass with seed {seed}"
         if not dr.all(dr.isfinite(image.array)):
-            require_finite(np.array(image), f"{self.label}, pass with seed {seed}")
-        if self._is_users and dr.any(image.array < -ROUNDING) and not self._may_overshoot():
-            require_light(np.array(image), f"{self.label}, pass with seed {seed}")
+            require_finite(np.array(image), layer)
+        if self._is_users and dr.any(image.array < -ROUNDING):
+            plugin = self.scene.sensors()[0].film().rfilter().class_name()
+            if any(
+                kind in plugin for kind in ("Box", "Tent", "Gaussian")
+            ):  # without negative lobes
+                _reject_negative(np.array(image), layer)
         return image
 
     @property
     def replays(self) -> bool:
-        """See the class."""
+        """Whether passes after the first replay its kernels, without tracing again."""
         return self._replayed is not None
 
     def sampled(self, spp: int) -> "Renderer":
@@ -161,7 +166,7 @@ class Renderer:
         given = self.scene, self.integrator, self.spp, seed
         if self._replayed is not None:
             try:
-                if hasattr(self.integrator, "prepare"):
+                if hasattr(self.integrator, "prepare"):  # what cannot be recorded
                     self.integrator.prepare(self.scene)
                 with _no_collection():
                     return self._replayed(*given)
@@ -171,30 +176,9 @@ class Renderer:
                 self._replayed = None
         return _rendered(*given)
 
-    def _may_overshoot(self):
-        """Return whether the film's filter has negative lobes."""
-        found = self.scene.sensors()[0].film().rfilter().class_name()
-        return not any(kind in found for kind in ("Box", "Tent", "Gaussian"))
-
-    def _require_room(self):
-        width, height = image_size(self.scene)
-        if width * height * self.spp > LARGEST_PASS:
-            raise InputError(
-                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once"
-                f" are too many: at most {LARGEST_PASS} samples per pass are allowed."
-                " Give fewer with --spp, or a smaller image with --resolution."
-            )
-
-    def pass_times(self) -> PassTimes:
-        """Return the :class:`PassTimes` of the passes so far."""
-        steady = self.times[1:] or self.times
-        return PassTimes(
-            median=median(steady),
-            first=self.times[0],
-            total=sum(self.times),
-            compilation=self.compilation,
-            passes=len(self.times),
-        )
+    def pass_times(self) -> Times:
+        """Return the :class:`Times` of the passes so far."""
+        return Times.of(self.times, self.compilation)
 
 
 @contextmanager
@@ -205,24 +189,6 @@ def variant(name: str) -> Iterator[None]:
         return
     with mi.scoped_set_variant(name):
         yield
-
-
-def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
-    """Make the integrator that a plan names, for the physical half's scene."""
-    direct.register()
-    description = {"type": plan.integrator, "hide_emitters": hide_emitters}
-    if plan.integrator == "direct":
-        return mi.load_dict(description)
-    description["max_depth"] = plan.max_depth
-    if plan.integrator in PATHS:
-        return mi.load_dict(description | {"rr_depth": plan.rr_depth})
-    names = ("shadows", "bsdf_samples", "light_samples")
-    own = {name: getattr(plan, name) for name in names}
-    integrator = mi.load_dict(description | own)
-    # The effect left out may be the environment itself.
-    if plan.tabulate_environment and scene.environment() is not None:
-        integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
-    return integrator
 
 
 @contextmanager
@@ -249,34 +215,70 @@ def _chain(error):
 
 
 def require_finite(image: np.ndarray, layer: str) -> None:
-    """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity.
-
-    The message gives the layer, the number of pixels and the first one as (x, y), counted from the
-    top left in reading order.
-    """
-    finite = np.isfinite(image)
-    if not finite.all():
+    """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity."""
+    if not np.isfinite(image).all():
         raise NonFiniteError(
-            f"{layer}: {_wrong(image, finite, 'NaN or infinite')}. Look at the surface and the"
-            " lights seen there: an infinite light or a degenerate mesh is the usual cause."
+            f"{layer}: {_wrong(image, np.isfinite(image), 'NaN or infinite')}. Look at the surface"
+            " and the lights seen there: an infinite light or a degenerate mesh is the usual cause."
         )
 
 
-def require_light(image: np.ndarray, layer: str) -> None:
-    """Raise `InputError` if an image holds a value that is negative by more than rounding."""
-    right = image >= -ROUNDING
-    if not right.all():
-        raise InputError(
-            f"{layer}: {_wrong(image, right, 'negative')}. Light must be 0 or more: clamp what"
-            " can be negative, such as drjit.maximum(cosine, 0)."
-        )
+def _reject_negative(image, layer):
+    raise InputError(
+        f"{layer}: {_wrong(image, image >= -ROUNDING, 'negative')}. Light must be 0 or more: clamp"
+        " what can be negative, such as drjit.maximum(cosine, 0)."
+    )
 
 
 def _wrong(image, right, what):
-    """Return how many pixels are wrong, and the first."""
+    """Return how many pixels are wrong, and the first as (x, y), in reading order from top left."""
     wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
     place = np.unravel_index(np.argmax(wrong), wrong.shape)
     return (
         f"{np.count_nonzero(wrong)} of {wrong.size} pixels are {what}, the first at (x, y) ="
         f" ({', '.join(str(index) for index in reversed(place))}): {np.asarray(image)[place]}"
     )
+
+
+def require_memory(name: str, width: int, height: int) -> None:
+    """Reject an image that does not fit into memory, and name the largest that does."""
+    free, need = available_memory(), BASE + BYTES_A_PIXEL * width * height
+    if free is None or need <= free:
+        return
+    pixels = max(free - BASE, 0) // BYTES_A_PIXEL
+    wide = isqrt(pixels * width // height)
+    high = wide * height // width
+    advice = "Not even a small one fits:"
+    if wide and high:
+        advice = f"At most {wide}x{high} pixels of this shape fit: give such a --resolution, or"
+    raise InputError(
+        f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
+        f" {free / 1e9:.2g} GB are free. {advice} free some memory."
+    )
+
+
+def available_memory() -> int | None:
+    """Return the bytes that this process may still take; None if unknown.
+
+    Linux says what programs can take without swapping, and what the process's control group leaves,
+    without the pages of files that can be dropped.
+    """
+    found = []
+    with suppress(OSError, ValueError, KeyError):
+        found.append(1024 * _numbers(Path("/proc/meminfo"))["MemAvailable:"])
+    with suppress(OSError, ValueError, KeyError):  # no group of version 2, or the word "max"
+        own = Path("/proc/self/cgroup").read_text(encoding="utf-8").split("0::/", 1)[1]
+        group = Path("/sys/fs/cgroup") / own.splitlines()[0]
+        allowed, used = (
+            int((group / f"memory.{kind}").read_text(encoding="utf-8"))
+            for kind in ("max", "current")
+        )
+        cached = _numbers(group / "memory.stat")["inactive_file"]
+        found.append(max(allowed - used + cached, 0))
+    return min(found, default=None)
+
+
+def _numbers(file: Path) -> dict[str, int]:
+    """Return the numbers of a file of lines that begin with a name and a number."""
+    lines = (line.split() for line in file.read_text(encoding="utf-8").splitlines())
+    return {words[0]: int(words[1]) for words in lines if len(words) > 1}

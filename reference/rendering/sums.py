@@ -1,25 +1,64 @@
-"""Running sums of passes: their mean, its standard error, and its noise.
+"""Running sums of passes: their mean, its standard error, and how its noise is distributed.
 
-Every standard error here comes from the spread of passes, which are independent.
+Every standard error here comes from the spread of passes, which are independent. Path-traced noise
+is skewed: rare paths carry much of the light, and until one arrives a pixel looks darker, with a
+smaller error, than it is. The third moment of the passes measures such contributions, and means of
+groups of passes show how any number computed from the image scatters.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from math import prod
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.arrays import Array
+from heuristic.convention import Array
 
-POWERS = {"signed": 1, "squares": 2, "cubes": 3}
-ROOTS = {1: lambda value: value, 2: dr.sqrt, 3: dr.cbrt}
+GROUPS = 8
+"""Groups of passes, at most: seven degrees of freedom for an interval."""
 
-PART = 2**20
-"""Values of a sum updated at a time: Dr.Jit's memory comes in powers of two."""
+BLOCK = 8
+"""Side in pixels of the blocks for sampling and for testing marks."""
+
+BLOCKS = 256
+"""Blocks sampled, at most: 16,384 pixels, all of a 128 x 128 image. It bounds memory and time."""
+
+MEAN, DEVIATION, NOISE = ("mean",), ("mean", "squares"), ("mean", "squares", "signed")
+"""What an :class:`Accumulator` can sum."""
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """Means of groups of passes at some pixels.
+
+    Attributes
+    ----------
+    means
+        (K, P, 3): the mean of each group, in doubles. Group k holds passes k, k + 8, k + 16, …
+    sizes
+        (K,): passes of each group.
+    places
+        (P,): the pixels, counted in reading order.
+    blocks
+        (P,): the block of each pixel, numbered from 0 to ``sampled - 1``.
+    sampled, total
+        Blocks that were sampled, and blocks with a counted pixel.
+    """
+
+    means: np.ndarray
+    sizes: np.ndarray
+    places: np.ndarray
+    blocks: np.ndarray
+    sampled: int
+    total: int
+
+    def by_block(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums (B, ...) over the sampled blocks of values (P, ...) of the pixels."""
+        sums = np.zeros((self.sampled, *values.shape[1:]))
+        np.add.at(sums, self.blocks, values)
+        return sums
 
 
 @dataclass(frozen=True)
@@ -28,8 +67,6 @@ class Estimate:
 
     Attributes
     ----------
-    mean
-        Mean of the passes.
     standard_error
         Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
     noise
@@ -43,173 +80,148 @@ class Estimate:
     passes: int
 
 
-class Mean:
-    """The running mean of passes.
+@dataclass(frozen=True)
+class DifferenceEstimate(Estimate):
+    """The mean difference of two halves, and how its noise is distributed.
 
-    Kept as Dr.Jit arrays of double precision, because NumPy would take as long as the rendering; in
-    parts of :data:`PART` values, so updates take almost no extra memory.
-
-    Parameters
+    Attributes
     ----------
-    compact
-        Whether all sums except the mean are kept in single precision, as roots of their power,
-        which gives them the images' range. Each pass adds less than 2e-7 of a sum to its error.
+    third
+        (H, W, 3): third cumulant of ``mean``, without bias from 4 passes on; 0 with fewer.
+        Negative where single contributions to the reference are large.
+    grouped
+        Means of groups of passes at a sample of pixels.
     """
 
-    SUMS: tuple[str, ...] = ("mean",)
+    third: np.ndarray
+    grouped: Grouped
 
-    def __init__(self, compact: bool = False):
+
+class Accumulator:
+    """Running sums of passes, for an :class:`Estimate`; or fewer, for a mean and its error.
+
+    They are Dr.Jit arrays of double precision: NumPy would take as long as the rendering.
+    """
+
+    def __init__(self, moments: Sequence[str] = NOISE):
         self.count = 0
-        self._compact = compact
-        self._shape = ()
-        self._parts: list[dict[str, Array]] = []
+        self._moments, self._shape = tuple(moments), ()
+        self._sums: dict[str, Array] = {}
 
     def add(self, image: Any, less: Any = None) -> None:
         """Add a pass: a tensor (H, W, 3), less another one if given."""
-        flat = flattened(image, less)
+        value = _doubles(image) if less is None else _doubles(image) - _doubles(less)
+        self._shape = tuple(image.shape)
         if self.count == 0:
-            self._shape = tuple(image.shape)
-            self._parts = [
-                {name: self._packed(name, dr.zeros(mi.Float64, len(part))) for name in self.SUMS}
-                for part in self._ranges()
-            ]
+            self._sums = {name: dr.zeros(mi.Float64, len(value)) for name in self._moments}
         self.count += 1
-        for number, (part, kept) in enumerate(zip(self._ranges(), self._parts, strict=True)):
-            places = dr.arange(mi.UInt32, len(part)) + dr.opaque(mi.UInt32, part.start)
-            sums = self._sums(number, len(part))
-            self._step(sums, values(flat, places))
-            kept.update((name, self._packed(name, sums[name])) for name in self.SUMS)
-            del sums
-            dr.eval(kept)
+        self._add(value, self._sums)
+        dr.eval(self._sums)
 
-    def mean(self, dtype: type = float, last: bool = False) -> np.ndarray:
-        """Return the mean of the passes so far, as :meth:`Accumulator.estimate` does."""
-        return self._array("mean", dtype, last)
+    def _add(self, value: Array, sums: dict[str, Array]) -> None:
+        count = self.count
+        step = value - sums["mean"]
+        share = step / dr.opaque(mi.Float64, count)
+        if "cubes" in sums:
+            # The update of a third central moment by one value (Pébay 2008, equation 2.8) takes the
+            # old mean and squares.
+            cubic = dr.opaque(mi.Float64, (count - 1) * (count - 2))
+            sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
+        sums["mean"] += share
+        if "squares" in sums:
+            sums["squares"] += step * (value - sums["mean"])
+        if "signed" in sums:
+            sums["signed"] += value * dr.opaque(mi.Float64, 1 if count % 2 else -1)
 
-    def part(self, name: str, number: int) -> Array:
-        """Return a part of a sum."""
-        return self._unpacked(name, self._parts[number][name])
+    def _array(self, name: str) -> np.ndarray:
+        return np.array(self._sums[name]).reshape(self._shape)
 
-    def state(self) -> dict[str, Callable[..., np.ndarray]]:
-        """Return functions that make the array of each sum, for :meth:`restore`."""
-        sums = {name: partial(self._array, name) for name in self.SUMS}
-        return {"count": lambda: np.array(self.count)} | sums
+    def mean(self, dtype: type = float) -> np.ndarray:
+        """Return the mean of the passes so far."""
+        return self._array("mean").astype(dtype, copy=False)
 
-    def shapes(self, size: tuple[int, int]) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of the arrays of a :meth:`state`, of images (H, W)."""
-        return {"count": ()} | dict.fromkeys(self.SUMS, (*size, 3))
+    def standard_error(self, dtype: type = float) -> np.ndarray:
+        """Return the standard error of the mean."""
+        squares = self._array("squares")
+        squares /= max(self.count - 1, 1) * self.count
+        return np.sqrt(squares, out=squares).astype(dtype, copy=False)
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Resume from the arrays of another :meth:`state`, which are removed from it."""
-        self.count = int(state["count"])
-        self._shape = state[self.SUMS[0]].shape
-        self._parts = [{} for _ in self._ranges()]
-        for name in self.SUMS:
-            flat = state.pop(name).reshape(-1)
-            for part, kept in zip(self._ranges(), self._parts, strict=True):
-                kept[name] = self._packed(name, mi.Float64(flat[part.start : part.stop]))
-            dr.eval(self._parts)
-
-    def _step(self, sums, image):
-        sums["mean"] += (image - sums["mean"]) / dr.opaque(mi.Float64, self.count)
-
-    def _sums(self, number, size):
-        """Return the sums of a part of ``size`` values, in doubles."""
-        return {name: self.part(name, number) for name in self.SUMS}
-
-    def _packed(self, name, total):
-        power = POWERS.get(name)
-        if not self._compact or power is None:
-            return total
-        return mi.Float32(dr.mulsign(ROOTS[power](dr.abs(total)), total))
-
-    def _unpacked(self, name, kept):
-        power = POWERS.get(name)
-        if not self._compact or power is None:
-            return kept
-        root = mi.Float64(kept)
-        return root if power == 1 else root * root * (root if power == 3 else 1.0)
-
-    def _ranges(self):
-        size = prod(self._shape)
-        return [range(start, min(start + PART, size)) for start in range(0, size, PART)]
-
-    def _array(self, name, dtype=float, last=False):
-        """Return a sum as an array; ``last`` frees its memory."""
-        found = np.empty(prod(self._shape), dtype)
-        for part, kept in zip(self._ranges(), self._parts, strict=True):
-            total = self._unpacked(name, kept.pop(name) if last else kept[name])
-            found[part.start : part.stop] = np.array(total)
-        if last:
-            dr.flush_malloc_cache()
-        return found.reshape(self._shape)
-
-
-class Deviations(Mean):
-    """The running mean and spread of passes."""
-
-    SUMS: tuple[str, ...] = ("mean", "squares")
-
-    def standard_error(self, dtype: type = float, last: bool = False) -> np.ndarray:
-        """Return the standard error of the mean, as :meth:`Accumulator.estimate` does."""
-        error = self._array("squares", float, last)
-        error /= max(self.count - 1, 1) * self.count
-        np.sqrt(error, out=error)
-        return error.astype(dtype, copy=False)
-
-    def _step(self, sums, image):
-        step = image - sums["mean"]
-        super()._step(sums, image)
-        sums["squares"] += step * (image - sums["mean"])
-
-
-class Accumulator(Deviations):
-    """Running sums of passes, for an :class:`Estimate`."""
-
-    SUMS: tuple[str, ...] = (*Deviations.SUMS, "signed")
-
-    def _step(self, sums, image):
-        super()._step(sums, image)
-        # Rounded like the sum, so equal passes cancel.
-        image = mi.Float64(mi.Float32(image)) if self._compact else image
-        sums["signed"] += image * dr.opaque(mi.Float64, 1 if self.count % 2 else -1)
-
-    def noise(self, dtype: type = float, last: bool = False) -> np.ndarray:
+    def noise(self, dtype: type = float) -> np.ndarray:
         """Return the noise image of :class:`Estimate`; the number of passes should be even."""
-        noise = self._array("signed", dtype, last)
-        noise /= self.count
-        return noise
+        return (self._array("signed") / self.count).astype(dtype, copy=False)
 
-    def estimate(self, dtype: type = float, last: bool = False) -> Estimate:
-        """Return the estimate so far; the number of passes should be even and at least 2.
-
-        Parameters
-        ----------
-        dtype
-            Type of the arrays.
-        last
-            Whether the sums are no longer needed: each is freed as soon as its array is made.
-        """
-        noise, error = self.noise(dtype, last), self.standard_error(dtype, last)
-        return Estimate(self.mean(dtype, last), error, noise, self.count)
+    def estimate(self, dtype: type = float) -> Estimate:
+        """Return the estimate so far; the number of passes should be even and at least 2."""
+        return Estimate(self.mean(dtype), self.standard_error(dtype), self.noise(dtype), self.count)
 
 
-def flattened(image: Any, less: Any = None) -> Any:
-    """Return the values of one tensor or array (H, W, 3) or two as Dr.Jit arrays."""
-    given = [one for one in (image, less) if one is not None]
-    return [(one if dr.is_tensor_v(one) else mi.TensorXd(one)).array for one in given]
+class DifferenceSums(Accumulator):
+    """Running sums of the passes of a difference, for a :class:`DifferenceEstimate`.
+
+    ``counted`` (H, W) are the pixels from which blocks are sampled.
+    """
+
+    def __init__(self, counted: np.ndarray):
+        super().__init__((*NOISE, "cubes"))
+        self._sample = sample(counted)
+        flat = 3 * self._sample[0][:, None] + np.arange(3)
+        self._index = mi.UInt32(flat.ravel().astype(np.uint32))
+        self._groups = np.zeros((GROUPS, flat.size))
+
+    def _add(self, value: Array, sums: dict[str, Array]) -> None:
+        if len(self._index):
+            own = dr.gather(mi.Float64, value, self._index)
+            self._groups[(self.count - 1) % GROUPS] += np.array(own)
+        super()._add(value, sums)
+
+    def estimate(self, dtype: type = float) -> DifferenceEstimate:
+        """Return the estimate so far, like the base; the third cumulant in doubles."""
+        third, n = self._array("cubes"), self.count
+        # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
+        third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
+        plain = super().estimate(dtype)
+        return DifferenceEstimate(**vars(plain), third=third, grouped=self._grouped())
+
+    def _grouped(self) -> Grouped:
+        sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)
+        sizes = sizes[sizes > 0]
+        means = self._groups[: len(sizes)] / sizes[:, None]
+        places, blocks, total = self._sample
+        shape = (len(sizes), len(places), 3)
+        sampled = int(blocks.max()) + 1 if len(blocks) else 0
+        return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
 
 
-def values(images: Any, places: Array) -> Array:
-    """Return some values of the first flat image in doubles, less those of a second one."""
-    found = [mi.Float64(dr.gather(type(image), image, places)) for image in images]
-    return found[0] - found[1] if len(found) == 2 else found[0]
+def block_numbers(counted: np.ndarray) -> np.ndarray:
+    """Return the number of the block of each counted pixel, (N,), in reading order."""
+    rows, columns = np.nonzero(counted)
+    across = -(-counted.shape[1] // BLOCK)
+    return rows // BLOCK * across + columns // BLOCK
 
 
-def add_difference(sums: Any, images: Any) -> None:
+def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Draw blocks that hold counted pixels; always the same for the same image.
+
+    It returns places, blocks and total as in :class:`Grouped`.
+    """
+    own = block_numbers(counted)
+    numbers = np.unique(own)
+    # A random draw, not every n-th block: a stride could align with the image.
+    chosen = np.random.default_rng(0).permutation(len(numbers))[:BLOCKS]
+    chosen = numbers[np.sort(chosen)]
+    inside = np.isin(own, chosen)
+    places = np.flatnonzero(counted)[inside]
+    return places, np.searchsorted(chosen, own[inside]), len(numbers)
+
+
+def add_difference(sums: Sequence[Accumulator], images: Any) -> None:
     """Add the images of both halves, and their difference, to three sums."""
     heuristic, reference = images
-    # First, since it may use the means of earlier passes.
-    sums[2].add(heuristic, reference)
     sums[0].add(heuristic)
     sums[1].add(reference)
+    sums[2].add(heuristic, reference)
+
+
+def _doubles(image: Any) -> Array:
+    """Return the values of a tensor or array (H, W, 3) as doubles."""
+    return mi.Float64((image if dr.is_tensor_v(image) else mi.TensorXd(image)).array)

@@ -4,6 +4,7 @@ Both halves of a pair are derived from one such graph. It comes from an XML file
 dictionary, and knows the file and line of each node for error messages.
 """
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,12 +13,17 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import backend, light
+from heuristic import lights, llvm
 from heuristic.errors import InputError, unknown
-from heuristic.plugins import mapped
+from heuristic.plugins import textures
 
 FILENAME = "filename"
 """The parameter with which every plugin names its file."""
+
+CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[: ]*".*', re.DOTALL)
+"""Ends of messages that repeat a line of a file, which may be any file."""
+
+LONG = re.compile(r'("[^"]{60})[^"]+([^"]{20})(?=")')
 
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
@@ -28,21 +34,15 @@ KINDS_OF_OWN_PLUGINS = {
     "heuristic_glow": mi.ObjectType.Emitter,
     "heuristic_tilt": mi.ObjectType.Texture,
 }
-KINDS_OF_OWN_PLUGINS |= dict.fromkeys(light.PLUGINS, mi.ObjectType.Emitter)
-KINDS_OF_OWN_PLUGINS |= dict.fromkeys(mapped.KINDS, mi.ObjectType.Texture)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(lights.PLUGINS, mi.ObjectType.Emitter)
+KINDS_OF_OWN_PLUGINS |= dict.fromkeys(textures.KINDS, mi.ObjectType.Texture)
 
 
 def set_variant(variant: str) -> None:
-    """Switch Mitsuba to one of the variants that fotismos supports.
-
-    Raises
-    ------
-    InputError
-        For any other name.
-    """
-    if variant not in backend.VARIANTS:
-        raise unknown("variant", variant, backend.VARIANTS)
-    backend.use_threads()
+    """Switch Mitsuba to one of the variants that fotismos supports."""
+    if variant not in llvm.VARIANTS:
+        raise unknown("variant", variant, llvm.VARIANTS)
+    llvm.use_threads()
     mi.set_variant(variant)
 
 
@@ -62,17 +62,17 @@ class Graph:
 
     def copy(self) -> "Graph":
         """Return a copy that can be edited independently."""
-        copy = Graph(self.name, self.config, Parser.ParserState(self.state))
-        copy.folders = list(self.folders)
-        copy.kinds = self.kinds
-        copy.resolver = self.resolver
-        return copy
+        return self._of(Parser.ParserState(self.state))
+
+    def _of(self, state: Any) -> "Graph":
+        graph = Graph(self.name, self.config, state)
+        graph.folders, graph.kinds, graph.resolver = list(self.folders), self.kinds, self.resolver
+        return graph
 
     def part(self, index: int) -> "Graph":
         """Return a graph of a node, which comes first, and copies of everything it refers to."""
-        part = Graph(self.name, self.config, Parser.ParserState())
+        part = self._of(Parser.ParserState())
         part.state.files = self.state.files
-        part.folders, part.kinds, part.resolver = list(self.folders), self.kinds, self.resolver
         given = [index, *(one for one in self.nodes_in_use(index) if one != index)]
         places = {one: place for place, one in enumerate(given)}
         paths = list(self.state.node_paths)  # without files and added nodes
@@ -91,14 +91,21 @@ class Graph:
     def instantiate(self, index: int = 0) -> Any:
         """Make the Mitsuba scene, without merging shapes; or only the object of another node.
 
-        Raises
-        ------
-        InputError
-            With Mitsuba's own message if a plugin rejects its parameters.
+        InputError has Mitsuba's own message if a plugin rejects its parameters.
         """
-        state = Parser.ParserState(self.state)
         if index:
-            state.nodes[0] = Parser.SceneNode(state.nodes[index])
+            return self.part(index).instantiate()
+        try:
+            made = self._made()
+        except Exception as error:  # plugins may raise anything, in Python or in Mitsuba
+            message = plain_message(error) + self._culprits(error)
+            raise InputError(f"{self.name}: {message}") from error
+        if isinstance(made, mi.Scene):
+            self._require_extents(made)
+        return made
+
+    def _made(self) -> Any:
+        state = Parser.ParserState(self.state)
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118  Properties is not a mapping
                 if isinstance(node.props[key], mi.TensorXf):  # a plugin removes it
@@ -108,36 +115,22 @@ class Graph:
         # A Python plugin that evaluates something while several threads make plugins would wait
         # forever for a thread that waits for Python.
         self.config.parallel = not any(map(_is_python, state.nodes))
-        try:
-            with resolving(self.resolver):
-                made = Parser.instantiate(self.config, state)
-        except Exception as error:  # plugins may raise anything, in Python or in Mitsuba
-            raise InputError(f"{self.name}: {_message(error)}{self._culprits(error)}") from error
-        made = made[0] if isinstance(made, list) else made
-        if isinstance(made, mi.Scene):
-            self._require_extents(made)
-        return made
+        with resolving(self.resolver):
+            made = Parser.instantiate(self.config, state)
+        return made[0] if isinstance(made, list) else made
 
-    def _culprits(self, error):
+    def _culprits(self, error: Exception) -> str:
         """Name the files that cannot be read, if a message does not."""
-        files = {index: self.file(index) for index in self.nodes_in_use()}
-        known = [(index, path) for index, path in files.items() if path is not None]
-        told = str(error).rpartition("plugin of type")[2]
-        if any(path.name in told for _, path in known):
+        files = {index: path for index in self.nodes_in_use() if (path := self.file(index))}
+        if any(path.name in str(error).rpartition("plugin of type")[2] for path in files.values()):
             return ""
-        found = [str(path) for index, path in known if self._fails(index)]
-        return f" (the file {', '.join(found)})" if found else ""
-
-    def _fails(self, index):
-        """Return whether a node cannot be made on its own either."""
-        state = Parser.ParserState(self.state)
-        state.nodes[0] = Parser.SceneNode(state.nodes[index])
-        try:
-            with files_from(self.folder):
-                Parser.instantiate(self.config, state)
-        except Exception:
-            return True
-        return False
+        broken = []
+        for index, path in files.items():
+            try:
+                self.part(index)._made()
+            except Exception:
+                broken.append(str(path))
+        return f" (the file {', '.join(broken)})" if broken else ""
 
     def _require_extents(self, scene):
         """Reject shapes that extend to infinity, which rays never hit."""
@@ -191,20 +184,9 @@ class Graph:
         return Parser.file_location(self.state, self.state.nodes[index])
 
     def file(self, index: int) -> Path | None:
-        """Return the path of the file that a node reads, None if there is none.
-
-        It is the path where Mitsuba finds the file.
-        """
-        props = self.props(index)
-        name = props.get(FILENAME, None)
-        if not isinstance(name, str) or "\0" in name:
-            return None
-        with resolving(self.resolver):
-            path = Path(str(mi.file_resolver().resolve(name)))
-        try:
-            return path if path.exists() else None
-        except OSError:  # a name that is too long
-            return None
+        """Return where Mitsuba finds the file that a node names, None if nothing is there."""
+        name = self.props(index).get(FILENAME, None)
+        return find_file(self.resolver, name) if isinstance(name, str) else None
 
     def children(self, index: int, kind: Any) -> list[tuple[str, int]]:
         """Return ``(key, index)`` of a node's children of a kind."""
@@ -263,6 +245,17 @@ def files_from(folder: Path) -> Any:
     return widened
 
 
+def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:
+    """Return the path where Mitsuba finds a name, None if nothing is there."""
+    if not name or "\0" in name:
+        return None
+    path = Path(str((resolver or mi.file_resolver()).resolve(name)))
+    try:
+        return path if path.exists() else None
+    except OSError:  # a name that is too long
+        return None
+
+
 @contextmanager
 def resolving(resolver: Any) -> Iterator[None]:
     """Let Mitsuba find files with a resolver, to which a ``<path>`` in a scene adds places."""
@@ -283,13 +276,15 @@ def _is_python(node):
     return is_unknown or node.props.plugin_name() in KINDS_OF_OWN_PLUGINS
 
 
-def _message(error):
-    """Return Mitsuba's message; for a Python plugin, its message and location."""
+def plain_message(error: Exception) -> str:
+    """Return Mitsuba's message without what a file holds; for a Python plugin, its own message."""
     text = str(error).strip()
-    if "Traceback" not in text:
-        return text
-    place, _, trace = text.partition(": failed to instantiate")
-    return f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
+    if isinstance(error, UnicodeDecodeError):
+        text = error.object.decode("utf-8", "replace")
+    if "Traceback" in text:
+        place, _, trace = text.partition(": failed to instantiate")
+        text = f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
+    return LONG.sub(r"\1…\2", CONTENT.sub(r"\1", text))
 
 
 def properties(plugin: str, **values: Any) -> Any:

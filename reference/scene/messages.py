@@ -31,8 +31,8 @@ class _Listener(mi.Appender):
 class _Plain(mi.Formatter):
     """Only the words of a message, without time, thread and line of code."""
 
-    def format(self, *told: Any) -> str:
-        return told[-1]
+    def format(self, *parts: Any) -> str:
+        return parts[-1]
 
 
 def divert(hear: Callable[[str], Any]) -> None:

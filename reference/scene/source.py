@@ -1,17 +1,21 @@
-"""The source of a scene, read once: the file parsed, the script run, its files listed."""
+"""The source of a scene, read once: the file parsed, the script run, its files listed, a digest."""
 
-from collections.abc import Callable, Mapping
+import hashlib
+import runpy
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from heuristic.errors import InputError, suggestion
+from heuristic.user_code import contained
 from reference.scene import messages
-from reference.scene.graph import Graph, files_from, resolving
-from reference.scene.reading import included, placeholders, require_named_files
+from reference.scene.files import SCRIPT, included, require_named_files
+from reference.scene.graph import Graph, Reference, files_from, find_file, plain_message, resolving
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -19,125 +23,160 @@ Edit = Callable[[Graph], None]
 
 
 @dataclass(frozen=True)
+class Script:
+    """A function that runs a Python file and returns its scene, a dictionary."""
+
+    path: Path
+
+    def __call__(self) -> Any:
+        """Run the file; :class:`heuristic.errors.InputError` if it raises or has no scene."""
+        try:
+            with contained(self.path):
+                scene = runpy.run_path(str(self.path)).get(SCRIPT)
+                made = scene() if callable(scene) else scene
+        except (Exception, SystemExit) as error:  # a user's code may raise anything
+            raise InputError(f"{self.path}: {type(error).__name__}: {error}") from error
+        if not isinstance(made, Mapping):
+            raise InputError(
+                f"{self.path}: `{SCRIPT}` is {type(made).__name__}. It must be a dictionary for"
+                " mitsuba.load_dict, or a function that returns one."
+            )
+        return made
+
+
+@dataclass(eq=False)
 class Source:
     """The source of a scene: a name, and an XML file or a dictionary.
 
-    Parameters
-    ----------
-    name
-        Name in reports and of the output folder.
-    content
-        Path of a Mitsuba XML file, a dictionary for ``mitsuba.load_dict``, or a function that
-        returns one.
-    parameters
-        Values for the ``$name`` placeholders of an XML file.
-    edits
-        Functions that change the graph, in order.
+    ``content`` is the path of a Mitsuba XML file, a dictionary for ``mitsuba.load_dict``, or a
+    function that returns one, ``parameters`` are values for the ``$name`` placeholders of a file,
+    and ``edits`` change the graph, in order. What was read is kept, and shared by all that are
+    edited from one: ``graphs`` by variant, ``made`` the dictionary that the function returned, and
+    ``messages``, what Mitsuba said meanwhile.
     """
 
     name: str
     content: Content
     parameters: Mapping[str, str] = field(default_factory=dict)
     edits: tuple[Edit, ...] = ()
-    _read: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    messages: list[str] = field(default_factory=list, repr=False)
+    graphs: dict[str, Graph] = field(default_factory=dict, repr=False)
+    made: list[Mapping[str, Any]] = field(default_factory=list, repr=False)
 
     def edited(self, edit: Edit) -> "Source":
         """Return the same scene with one more edit of its graph; it is not read again."""
-        other = replace(self, edits=(*self.edits, edit))
-        object.__setattr__(other, "_read", self._read)
-        return other
+        return replace(self, edits=(*self.edits, edit))
 
     def parse(self) -> Graph:
         """Return the scene's graph for the current variant, to be edited freely.
 
-        A file is parsed once per variant; a function is called once.
-
-        Raises
-        ------
-        InputError
-            With Mitsuba's own message, which names file, line and column, if the file is missing,
-            is not XML, or uses something unknown to Mitsuba.
+        A file is parsed once per variant; a function is called once. InputError has Mitsuba's own
+        message, which names file, line and column.
         """
         variant = mi.variant()
-        if variant not in self._read:
-            with messages.collected(self.said):
-                self._read[variant] = self._parsed(variant)
-        graph = self._read[variant].copy()
+        if variant not in self.graphs:
+            with messages.collected(self.messages):
+                self.graphs[variant] = self._parsed(variant)
+        graph = self.graphs[variant].copy()
         for edit in self.edits:
             edit(graph)
         return graph
 
-    @property
-    def said(self) -> list[str]:
-        """Mitsuba's messages while it read the scene."""
-        return self._read.setdefault("said", [])
-
     def files(self) -> tuple[Path, ...]:
         """Return the files that the scene reads, each where Mitsuba finds it, sorted.
 
-        These are the scene's own file, its includes, every file that an element names, and files
-        that a script read (:class:`reference.scene.script.Script`). The tables of a ``<spectrum
-        filename=...>`` are in the graph as soon as it is parsed.
+        These are the scene's own file or script, its includes, and every file that an element
+        names. The tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
-        found = set(getattr(self.content, "files", ()))
+        found = {self.content.path.resolve()} if isinstance(self.content, Script) else set()
         if isinstance(self.content, (str, PathLike)):
             found |= {Path(str(file)).resolve() for file in graph.state.files}
-        with resolving(graph.resolver):
-            resolver = mi.file_resolver()
-            for index in graph.nodes_in_use():
-                for _, value in graph.props(index).items():
-                    if isinstance(value, str) and (path := _file(resolver, value)):
-                        found.add(path)
+        for index in graph.nodes_in_use():
+            for _, value in graph.props(index).items():
+                path = find_file(graph.resolver, value) if isinstance(value, str) else None
+                if path is not None and path.is_file():
+                    found.add(path.resolve())
         return tuple(sorted(found))
-
-    def _content(self) -> str | PathLike | Mapping[str, Any]:
-        if not callable(self.content):
-            return self.content
-        if "content" not in self._read:
-            self._read["content"] = self.content()
-        return self._read["content"]
-
-    def _require_placeholders(self, path: Path) -> None:
-        """Ensure that the file has a placeholder for each given value."""
-        known = placeholders(path) if self.parameters else set()
-        for name in sorted(set(self.parameters) - known):
-            raise InputError(
-                f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
-                " into the file, or leave the option -D out."
-            )
 
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
-        content, resolver = self._content(), None
+        content, resolver = self.content, None
+        if callable(content):
+            self.made[:] = self.made or [content()]
+            content = self.made[0]
         try:
             if isinstance(content, Mapping):
                 require_named_files(content)
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                included(path, self.parameters)
-                self._require_placeholders(path)
+                self._require_placeholders(included(path, self.parameters).placeholders)
                 resolver = files_from(path.resolve().parent)
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
-        except (RuntimeError, ValueError) as error:  # the latter for bytes that are not UTF-8
-            raise InputError(f"{self.name}: {error}") from error
+        except (RuntimeError, ValueError) as error:
+            raise InputError(f"{self.name}: {plain_message(error)}") from error
         if state.root.type != mi.ObjectType.Scene:
             raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
 
+    def _require_placeholders(self, known: set[str]) -> None:
+        """Ensure that the file has a placeholder for each given value."""
+        for name in sorted(set(self.parameters) - known):
+            raise InputError(
+                f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
+                " into the file, or leave the option -D out."
+            )
 
-def _file(resolver: mi.FileResolver, value: str) -> Path | None:
-    """Return the file that a text names, if any."""
-    if not value or len(value) > 4096 or "\0" in value or "\n" in value:
-        return None
-    path = Path(str(resolver.resolve(value)))
-    try:
-        return path.resolve() if path.is_file() else None
-    except OSError:
-        return None
+
+def digest(source: Source) -> str:
+    """Return a digest of a scene in the current variant, and of every file that it reads.
+
+    It holds the graph with all values at full precision, objects that a script made, and the
+    content of :meth:`Source.files`.
+    """
+    found = hashlib.sha256()
+    graph = source.parse()
+    for index in graph.nodes_in_use():
+        props = graph.props(index)
+        found.update(f"{index} {props.plugin_name()} {props.id()}\0".encode())
+        for key, value in props.items():
+            for part in _parts(value):
+                found.update(f"{key} {len(part)} ".encode() + part)
+    for path in source.files():
+        try:
+            with path.open("rb") as file:
+                found.update(hashlib.file_digest(file, "sha256").digest())
+        except OSError as error:
+            raise InputError(
+                f"{source.name}: {path}: {error.strerror or error}. The scene names this file:"
+                " ensure that it can be read."
+            ) from error
+    return found.hexdigest()
+
+
+def _parts(value: Any) -> Iterator[bytes]:
+    """Yield a property's value as bytes; printed, floats are rounded and arrays shortened."""
+    if value is None or isinstance(value, (bool, int, float, str)):
+        yield repr(value).encode("utf-8", "surrogateescape")
+    elif isinstance(value, Reference):
+        yield f"node {value.index()}".encode()
+    elif hasattr(value, "wavelengths"):
+        yield repr((list(value.wavelengths), list(value.values))).encode()
+    elif hasattr(value, "matrix"):
+        yield np.array(value.matrix).tobytes()
+    elif hasattr(value, "__array__") or hasattr(value, "__array_interface__"):
+        array = np.array(value)
+        yield f"{array.dtype} {array.shape}".encode()
+        yield array.tobytes()
+    else:
+        yield str(value).encode()
+        if isinstance(value, mi.Object):
+            for name, inner in mi.traverse(value).items():
+                yield name.encode()
+                yield from _parts(inner)

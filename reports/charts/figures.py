@@ -19,14 +19,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from comparisons.comparison import ComparisonRecord
+from comparisons.comparison import Comparison, ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.departure.metrics import LEADING
-from comparisons.record import Comparison
-from reports.charts import error_over_time, histograms, vega
+from reports.charts import cost_charts, histograms, vega
 from reports.charts.theme import Spec
-from reports.files import images, ownership
-from reports.terminal.printing import number
+from reports.files import images
+from reports.run import results
+from reports.terminal.words import number
 
 FORMATS = ("svg", "pdf")
 
@@ -52,10 +52,10 @@ MARKS = {
 
 def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
     """Write the strip and the histograms of a comparison as ``folder/name...`` in each format."""
-    ownership.folder(folder)
+    results.own(folder)
     figure = strip(comparison)
     for kind in FORMATS:
-        ownership.write(folder / f"{name}.{kind}", drawn(figure, kind))
+        results.write(folder / f"{name}.{kind}", drawn(figure, kind))
     for metric, spec in histograms.specs(comparison.record).items():
         write_chart(folder, f"{name}-histogram-{metric}", spec)
 
@@ -67,14 +67,14 @@ def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
     """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
-    write_chart(folder, f"{name}-cost", error_over_time.error_over_time(record))
+    write_chart(folder, f"{name}-cost", cost_charts.titled(record))
 
 
 def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
     """Write a Vega-Lite specification as ``folder/name`` in each format."""
-    ownership.folder(folder)
+    results.own(folder)
     for kind in FORMATS:
-        ownership.write(folder / f"{name}.{kind}", vega.paper(spec, kind))
+        results.write(folder / f"{name}.{kind}", vega.paper(spec, kind))
 
 
 def strip(comparison: Comparison) -> Figure:

@@ -10,7 +10,7 @@ from comparisons.departure.metrics import METRICS
 from comparisons.departure.statistics import Histogram, Summary
 from reports.charts import vega
 from reports.charts.theme import Spec
-from reports.terminal.printing import number, percent
+from reports.terminal.words import number, percent
 
 #: Size of the chart in pixels; the page scales it.
 WIDTH, HEIGHT = 300, 130

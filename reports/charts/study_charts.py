@@ -1,26 +1,11 @@
-"""The figures of a study as charts.
-
-A figure is a table of the study's TOML file::
-
-    [[figure]]
-    name = "departure"             # of the file
-    title = "Departure over roughness and incidence"
-    part = "lobe"
-    kind = "map"                   # or "lines"
-    x = "light_angle"
-    y = "alpha"                    # maps
-    values = ["dE2000"]            # one column for a map, one or more for lines
-    series = "alpha"               # lines: one for each value of this parameter
-    where = { int_ior = [1.5, 2] } # the points that are shown
-    rule = 1.0                     # lines: a horizontal line
-    log = ["x", "y"]               # lines: logarithmic axes
+"""The figures of a study as charts; for their keys see :mod:`comparisons.study.design`.
 
 Points that differ in other parameters are averaged, and the subtitle says over which. Colours are
 viridis and magma, whose lightness rises steadily: they also work in grey.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
 import altair as alt
@@ -29,17 +14,14 @@ import pyarrow as pa
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
-from comparisons.study import query
-from comparisons.study.design import Part, Study
-from heuristic.errors import InputError, unknown
+from comparisons.study import dataset
+from comparisons.study.dataset import Row
+from comparisons.study.design import StudyFigure, StudyFile, StudyPart
 from reports.charts.theme import FAINT, Spec
 from reports.charts.vega import specification
 
-KEYS = {"name", "title", "part", "kind", "x", "y", "values", "series", "where", "rule", "log"}
-NEEDED = {"map": {"name", "title", "part", "x", "y", "values"},
-          "lines": {"name", "title", "part", "x", "values"}}  # fmt: skip
-Named: TypeAlias = Mapping[str, Any]
-"""A figure of a TOML file, or a row of the dataset."""
+Cell: TypeAlias = dict[str, Any]
+"""A mark of a chart: ``x``, perhaps ``y``, and ``value``."""
 
 SYMBOLS = {
     "alpha": "α",
@@ -58,70 +40,47 @@ DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
 """Dashes of lines of several columns."""
 
 
-def check(figure: Named, study: Study) -> None:
-    """Ensure that a figure of a TOML file is complete, and that its part and parameters exist.
-
-    Raises
-    ------
-    InputError
-        Naming the missing or unknown keys.
-    """
-    where = f"figure {figure.get('name')!r}"
-    kind = figure.get("kind")
-    if kind not in NEEDED:
-        raise unknown(f"{where}: kind =", kind, NEEDED)
-    missing, surplus = NEEDED[kind] - set(figure), set(figure) - KEYS
-    if missing or surplus:
-        verb, names = ("lacks", missing) if missing else ("has", surplus)
-        wrong = f"{verb} {', '.join(sorted(names))}"
-        raise InputError(f"{where} {wrong}. It needs {', '.join(sorted(NEEDED[kind]))}.")
-    parts = {part.name: part for part in study.parts}
-    if figure["part"] not in parts:
-        raise unknown(f"{where}: part =", figure["part"], parts)
-    spans = parts[figure["part"]].spans
-    for name in (figure["x"], figure.get("y"), figure.get("series"), *figure.get("where", ())):
-        if name is not None and name not in spans:
-            raise unknown(f"{where}: parameter", name, spans)
-
-
-def default_figures(study: Study) -> Iterator[dict[str, Any]]:
-    """Yield a figure for each part without one: the departure over its first parameters."""
-    shown = {figure["part"] for figure in study.figures}
+def all_figures(study: StudyFile) -> Iterator[StudyFigure]:
+    """Yield a study's figures; a part without one gets the departure over its parameters."""
+    yield from study.figures
+    shown = {figure.part for figure in study.figures}
     for part in study.parts:
-        names = part.varying
-        if part.name in shown or not names:
-            continue
-        over = {"kind": "lines"} if len(names) == 1 else {"kind": "map", "y": names[0]}
-        named = dict.fromkeys(("name", "title", "part"), part.name)
-        figure: dict[str, Any] = {**named, "values": ["dE2000"]}
-        yield figure | over | {"x": names[-1]}
+        if part.name not in shown and (names := part.varying):
+            is_map = len(names) > 1
+            yield StudyFigure(
+                name=part.name,
+                title=part.name,
+                part=part.name,
+                kind="map" if is_map else "lines",
+                x=names[-1],
+                y=names[0] if is_map else None,
+                values=("dE2000",),
+            )
 
 
-def chart(figure: Named, table: pa.Table, study: Study) -> Spec:
+def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
     """Return the Vega-Lite specification of a figure.
 
-    Raises
-    ------
-    InputError
-        If a column does not exist, or no point is to be shown.
+    ``InputError`` if a column does not exist, or no point is to be shown.
     """
-    for column in figure["values"]:
-        query.require(table, column)
-    part = next(part for part in study.parts if part.name == figure["part"])
-    data = query.rows(table, figure["part"], figure.get("where"))
-    shown = {figure["x"], figure.get("y"), figure.get("series"), *figure.get("where", ())}
+    for column in figure.values:
+        dataset.require(table, column)
+    (part,) = (part for part in study.parts if part.name == figure.part)
+    data = dataset.rows(table, figure.part, figure.where)
+    shown = {figure.x, figure.y, figure.series, *figure.where}
     over = [name for name in part.varying if name not in shown]
-    make = {"map": _map, "lines": _lines}[figure["kind"]]
-    title = {"text": figure["title"]}
+    title = {"text": figure.title}
     if over and part.design == "grid":
         title["subtitle"] = f"mean over {', '.join(map(_label, over))}"
+    make = {"map": _map, "lines": _lines}[figure.kind]
     spec = specification(make(figure, table, part, data))
-    return spec | {"title": title, "description": figure["title"], "padding": 8}
+    return spec | {"title": title, "description": figure.title, "padding": 8}
 
 
-def _map(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> alt.TopLevelMixin:
-    (column,) = figure["values"]
-    names = figure["x"], figure["y"]
+def _map(
+    figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
+) -> alt.TopLevelMixin:
+    (column,), names = figure.values, (figure.x, str(figure.y))
     is_grid, is_word = part.design == "grid", isinstance(data[0][column], str)
     if is_grid:
         cells = _mean(data, names, column)
@@ -135,7 +94,17 @@ def _map(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> a
     else:
         scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
         colour = alt.Color("value:Q", title=_label(column).split(" "), scale=scale)
-    chart = alt.Chart(alt.Data(values=cells)).encode(**_places(names, table, part))
+    x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
+    if is_grid:
+        x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
+        y = y.type("ordinal").sort("descending").axis(labelOverlap="greedy")
+    else:
+        x, y = (
+            place.scale(type="log" if part.levels[name].is_log else "linear",
+                        nice=not part.levels[name].is_log)
+            for place, name in zip((x, y), names, strict=True)
+        )  # fmt: skip
+    chart = alt.Chart(alt.Data(values=cells)).encode(x=x, y=y)
     marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
     layers = [marks.encode(color=colour)]
     if is_word and is_grid:
@@ -143,93 +112,67 @@ def _map(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> a
     return alt.layer(*layers).properties(width=420, height=300)
 
 
-def _places(names: Sequence[str], table: pa.Table, part: Part) -> dict[str, Any]:
-    """Return the axes of a map: steps of a grid's parameters, or spans of sampled ones."""
-    x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
-    if part.design == "grid":
-        x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
-        return {"x": x, "y": y.type("ordinal").sort("descending").axis(labelOverlap="greedy")}
-    logarithmic = [getattr(part.spans[name], "logarithmic", False) for name in names]
-    return {
-        axis: place.scale(type="log" if is_log else "linear", nice=not is_log)
-        for axis, place, is_log in zip("xy", (x, y), logarithmic, strict=True)
-    }
-
-
-def _lines(figure: Named, table: pa.Table, part: Part, data: Sequence[Named]) -> alt.TopLevelMixin:
-    x, series, columns = figure["x"], figure.get("series"), figure["values"]
-    keys = (x, series) if series else (x,)
+def _lines(
+    figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
+) -> alt.TopLevelMixin:
+    columns, series = figure.values, figure.series
+    keys = (figure.x, series) if series else (figure.x,)
     values = [
-        cell | {"quantity": _label(column)}
+        {**cell, "quantity": _label(column)}
         for column in columns
         for cell in _mean(data, keys, column)
     ]
-    title = _label(columns[0]) if len(columns) == 1 else _common(columns)
+    # Of several columns, the words that their names share, such as `albedo` of both halves.
+    words = [column.split("_") for column in columns]
+    shared = [word for word in words[0] if all(word in other for other in words)]
+    label = _label(columns[0]) if len(columns) == 1 else " ".join(shared) or "value"
     scales: list[Spec] = [
-        {"type": "log"} if axis in figure.get("log", ()) else {"zero": axis == "y"} for axis in "xy"
+        {"type": "log"} if axis in figure.log else {"zero": axis == "y"} for axis in "xy"
     ]
-    chart = (
-        alt.Chart()
-        .mark_line(strokeWidth=2)
-        .encode(
-            x=_axis(alt.X, table, x).scale(nice=False, **scales[0]),
-            y=alt.Y("value:Q", title=_with(title, query.unit(table, columns[0]))).scale(
-                **scales[1]
-            ),
-        )
-    )
+    y = alt.Y("value:Q", title=_with_unit(label, table, columns[0])).scale(**scales[1])
+    x = _axis(alt.X, table, figure.x).scale(nice=False, **scales[0])
+    chart = alt.Chart().mark_line(strokeWidth=2).encode(x=x, y=y)
     if series:
-        inks = alt.Scale(range=_inks(len({value["y"] for value in values})))
-        chart = chart.encode(color=alt.Color("y:O", title=_title(table, series), scale=inks))
+        # Viridis without its light end, which is invisible on white.
+        shades = colormaps["viridis"](np.linspace(0, 0.8, len({cell["y"] for cell in values})))
+        inks = alt.Scale(range=[to_hex(shade) for shade in shades])
+        title = _with_unit(_label(series), table, series)
+        chart = chart.encode(color=alt.Color("y:O", title=title, scale=inks))
     if len(columns) > 1:
         dash = alt.StrokeDash("quantity:N", title=None, sort=[_label(name) for name in columns])
         dash = dash.scale(range=DASHES[: len(columns)]).legend(labelLimit=300, symbolSize=400)
         chart = chart.encode(strokeDash=dash)
     layers = [chart]
-    if "rule" in figure:
+    if figure.rule is not None:
         rule = alt.Chart(alt.Data(values=[{}])).mark_rule(strokeDash=[3, 3], color=FAINT)
-        layers.append(rule.encode(y=alt.datum(figure["rule"])))
+        layers.append(rule.encode(y=alt.datum(figure.rule)))
     return alt.layer(*layers, data=alt.Data(values=values)).properties(width=460, height=300)
 
 
-def _mean(data: Sequence[Named], keys: Sequence[str], column: str) -> list[dict[str, Any]]:
+def _mean(data: Sequence[Row], keys: Sequence[str], column: str) -> list[Cell]:
     """Return a column's mean for each combination of keys; of words, the most frequent."""
     groups: dict[tuple[Any, ...], list[Any]] = defaultdict(list)
     for row in data:
         if row[column] is not None:
             groups[tuple(row[key] for key in keys)].append(row[column])
     cells = []
-    for key, found in sorted(groups.items()):
-        is_word = isinstance(found[0], str)
-        value = max(sorted(set(found)), key=found.count) if is_word else sum(found) / len(found)
+    for key, group in sorted(groups.items()):
+        is_word = isinstance(group[0], str)
+        value = max(sorted(set(group)), key=group.count) if is_word else sum(group) / len(group)
         cells.append(dict(zip(("x", "y"), key, strict=False)) | {"value": value})
     return cells
 
 
-def _inks(count: int) -> list[str]:
-    """Return colours along viridis without its light end, which is invisible on white."""
-    return [to_hex(ink) for ink in colormaps["viridis"](np.linspace(0, 0.8, count))]
-
-
 def _axis(channel: Any, table: pa.Table, name: str) -> Any:
     field = {alt.X: "x", alt.Y: "y"}[channel]
-    return channel(f"{field}:Q", title=_title(table, name)).axis(format=".3~g")
+    title = _with_unit(_label(name), table, name)
+    return channel(f"{field}:Q", title=title).axis(format=".3~g")
 
 
-def _title(table: pa.Table, column: str) -> str:
-    return _with(_label(column), query.unit(table, column))
-
-
-def _with(label: str, unit: str) -> str:
+def _with_unit(label: str, table: pa.Table, column: str) -> str:
+    unit = dataset.unit(table, column)
     return f"{label} ({unit})" if unit not in ("", "1") else label
 
 
 def _label(column: str) -> str:
     return SYMBOLS.get(column, column.replace("_", " "))
-
-
-def _common(columns: Sequence[str]) -> str:
-    """Return the words common to several columns' names, such as ``albedo`` of both halves."""
-    words = [column.split("_") for column in columns]
-    shared = [word for word in words[0] if all(word in other for other in words)]
-    return " ".join(shared) or "value"

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-from reference.effects import EFFECTS
+from reference.planning.effects import EFFECTS
 
 Spec: TypeAlias = dict[str, Any]
 """A Vega-Lite specification, or a part of one."""
 
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
-"""Colours of effects with a price: Okabe and Ito's seven for effects that often come together, and
+"""Colours of effects in attributions: Okabe and Ito's seven for those that often come together, and
 three of Tol's muted scheme. Both suit the common colour deficiencies."""
 
 EFFECTS_TITLE = "Effects"

@@ -1,24 +1,18 @@
-"""Charts: Vega-Lite specifications, drawn as SVG here and live in the page.
+"""Charts: Vega-Lite specifications, drawn as SVG.
 
-Paper and browsers without JavaScript show the SVG. It takes the colour of the surrounding text, so
-it fits a light and a dark page. The page replaces it with a live chart of the same specification,
-drawn by the page's one Vega bundle. A specification contains its data, and loads nothing.
+In a page the SVG takes the colour of the surrounding text, so it fits a light and a dark one.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from comparisons.store import Entry
 from heuristic.errors import OutputError
 from reports.charts import theme
 from reports.charts.theme import Spec
@@ -35,21 +29,20 @@ IDLE = re.compile(
 
 @dataclass(frozen=True)
 class Figure:
-    """A chart for the page: its title, a sentence, the specification and a picture of it."""
+    """A chart for the page: its title, a sentence, and its picture."""
 
     title: str
     note: str
-    spec: Mapping[str, Any]
     svg: str
 
 
 def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
     """Make a figure of a Vega-Lite specification, whose config overrides the theme.
 
-    Its text may come from users' files: it is escaped in the picture, and is data in the page.
+    Its text may come from users' files: it is escaped in the picture.
     """
     spec = theme.themed(spec, theme.PAGE)
-    return Figure(title, note, spec, _drawn(json.dumps(spec)))
+    return Figure(title, note, _drawn(json.dumps(spec)))
 
 
 def paper(spec: Mapping[str, Any], kind: str = "svg") -> bytes:
@@ -83,37 +76,6 @@ def specification(chart: altair.TopLevelMixin) -> Spec:
     spec = chart.to_dict()
     del spec["config"]  # Altair's default theme
     return spec
-
-
-@lru_cache(maxsize=1)
-def bundle() -> str:
-    """Vega, Vega-Lite and vega-embed as one JavaScript module that sets `window.vegaEmbed`.
-
-    It takes two seconds to make, and is kept in the user's cache if there is one.
-    """
-    import vl_convert
-
-    # The home folder may be missing, or read-only.
-    with suppress(OSError, RuntimeError, OutputError):
-        kept = Entry(_cache() / "vega.json", vl_convert.__version__)  # type: ignore[attr-defined]  # untyped
-        script = (kept.load() or {}).get("script")
-        if not isinstance(script, str):
-            script = _bundled()
-            kept.path.parent.mkdir(parents=True, exist_ok=True)
-            kept.save({"script": script})
-        return script
-    return _bundled()
-
-
-@lru_cache(maxsize=1)
-def _bundled() -> str:
-    return _made("javascript_bundle", "window.vegaEmbed = vegaEmbed;")
-
-
-def _cache() -> Path:
-    """The cache folder (XDG Base Directory Specification)."""
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (given if given.is_absolute() else Path.home() / ".cache") / "fotismos"
 
 
 @lru_cache(maxsize=1024)

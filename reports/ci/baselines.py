@@ -1,7 +1,7 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,18 +9,20 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
+from PIL import Image
 
 from comparisons import atomic
-from comparisons.case import SUFFIXES, Case, Request, file_of, open_case
+from comparisons.atomic import content, require_regular
+from comparisons.case import SUFFIXES, Case, file_of, open_case
 from comparisons.check.baseline import FORMAT_0_1, Baseline, parse
 from comparisons.check.measurement import HALVES
-from comparisons.store import content, require_regular
+from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import in_file
 from reports.files import exr
 
-Pictures = Mapping[str, NDArray[np.floating]]
+Kept = Mapping[str, NDArray[np.floating]]
 """The halves' small pictures, ``{half: (H, W, 3) linear RGB}``."""
 
 
@@ -32,39 +34,20 @@ class BaselineFile:
     baseline: Baseline
 
     def open(self, seed: int | None = None) -> Case:
-        """Open the scene, see :func:`comparisons.case.open_case`.
-
-        Parameters
-        ----------
-        seed
-            Replaces the baseline's.
-        """
+        """Open the scene; ``seed`` replaces the baseline's."""
         options = options_from(self.baseline.options, self.path)
         options |= {} if seed is None else {"seed": seed}
-        return open_case(scene_from(self.baseline.scene, self.path), Request.of(options))
+        return open_case(scene_from(self.baseline.scene, self.path), Options.of(options))
 
-    def pictures(self) -> Pictures | None:
-        """Return the small pictures, or None if the baseline has none.
-
-        Raises
-        ------
-        InputError
-            If they cannot be read.
-        """
+    def pictures(self) -> Kept | None:
+        """Return the small pictures, or None if the baseline has none."""
         if not self.baseline.images:
             return None
         return _read_pictures(self.path.parent / Path(self.baseline.images).name)
 
 
-def find(path: str | Path) -> list[Path]:
-    """Return the baselines at ``path``: the file itself, or a folder's, sorted.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
-    path = Path(path)
+def find(path: Path) -> list[Path]:
+    """Return the baselines at ``path``: the file itself, or a folder's, sorted."""
     if path.is_dir():
         found = sorted(path.glob("*.json"))
         if not found:
@@ -88,13 +71,7 @@ _HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--sce
 
 
 def read(path: Path) -> BaselineFile:
-    """Read a baseline.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is not a baseline.
-    """
+    """Read a baseline."""
     try:
         text = content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
@@ -111,22 +88,40 @@ def was_ours(path: Path) -> bool:
     return any(text.startswith(head) or head.startswith(text) for head in HEADS)
 
 
-def write(path: Path, baseline: Baseline, pictures: Pictures | None = None) -> None:
-    """Write a baseline atomically, with its small pictures if given.
+def require_own_pictures(path: Path) -> None:
+    """Ensure that the pictures next to a baseline, if any, are those of a baseline."""
+    images = path.with_suffix(".exr")
+    if not images.exists():
+        return
+    import OpenEXR
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
+    try:
+        content(images, LARGEST)
+        with OpenEXR.File(str(images), separate_channels=True, header_only=True) as file:
+            is_own = all(name.startswith("baseline.") for name in file.channels())
+    except Exception:  # the library has many for a file that is not EXR
+        is_own = False
+    if not is_own:
+        raise InputError(
+            f"{images}: fotismos did not make this file, which --images would replace. Move it"
+            " away, or give another baseline."
+        )
+
+
+def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
+    """Write a baseline atomically, with its small pictures if given."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists():
             require_regular(path)
         if pictures is not None:
             images = path.with_suffix(".exr")
+            require_own_pictures(path)
             # "baseline." keeps the layers at half precision, which is enough for pictures.
-            layers = {f"baseline.{half}": image for half, image in pictures.items()}
+            size = pictures[HALVES[0]].shape
+            scale = min(1.0, LONGEST_KEPT / max(size[:2]))
+            small = [max(1, round(side * scale)) for side in size[:2]]
+            layers = {f"baseline.{half}": reduced(pictures[half], small) for half in HALVES}
             exr.write(images, layers, {"scene": baseline.scene})
             baseline = structs.replace(baseline, images=images.name)
         atomic.write(path, baseline.text())
@@ -136,6 +131,14 @@ def write(path: Path, baseline: Baseline, pictures: Pictures | None = None) -> N
         ) from error
 
 
+def reduced(image: NDArray[np.floating], shape: Sequence[int]) -> NDArray[np.floating]:
+    """Average an image (H, W, 3) down to ``shape``, whose first sides are height and width."""
+    height, width = shape[:2]
+    planes = [Image.fromarray(image[..., channel].astype(np.float32)) for channel in range(3)]
+    small = [plane.resize((width, height), Image.Resampling.BOX) for plane in planes]
+    return np.stack([np.asarray(plane, float) for plane in small], axis=-1)
+
+
 def scene_from(scene: str, path: Path) -> str:
     """Return a baseline's scene as :func:`comparisons.case.open_case` takes it."""
     beside = path.parent / scene
@@ -143,19 +146,13 @@ def scene_from(scene: str, path: Path) -> str:
 
 
 def scene_for(scene: str, path: Path) -> str:
-    """Return how a baseline at ``path`` names a scene: files relative to the baseline's folder.
-
-    Raises
-    ------
-    InputError
-        If the file does not exist.
-    """
+    """Return how a baseline at ``path`` names a scene: files relative to the baseline's folder."""
     file = file_of(scene)
     return scene if file is None else Path(os.path.relpath(file, path.parent)).as_posix()
 
 
 def options_from(options: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Return a baseline's options as a :class:`comparisons.case.Request` takes them."""
+    """Return a baseline's options as a :class:`comparisons.options.Options` takes them."""
     return _with_heuristic(options, lambda file: os.path.relpath(path.parent / file))
 
 
@@ -178,7 +175,7 @@ def name_of(scene: str | Path) -> str:
     return Path(scene).stem if Path(scene).suffix in SUFFIXES else str(scene)
 
 
-def _read_pictures(path: Path) -> Pictures:
+def _read_pictures(path: Path) -> Kept:
     import OpenEXR
 
     try:
@@ -191,16 +188,13 @@ def _read_pictures(path: Path) -> Pictures:
                 )
                 for half in HALVES
             }
+            if max(max(each.shape) for each in pictures.values()) > LONGEST_KEPT:
+                raise ValueError("they are too large")
+            if not all(np.isfinite(each).all() for each in pictures.values()):
+                raise ValueError("they are not finite")
+            return pictures
     except Exception as error:  # the library has many for a file that is not EXR
-        raise _unreadable(path, error) from error
-    for picture in pictures.values():
-        if picture.ndim != 3 or max(picture.shape) > LONGEST_KEPT or not np.isfinite(picture).all():
-            raise _unreadable(path, "they are too large, or not finite")
-    return pictures
-
-
-def _unreadable(path: Path, reason: object) -> InputError:
-    return InputError(
-        f"{path}: the baseline's pictures cannot be read: {reason}. Write them again with"
-        f" `{program.command('check', 'BASELINE', '--update', '--images')}`."
-    )
+        raise InputError(
+            f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
+            f" `{program.command('check', 'BASELINE', '--update', '--images')}`."
+        ) from error

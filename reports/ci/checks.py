@@ -1,79 +1,109 @@
-"""Checking scenes against baselines, and writing baselines and the pictures of what failed."""
+"""Checking scenes against baselines, and writing baselines: one, or all of a command."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from comparisons import record
-from comparisons.case import Case
-from comparisons.check import baseline, check, suspects
-from comparisons.check.baseline import Baseline
-from comparisons.check.check import Check
-from comparisons.check.measurement import HALVES
-from comparisons.check.moved import LEVEL
-from comparisons.compare import Progress
-from comparisons.records import to_json
-from heuristic.errors import FotismosError
+from msgspec import Meta, field, structs
+
+from comparisons.case import Case, open_case
+from comparisons.check import baseline
+from comparisons.check.measurement import HALVES, made_small, measure_scene
+from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
+from comparisons.compare import compare
+from comparisons.departure.metrics import LEADING
+from comparisons.gallery.builtin import SCENES
+from comparisons.options import Options
+from comparisons.processes.pool import Pool, Task
+from comparisons.record import versions
+from heuristic import program
+from heuristic.errors import FotismosError, InputError
+from reference.records import VERSION, Amount, Count, Record, Share, to_json
+from reference.rendering.passes import Progress
 from reference.scene.graph import set_variant
-from reports.ci import baselines, check_pictures, check_record
-from reports.ci.baselines import BaselineFile, Pictures
-from reports.ci.check_record import Status, VersionChange
-from reports.files import ownership
+from reports.ci import baselines
+from reports.ci.baselines import BaselineFile
+from reports.ci.summary import moved_cells
+from reports.files import images
+from reports.page.scene_view import Before, SceneView
+from reports.run import results, scene
+from reports.terminal import progress
+from reports.terminal.words import percent
 
-FILES = ("check.json", *(f"{name}.png" for name in check_pictures.NAMES))
-"""The files of a failure."""
+RECORD = "check.json"
 
-ERROR = 2
-"""Exit code if a baseline could not be checked; 1 means that something moved."""
+LARGEST_ERROR = 2.0
+"""ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """The result for one baseline.
+class Change(Record):
+    """A value in the baseline, and now."""
 
-    Attributes
-    ----------
-    path, scene
-        The baseline's file, and the scene that it names.
-    status
-        ``passed``, ``failed`` (something moved), ``error`` (not checked); of an update ``created``,
-        ``updated`` or ``unchanged``.
-    seconds
-        Time that it took.
-    check
-        The comparison with the baseline; None if there was nothing to compare with.
-    message
-        The error, or a remark on an update.
-    exit_code
-        0, 1 for a failure, 2 for an error.
-    folder
-        The folder of a failure's pictures.
-    versions
-        Libraries whose version changed since the baseline was made.
-    causes
-        Likely reasons for a failure, in sentences.
-    objects
-        Each object's share of a failure's change, by half.
-    """
+    before: float
+    after: float
 
-    path: Path
+
+class VersionChange(Record):
+    """The version of a library when the baseline was made, and today's."""
+
+    before: str
+    after: str
+
+
+class CheckRecord(Record, kw_only=True, omit_defaults=True):
+    """The result for one baseline; without numbers if it was not compared."""
+
+    # Made by functions, which `omit_defaults` does not omit.
+    record_version: int = field(default_factory=lambda: VERSION)
+    baseline: Annotated[str, Meta(description="Path of its file.")]
     scene: str
-    status: Status
-    seconds: float = 0.0
-    check: Check | None = None
+    status: Literal["passed", "failed", "error", "created", "updated", "unchanged"]
+    passed: bool = field(default_factory=lambda: True)
+    seconds: Amount
     message: str = ""
-    exit_code: int = 0
-    folder: Path | None = None
+    tested: Count | None = None
+    significance: Share | None = None
+    moved: tuple[Move, ...] | None = None
+    metrics: dict[str, Change] | None = None
     versions: dict[str, VersionChange] | None = None
-    causes: tuple[str, ...] = ()
-    objects: dict[str, dict[str, float]] | None = None
+    causes: Annotated[
+        tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
+    ] = ()
+    objects: Annotated[
+        dict[str, dict[str, Share]] | None,
+        Meta(description="By half: each object's share of the change."),
+    ] = None
+    pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
 
     @property
     def name(self) -> str:
-        """Return the baseline's name."""
-        return self.path.stem
+        """The baseline's name."""
+        return Path(self.baseline).stem
+
+    @property
+    def exit_code(self) -> int:
+        """1 if something moved, 2 if the baseline could not be checked, else 0."""
+        return {"failed": 1, "error": 2}.get(self.status, 0)
+
+    @property
+    def versions_line(self) -> str:
+        """Which versions changed since the baseline; empty for none."""
+        changed = (self.versions or {}).items()
+        changes = ", ".join(f"{name} {both.before} -> {both.after}" for name, both in changed)
+        return f"versions since the baseline: {changes}" if changes else ""
+
+
+class Checks(Record, kw_only=True):
+    """The results of one command."""
+
+    record_version: int = VERSION
+    passed: bool
+    significance: Share
+    checks: tuple[CheckRecord, ...]
+
+
+# --- One baseline ----------------------------------------------------------------------------
 
 
 def examine(
@@ -82,144 +112,279 @@ def examine(
     level: float = LEVEL,
     folder: Path | None = None,
     progress: Progress | None = None,
-) -> Result:
-    """Check a scene against its baseline, and write pictures of a failure.
+) -> tuple[CheckRecord, SceneView | None]:
+    """Check a scene against its baseline.
 
-    Parameters
-    ----------
-    file
-        The baseline.
-    case
-        The scene, see :meth:`BaselineFile.open`.
-    level
-        Chance of an alarm though nothing changed.
-    folder
-        For the pictures, which are written only if something moved; an earlier failure's are
-        deleted.
-    progress
-        See :func:`comparisons.compare.compare`.
-
-    Raises
-    ------
-    FotismosError
-        If the scene cannot be measured, or the baseline's pictures cannot be read.
+    ``level`` is the chance of an alarm though nothing changed. If something moved, the scene is
+    compared as ``fotismos compare`` does, its files and ``check.json`` are written to ``folder``,
+    and its part of the page is returned; else those of an earlier failure are deleted.
     """
-    begin = perf_counter()
-    pictures = file.pictures()
+    begin, pictures = perf_counter(), file.pictures()
     found = _checked(file, case, level, progress)
     if folder is not None:
-        ownership.clear(folder, FILES)
-    result = Result(
-        file.path,
-        file.baseline.scene,
-        "passed" if found.passed else "failed",
-        seconds=perf_counter() - begin,
-        check=found,
-        exit_code=0 if found.passed else 1,
-        folder=None if found.passed else folder,
-        versions=_changed_versions(file.baseline),
-        **({} if found.passed else _explained(found, pictures)),
+        scene.remove(folder)
+        results.clear(folder, (RECORD,))
+    made = _record(file, "passed" if found.passed else "failed", found, begin)
+    if found.passed:
+        return made, None
+    halves = [half for half in HALVES if any(move.half == half for move in found.moved)]
+    before = pictures or dict.fromkeys(halves)
+    made = structs.replace(
+        made,
+        causes=tuple(found.causes()),
+        objects={half: found.objects(half, before[half]) for half in halves},
+        pictures=folder.as_posix() if folder else None,
     )
-    if result.folder is not None:
-        _write_failure(result, result.folder, found, pictures)
-    return result
+    if folder is None:
+        return made, None
+    comparison = compare(case.source, case.options, progress, case.command())
+    view = scene.write(folder.parent, folder.name, comparison)
+    results.write(folder / RECORD, to_json(made))
+    return made, structs.replace(view, before=_before(made, found, pictures))
 
 
 def update(
     file: BaselineFile,
     case: Case,
     level: float = LEVEL,
-    images: bool = False,
+    with_pictures: bool = False,
     progress: Progress | None = None,
-) -> Result:
+) -> CheckRecord:
     """Measure again, and write the baseline if anything moved, or pictures are to be added."""
-    begin = perf_counter()
+    begin, old = perf_counter(), file.baseline
     found = _checked(file, case, level, progress)
-    old, message = file.baseline, ""
-    new: Baseline | None = None
-    if not found.passed:
-        new = baseline.of(old.scene, old.options, found.after)
-    elif images and not old.images:
-        new, message = old, "the pictures were added"
-    if new is not None:
-        kept = check_pictures.reduced(found.pictures) if images or old.images else None
+    made = _record(file, "unchanged" if found.passed else "updated", found, begin)
+    is_added = found.passed and with_pictures and not old.images
+    if is_added:
+        added = f"the pictures were added. {found.now.caution}".removesuffix(". ")
+        made = structs.replace(made, message=added)
+    if is_added or not found.passed:
+        kept = found.now.pictures if with_pictures or old.images else None
+        new = old if found.passed else baseline.of(old.scene, old.options, found.now.measurement)
         baselines.write(file.path, new, kept)
-    status: Status = "unchanged" if found.passed else "updated"
-    return Result(file.path, old.scene, status, perf_counter() - begin, found, message)
+    return made
 
 
 def create(
-    path: Path, scene: str, case: Case, images: bool = False, progress: Progress | None = None
-) -> Result:
-    """Measure a scene, and write or replace its baseline.
-
-    Parameters
-    ----------
-    path
-        The baseline's file.
-    scene
-        How the baseline names the scene.
-    case
-        The scene; its resolution is small unless requested otherwise.
-    images
-        Write pictures next to it.
-    progress
-        See :func:`comparisons.compare.compare`.
-    """
+    path: Path,
+    scene: str,
+    case: Case,
+    with_pictures: bool = False,
+    progress: Progress | None = None,
+) -> CheckRecord:
+    """Measure a scene at a small size, and write or replace its baseline, which names it."""
     begin = perf_counter()
-    case = check.made_small(case)
-    measured = check.measure_scene(case.source, case.options, progress=progress)
-    options = baselines.options_for(case.asking(spp=measured.spp).request.stated(), path)
-    status: Status = "updated" if path.exists() else "created"
+    case = made_small(case)
+    measured = measure_scene(case.source, case.options, progress=progress)
+    options = baselines.options_for(case.changed(spp=measured.spp).options.stated(), path)
+    status: Literal["updated", "created"] = "updated" if path.exists() else "created"
     new = baseline.of(scene, options, measured.measurement)
-    baselines.write(path, new, check_pictures.reduced(measured.pictures) if images else None)
-    return Result(path, scene, status, perf_counter() - begin)
-
-
-def guarded(run: Callable[..., Result], path: Path, *more: Any) -> Result:
-    """Return ``run(path, *more)``; an exception becomes this baseline's result.
-
-    An interruption and ``SystemExit`` pass through.
-    """
-    begin = perf_counter()
-    try:
-        return run(path, *more)
-    except Exception as error:
-        return failed(path, error, perf_counter() - begin)
-
-
-def failed(path: Path, error: BaseException, seconds: float = 0.0) -> Result:
-    """Return the result of a baseline that an exception kept from being judged."""
-    kind = "" if isinstance(error, FotismosError) else f"{type(error).__name__}: "
-    where = "" if str(error).startswith(str(path)) else f"{path}: "
-    message = f"{where}{kind}{error}"
-    return Result(path, "", "error", seconds=seconds, message=message, exit_code=ERROR)
+    baselines.write(path, new, measured.pictures if with_pictures else None)
+    return CheckRecord(
+        baseline=path.as_posix(),
+        scene=scene,
+        status=status,
+        seconds=round(perf_counter() - begin, 3),
+        message=measured.caution,
+    )
 
 
 def _checked(file: BaselineFile, case: Case, level: float, progress: Progress | None) -> Check:
     set_variant(case.variant)
-    return check.check(case.source, case.options, file.baseline.measured(), level, progress)
+    return check(case.source, case.options, file.baseline.measured(), level, progress)
 
 
-def _changed_versions(baseline: Baseline) -> dict[str, VersionChange]:
-    now = record.versions()
-    return {
+def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> CheckRecord:
+    now = versions()
+    changed = {
         name: VersionChange(old, now.get(name, "none"))
-        for name, old in baseline.versions.items()
+        for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
+    metrics, after = found.before.metrics.items(), found.now.measurement.metrics
+    return CheckRecord(
+        baseline=file.path.as_posix(),
+        scene=file.baseline.scene,
+        status=status,
+        passed=status != "failed",
+        seconds=round(perf_counter() - begin, 3),
+        message=found.now.caution,
+        tested=len(found.moves),
+        significance=found.level,
+        moved=found.moved,
+        metrics={name: Change(old.value, after[name].value) for name, old in metrics},
+        versions=changed or None,
+    )
 
 
-def _explained(found: Check, before: Pictures | None) -> dict[str, Any]:
-    """Return causes and objects of a failure; ``before`` are the baseline's pictures, if any."""
-    halves = (half for half in HALVES if any(move.half == half for move in found.moved))
-    objects = {half: found.objects(half, before[half] if before else None) for half in halves}
-    return {"causes": tuple(suspects.causes(found)), "objects": objects}
+def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) -> Before:
+    """Return the section of the page on what moved."""
+    shown = {}
+    for half, old in (pictures or {}).items():
+        now = baselines.reduced(found.now.pictures[half], old.shape)
+        shown[half] = images.png(images.tonemap(old))
+        shown[f"{half}-error"] = images.png(images.error_map(LEADING(now, old), LARGEST_ERROR))
+    sentences = list(made.causes)
+    for half, objects in (made.objects or {}).items():
+        shares = ", ".join(f"{name} {percent(share)}" for name, share in [*objects.items()][:5])
+        sentences += [f"The change in the {half} by object: {shares}."] if shares else []
+    return Before(
+        sentences=tuple(filter(None, (*sentences, made.versions_line))),
+        moved=tuple(map(moved_cells, made.moved or ())),
+        tested=made.tested or 0,
+        pictures=shown,
+        command=program.command("check", made.baseline, "--update"),
+    )
 
 
-def _write_failure(result: Result, folder: Path, found: Check, before: Pictures | None) -> None:
-    """Write pictures and the record; ``before`` are the baseline's pictures, if any."""
-    ownership.folder(folder)
-    for name, png in check_pictures.pictures(found, before).items():
-        ownership.write(folder / f"{name}.png", png)
-    ownership.write(folder / "check.json", to_json(check_record.of(result)))
+# --- All baselines of a command --------------------------------------------------------------
+
+
+def examine_all(
+    pool: Pool, path: Path, significance: float, seed: int | None, folder: Path
+) -> tuple[list[CheckRecord], list[SceneView]]:
+    """Check one baseline or a folder of them in a pool; the significance is shared.
+
+    ``seed`` replaces the baselines' unless it is None; failures go to ``folder``.
+    """
+    paths = baselines.find(path)
+    level = level_of_each(significance, len(paths))
+    calls = [(one, level, seed, folder / one.stem) for one in paths]
+    found = _each(pool, examine_one, calls)
+    return [made for made, _ in found], [view for _, view in found if view]
+
+
+def update_all(
+    pool: Pool,
+    path: Path,
+    scenes: Sequence[str],
+    with_pictures: bool,
+    significance: float,
+    options: Mapping[str, Any],
+) -> list[CheckRecord]:
+    """Write one baseline or several, except those with the same options of which nothing moved.
+
+    Without ``scenes``, the files name them; ``options`` replace theirs.
+    """
+    calls = [
+        (one, scene, with_pictures, significance, options) for one, scene in _targets(path, scenes)
+    ]
+    return [made for made, _ in _each(pool, update_one, calls)]
+
+
+def _each(
+    pool: Pool, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]
+) -> list[tuple[CheckRecord, SceneView | None]]:
+    """Return the result of each baseline, in order; its path is the first argument."""
+    found = {}
+    with progress.shown() as bar:
+        tasks = [Task(call[0].name, function, call, bar.of(call[0].stem)) for call in calls]
+        for task, outcome in pool.each(tasks):
+            path, error = task.arguments[0], outcome.exception()
+            found[path] = (failed(path, error), None) if error else outcome.result()
+    return [found[call[0]] for call in calls]
+
+
+def failed(path: Path, error: BaseException, seconds: float = 0.0) -> CheckRecord:
+    """Return the result of a baseline that an exception kept from being judged."""
+    kind = "" if isinstance(error, FotismosError) else f"{type(error).__name__}: "
+    where = "" if str(error).startswith(str(path)) else f"{path}: "
+    return CheckRecord(
+        baseline=path.as_posix(),
+        scene="",
+        status="error",
+        passed=False,
+        seconds=round(seconds, 3),
+        message=f"{where}{kind}{error}",
+    )
+
+
+def examine_one(
+    path: Path, level: float, seed: int | None, folder: Path, progress: Progress | None = None
+) -> tuple[CheckRecord, SceneView | None]:
+    """Check one baseline in a process of a pool; an exception becomes its result."""
+    begin = perf_counter()
+    try:
+        file = baselines.read(path)
+        return examine(file, file.open(seed), level, folder, progress)
+    except Exception as error:
+        return failed(path, error, perf_counter() - begin), None
+
+
+def update_one(
+    path: Path,
+    scene: str | None,
+    with_pictures: bool,
+    significance: float,
+    options: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> tuple[CheckRecord, None]:
+    """Write one baseline in a process of a pool; ``scene`` is None if the file names it."""
+    begin = perf_counter()
+    try:
+        return _updated(path, scene, with_pictures, significance, options, progress), None
+    except Exception as error:
+        return failed(path, error, perf_counter() - begin), None
+
+
+def _updated(
+    path: Path,
+    scene: str | None,
+    with_pictures: bool,
+    significance: float,
+    options: Mapping[str, Any],
+    progress: Progress | None,
+) -> CheckRecord:
+    if with_pictures:
+        baselines.require_own_pictures(path)
+    file, options = _readable(path, scene), baselines.options_for(options, path)
+    if file is not None:
+        old = file.baseline
+        if scene is not None and baselines.scene_for(scene, path) != old.scene:
+            raise InputError(
+                f"{path}: this is the baseline of {old.scene}, not of {scene}. Give another file"
+                f" for {scene}, or delete this one."
+            )
+        scene, options = baselines.scene_from(old.scene, path), dict(old.options) | options
+        if Options.of(options) == Options.of(old.options):
+            return update(file, file.open(), significance, with_pictures, progress)
+        with_pictures = with_pictures or bool(old.images)
+    assert scene is not None, "a baseline that cannot be read comes with its scene"
+    case = open_case(scene, Options.of(baselines.options_from(options, path)))
+    return create(path, baselines.scene_for(scene, path), case, with_pictures, progress)
+
+
+def _readable(path: Path, scene: str | None) -> BaselineFile | None:
+    """Read a baseline; None if it is missing, or broken while its scene is given."""
+    if not path.exists():
+        return None
+    try:
+        return baselines.read(path)
+    except InputError as error:
+        if scene is None or not path.is_file():
+            raise
+        if not baselines.was_ours(path):
+            raise InputError(
+                f"{path}: this file is not a baseline, and is not overwritten. Give another one."
+            ) from error
+        return None
+
+
+def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]:
+    """Return ``(file, scene)`` of each baseline to write; without a scene, its file names it."""
+    if path.suffix == ".json":
+        if len(scenes) > 1:
+            raise InputError(f"{path}: a baseline is of one --scene; give a folder for several.")
+        if not scenes and not path.exists():
+            if path.stem not in SCENES:
+                raise InputError(f"{path}: there is no such baseline. Give its --scene.")
+            scenes = (path.stem,)
+        return [(path, scenes[0] if scenes else None)]
+    if scenes:
+        named = {path / f"{baselines.name_of(scene)}.json": scene for scene in scenes}
+        if len(named) < len(scenes):
+            raise InputError(
+                f"{', '.join(scenes)}: two scenes have one name. Give a file for each."
+            )
+        return list(named.items())
+    return [(one, None) for one in baselines.find(path)]

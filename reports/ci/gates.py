@@ -6,39 +6,68 @@ bound. If the interval contains the bound, the gate is undetermined: more sample
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import TYPE_CHECKING
 
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure.metrics import LEADING
-from reports.terminal.printing import number, percent
-from reports.terminal.tables import printed
-from reports.verdict import USUAL
+import click
 
-FAILED: Final = "failed"
-UNDETERMINED: Final = "undetermined"
-PASSED: Final = "passed"
+from reports.jobs import Within
+
+if TYPE_CHECKING:
+    from comparisons.comparison import ComparisonRecord
+
+FAILED, UNDETERMINED, PASSED = "failed", "undetermined", "passed"
 
 HEADINGS = ("scene", "gate", "bound", "found", "from", "to", "result")
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """The result of one gate for one scene.
+class Percentage(click.ParamType):
+    """A percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
 
-    Attributes
-    ----------
-    scene, gate
-        The names of the scene, and of the bounded quantity.
-    bound, found, low, high
-        The largest value allowed, the value found, and its 95 % interval.
-    is_share
-        Whether these are shares, printed as percentages.
+    name = "percentage"
+
+    def convert(
+        self, value: str, parameter: click.Parameter | None, context: click.Context | None
+    ) -> float:
+        digits, sign, rest = value.strip().partition("%")
+        try:
+            share = float(digits) / 100.0
+        except ValueError:
+            share = math.nan
+        if not (sign and not rest and 0.0 <= share <= 1.0):
+            message = f"{value!r} is not a percentage: give one from 0% to 100%, such as 5%."
+            self.fail(message, parameter, context)
+        return share
+
+
+options = (
+    click.option(
+        "--max-mean",
+        type=Within(min=0, max=1000),
+        metavar="DE",
+        help="Exit code 1 if a scene's mean ΔE2000 is larger, by more than noise.",
+    ),
+    click.option(
+        "--max-visible",
+        type=Percentage(),
+        metavar="P%",
+        help="Exit code 1 if a larger share of a scene's pixels has ΔE2000 above 2, by more than"
+        " noise.",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One bound of one scene: the largest value allowed, the value found, its 95 % interval.
+
+    ``is_share`` prints them as percentages.
     """
 
     scene: str
-    gate: str
+    name: str
     bound: float
     found: float
     low: float
@@ -46,66 +75,65 @@ class Outcome:
     is_share: bool
 
     @property
-    def state(self) -> Literal["failed", "undetermined", "passed"]:
-        """Return whether the interval is above the bound, contains it, or is below."""
+    def state(self) -> str:
+        """Whether the interval is above the bound, contains it, or is below."""
         if self.low > self.bound:
             return FAILED
         return PASSED if self.high <= self.bound else UNDETERMINED
 
     def cells(self) -> tuple[str, ...]:
         """Return the cells of its row in a table, under :data:`HEADINGS`."""
+        from reports.terminal.words import number, percent  # loads the metrics
+
         form = percent if self.is_share else number
         numbers = self.bound, self.found, self.low, self.high
-        return self.scene, self.gate, *map(form, numbers), self.state
+        return self.scene, self.name, *map(form, numbers), self.state
 
     def __str__(self) -> str:
         _, gate, bound, found, low, high, state = self.cells()
         return f"{gate}: {found} ({low} to {high}), at most {bound} allowed: {state}"
 
 
-@dataclass(frozen=True)
-class Gates:
-    """The bounds of a command; None for no bound.
+def evaluate(
+    records: Sequence[ComparisonRecord], mean: float | None, visible: float | None
+) -> list[Gate]:
+    """Return the gates of each scene.
 
-    Attributes
-    ----------
-    mean
-        The largest mean of the leading metric.
-    visible
-        The largest share of pixels that depart by more than :data:`reports.verdict.USUAL`.
+    ``mean`` bounds the mean of the leading metric, ``visible`` the share of pixels that depart by
+    more than :data:`reports.verdict.USUAL`; None is no bound.
     """
+    from comparisons.departure.metrics import LEADING  # loads the metrics
+    from reports.verdict import USUAL
 
-    mean: float | None = None
-    visible: float | None = None
-
-    def judge(self, records: Sequence[ComparisonRecord]) -> list[Outcome]:
-        """Return the outcome of each gate for each scene."""
-        return [outcome for record in records for outcome in self._of(record)]
-
-    def _of(self, record: ComparisonRecord) -> Iterator[Outcome]:
-        found, limit = record.metrics[LEADING.name], f"{USUAL:g}"
-        if self.mean is not None:
-            numbers = self.mean, found.debiased, found.low, found.high
-            yield Outcome(record.scene, f"mean {LEADING.label}", *numbers, is_share=False)
-        if self.visible is not None:
+    made, limit = [], f"{USUAL:g}"
+    for record in records:
+        found = record.metrics[LEADING.name]
+        if mean is not None:
+            numbers = mean, found.debiased, found.low, found.high
+            made.append(Gate(record.scene, f"mean {LEADING.label}", *numbers, is_share=False))
+        if visible is not None:
             between = found.visible_between[limit]
-            numbers = self.visible, found.visible[limit], between.low, between.high
-            yield Outcome(record.scene, f"above {LEADING.label} {limit}", *numbers, is_share=True)
+            numbers = visible, found.visible[limit], between.low, between.high
+            name = f"above {LEADING.label} {limit}"
+            made.append(Gate(record.scene, name, *numbers, is_share=True))
+    return made
 
 
-def lines(outcomes: Sequence[Outcome]) -> Iterator[str]:
+def lines(gates: Sequence[Gate]) -> Iterator[str]:
     """Yield the lines on the gates of a run."""
+    from reports.terminal.tables import printed  # loads rich
+
     yield ""
-    yield from printed([HEADINGS, *(outcome.cells() for outcome in outcomes)], right=2)
-    yield verdict(outcomes)
+    yield from printed([HEADINGS, *(gate.cells() for gate in gates)], right=2)
+    yield outcome(gates)
 
 
-def verdict(outcomes: Sequence[Outcome]) -> str:
+def outcome(gates: Sequence[Gate]) -> str:
     """Return the line that says how it went."""
     counts = {
-        state: sum(outcome.state == state for outcome in outcomes)
+        state: sum(gate.state == state for gate in gates)
         for state in (FAILED, UNDETERMINED, PASSED)
     }
-    said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    listed = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     more = " More samples (--spp, --noise) decide." if counts[UNDETERMINED] else ""
-    return f"gates: {said}.{more}"
+    return f"gates: {listed}.{more}"

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import total_ordering
 from pathlib import Path
 from typing import Any
 
-from comparisons.case import Case, Request, Scene, open_case
-from comparisons.check import check
-from comparisons.check.measurement import PASSES
+from comparisons import atomic
+from comparisons.case import Case, Scene, open_case
+from comparisons.check.measurement import PASSES, made_small, measure_scene
 from comparisons.check.moved import LEVEL
 from comparisons.intervals import student
+from comparisons.options import Options
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import in_file, known_as
-from reports.ci import baselines, checks, lines
+from reference import records
+from reports.ci import baselines, checks, summary
 
 
 @total_ordering
@@ -23,14 +26,8 @@ from reports.ci import baselines, checks, lines
 class Departure:
     """A departure metric of a scene: it compares with numbers by its value.
 
-    Attributes
-    ----------
-    scene, metric
-        The names of the scene and the metric.
-    value, error
-        The metric, and its standard error over ``passes`` independent passes.
-    noise_floor
-        The value that noise alone would give; None for a metric without one.
+    ``error`` is its standard error over ``passes`` independent passes, ``noise_floor`` the value
+    that noise alone would give.
     """
 
     scene: str
@@ -43,11 +40,16 @@ class Departure:
     def __float__(self) -> float:
         return self.value
 
-    def __eq__(self, other: Any) -> bool:
-        return self.value == float(other)
+    def __eq__(self, other: object) -> bool:
+        number = _number(other)
+        return NotImplemented if number is None else self.value == number
 
-    def __lt__(self, other: Any) -> bool:
-        return self.value < float(other)
+    def __lt__(self, other: object) -> bool:
+        number = _number(other)
+        return NotImplemented if number is None else self.value < number
+
+    def __hash__(self) -> int:
+        return hash(self.value)
 
     def __repr__(self) -> str:
         return f"{self.metric} {self.value:.4g}"
@@ -68,20 +70,19 @@ class Departure:
         ]
 
 
+def _number(value: Any) -> float | None:
+    """Return what compares with a departure as a number; None for anything else."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return None
+
+
 @dataclass(frozen=True)
 class Fotismos:
-    """The fixture ``fotismos``.
+    """The fixture ``fotismos``: baselines in a folder, which are written if ``update``.
 
-    Attributes
-    ----------
-    folder
-        The folder of the baselines.
-    pictures
-        Returns the folder for a failure's pictures.
-    variant
-        Mitsuba variant that replaces the scenes'.
-    update
-        Whether to write baselines.
+    ``pictures`` returns the folder for a failure's; ``variant`` replaces the scenes'.
     """
 
     folder: Path
@@ -92,28 +93,22 @@ class Fotismos:
     def departure(self, scene: Scene, metric: str = "dE2000", **options: Any) -> Departure:
         """Measure how far textbook shading is from physics.
 
-        Parameters
-        ----------
-        scene
-            A built-in name, the path of a Mitsuba file (relative to the test's folder, else to the
-            current one), a dictionary for ``mitsuba.load_dict``, or a function that returns one.
-        metric
-            ``dE2000``, ``dE_ITP``, ``dE_CAM16UCS``, ``rmse`` or ``log2_luminance``.
-        options
-            Those of the command line: ``resolution``, ``spp``, ``seed``, ``heuristic``, ... A
-            heuristic may also be a function of a point; its file is found as a scene's is. Without
-            a resolution, the longer side is 64 pixels.
+        A scene is a built-in name, the path of a Mitsuba file (relative to the test's folder, else
+        to the current one), a dictionary for ``mitsuba.load_dict``, or a function that returns one.
+        ``options`` are those of the command line; a heuristic may also be a function of a point.
+        Without a resolution, the longer side is 64 pixels.
         """
-        case = check.made_small(
-            _open(self._found(scene), self._given({}) | self._placed(options), "scene")
+        case = made_small(
+            _open(self._scene(scene), self._options({}) | self._with_file(options), "scene")
         )
-        found = check.measure_scene(case.source, case.options).measurement
+        measured = measure_scene(case.source, case.options)
+        found = measured.measurement
+        if measured.caution:
+            warnings.warn(f"{case.name}: {measured.caution}", stacklevel=2)
         if metric not in found.metrics:
             raise unknown("metric", metric, found.metrics)
-        measured = found.metrics[metric]
-        return Departure(
-            case.name, metric, measured.value, measured.error, measured.noise_floor, PASSES
-        )
+        amount = found.metrics[metric]
+        return Departure(case.name, metric, amount.value, amount.error, amount.noise_floor, PASSES)
 
     def unchanged(
         self,
@@ -122,27 +117,15 @@ class Fotismos:
         significance: float = LEVEL,
         **options: Any,
     ) -> bool:
-        """Return True; fail the test if a scene moved from its baseline.
+        """Return True; fail the test if a scene moved from its baseline, or has none.
 
-        Parameters
-        ----------
-        scene
-            See :meth:`departure`; or the path of an existing baseline (.json).
-        name
-            The baseline's name; if omitted, the scene's. A dictionary needs one.
-        significance
-            Chance of a failure though nothing changed.
-        options
-            See :meth:`departure`. An existing baseline has its own; if those given here differ, the
-            test fails, or ``--fotismos-update`` writes them.
-
-        Raises
-        ------
-        AssertionError
-            With the table of what moved, or for a missing baseline.
+        For ``scene`` and ``options`` see :meth:`departure`; a scene may also be a baseline's path.
+        ``name`` is the baseline's, if not the scene's. ``significance`` is the chance of a failure
+        though nothing changed. If the options differ from the baseline's, the test fails, or
+        ``--fotismos-update`` writes them.
         """
-        scene = self._found(scene)
-        given = self._given(options)
+        scene = self._scene(scene)
+        given = self._options(options)
         path = self._path(scene, name)
         if not path.exists():
             if not self.update:
@@ -168,10 +151,13 @@ class Fotismos:
         elif self.update:
             checks.update(file, case, significance)
         else:
-            _require_passed(checks.examine(file, case, significance, self.pictures() / path.stem))
+            result, _ = checks.examine(file, case, significance, self.pictures() / path.stem)
+            _require_passed(result)
+            if result.message:
+                warnings.warn(f"{path}: {result.message}", stacklevel=2)
         return True
 
-    def _found(self, scene: Scene) -> Scene:
+    def _scene(self, scene: Scene) -> Scene:
         """Return a scene; a path relative to the test's folder, if there is such a file."""
         if not isinstance(scene, (str, Path)):
             return scene
@@ -182,12 +168,13 @@ class Fotismos:
         if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
             return Path(scene)
         suffix = f"-{self.variant}" if self.variant else ""
-        return self.folder / f"{name or _name(scene)}{suffix}.json"
+        own = atomic.file_name(name or _name(scene), "a baseline")
+        return self.folder / f"{own}{suffix}.json"
 
-    def _given(self, options: dict[str, Any]) -> dict[str, Any]:
-        return self._placed(options) | ({"variant": self.variant} if self.variant else {})
+    def _options(self, options: dict[str, Any]) -> dict[str, Any]:
+        return self._with_file(options) | ({"variant": self.variant} if self.variant else {})
 
-    def _placed(self, options: dict[str, Any]) -> dict[str, Any]:
+    def _with_file(self, options: dict[str, Any]) -> dict[str, Any]:
         """Return options with a heuristic's file in the test's folder, if it is there."""
         if "heuristic" not in options:
             return options
@@ -199,7 +186,7 @@ class Fotismos:
 
 def _open(scene: Scene, options: Mapping[str, Any], name: str | None = None) -> Case:
     own = (name or _name(scene)) if _in_python(scene) else None
-    return open_case(scene, Request.of(options), own)
+    return open_case(scene, Options.of(options), own)
 
 
 def _in_python(scene: Scene) -> bool:
@@ -210,11 +197,9 @@ def _other_options(
     recorded: Mapping[str, Any], given: Mapping[str, Any]
 ) -> dict[str, tuple[Any, Any]]:
     """Return ``{name: (baseline's, test's)}`` of the options in which they differ."""
-    stated = Request.of(given).stated()
+    old, new = (records.plain(Options.of(each)) for each in (recorded, given))
     return {
-        name: (recorded.get(name), stated.get(name))
-        for name in given
-        if recorded.get(name) != stated.get(name)
+        name: (old.get(name), new.get(name)) for name in given if old.get(name) != new.get(name)
     }
 
 
@@ -226,11 +211,10 @@ def _name(scene: Scene) -> str:
     return baselines.name_of(scene)
 
 
-def _require_passed(result: checks.Result) -> None:
-    if result.status == "passed":
+def _require_passed(made: checks.CheckRecord) -> None:
+    if made.status == "passed":
         return
-    assert result.check is not None, "a failure has a comparison"
-    text = [f"{result.path}: {len(result.check.moved)} of {len(result.check.moves)} moved"]
-    text += lines.moved_lines(result.check)
-    text += [line for line in (lines.versions_line(result), f"pictures: {result.folder}") if line]
+    text = [f"{made.baseline}: {len(made.moved or ())} of {made.tested} moved"]
+    text += summary.moved_lines(made)
+    text += [line for line in (made.versions_line, f"pictures: {made.pictures}") if line]
     raise AssertionError("\n".join(text))

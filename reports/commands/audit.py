@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from comparisons.processes.worker import Task
+from comparisons.processes.pool import Task
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity
@@ -43,8 +43,8 @@ def audit(
     """Check a heuristic or BSDF: energy, reciprocity, continuity, gradients.
 
     Evaluates it on white materials for all directions, and prints a table of checks with the worst
-    case of each. Writes a page (index.html) with charts and hard cases, audit.json, and audit.svg,
-    the albedos, to OUTPUT/audit/NAME.
+    case of each. Writes a page (index.html), audit.json with all numbers, and audit.svg, the lobes,
+    to OUTPUT/audit/NAME.
     Textbook shading fails most of the checks: the exit code is 1 only if a value is NaN, infinite
     or negative.
 
@@ -60,16 +60,14 @@ def audit(
     kind = "heuristic" if heuristic else "bsdf"
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons.records import to_json
-        from reports.run.output import below, held, require_free_folders
-        from reports.run.places import PAGE, assigned
+        from reference.records import to_json
+        from reports.run.results import PAGE, assigned, hold, own
         from reports.terminal import audit_lines
 
         command = jobs.command_line()
-        with held(output, command) as held_folder:
-            folder = below(held_folder, "audit")
-            (place,) = assigned(folder, [_wanted(name)])
-            require_free_folders(folder, place)
+        with hold(output, command) as top:
+            folder = own(top / "audit")
+            (place,) = assigned(folder, [_folder_of(name)])
             words = (kind, name, dict(parameters), command, folder / place)
             record = pool.do(Task(name, tasks.audited, words))
     if as_json:
@@ -77,15 +75,15 @@ def audit(
     else:
         verbosity.tell(audit_lines.lines(record))
         verbosity.tell_where(folder / place / PAGE)
-    if not record.is_defined:
+    if record.faults:
         click.get_current_context().exit(1)
 
 
-def _wanted(name: str) -> tuple[str, Path | None]:
+def _folder_of(name: str) -> tuple[str, Path | None]:
     """Return a folder's name, one for each function, and the heuristic's file if it has one."""
     from heuristic.heuristics import in_file
 
-    if (found := in_file(name)) is None:
+    if (place := in_file(name)) is None:
         return name, None
-    file, function = Path(found[0]), found[1]
+    file, function = Path(place[0]), place[1]
     return "-".join(filter(None, (file.stem, function))), Path(name)

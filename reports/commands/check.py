@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from heuristic.errors import InputError
 from reports import jobs
-from reports.ci import asked
+from reports.ci import summary as summaries
 from reports.terminal import verbosity
 
 
@@ -37,7 +37,7 @@ from reports.terminal import verbosity
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
 @jobs.json_option
-@asked.with_options(*asked.files)
+@jobs.with_options(*summaries.options)
 @jobs.output_option("out", "check")
 @jobs.timeout_option
 @jobs.workers_option
@@ -60,7 +60,7 @@ def check(
     link: str | None,
     output: Path,
     timeout: float,
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
     **rendering: Any,
 ) -> None:
@@ -86,42 +86,47 @@ def check(
     }
     _require_consistent(update, scenes, images, given)
     jobs.require_known(scenes)
-    with jobs.pool(timeout, workers, scheduler) as pool:
+    inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
+    summaries.require_free(junit, summary, [*scenes, *inputs])
+    with jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler) as pool:
         pool.start()
-        from comparisons.records import to_json
-        from reports.ci import annotations, check_record, lines, suite, summaries
-        from reports.ci.junit import document
-        from reports.page import check_page
-        from reports.run.output import below, held
+        from reference.records import to_json
+        from reports.ci import checks
+        from reports.page import page
+        from reports.run import results
 
-        page = None
+        views: list[Any] = []
         if update:
-            results = suite.update(pool, baseline, scenes, images, significance, given)
+            found = checks.update_all(pool, baseline, scenes, images, significance, given)
         else:
-            with held(output, jobs.command_line()) as held_folder:
-                folder = below(held_folder, "check")
-                results = suite.examine(pool, baseline, significance, given.get("seed"), folder)
-                page = check_page.write(folder, results, significance)
-    for result in results:
-        if result.status == "error":
-            click.echo(f"fotismos: error: {result.message}", err=True)
-    asked.write_junit(junit, lambda: document(results))
-    if summary is not None:
-        address = (link or str(page)) if page else ""
-        summaries.append(summary, summaries.of_check(results, significance, address))
-    notes = annotations.annotate(results, output, significance, written=summary)
+            with results.hold(output, jobs.command_line()) as top:
+                folder = results.own(top / "check")
+                found, views = checks.examine_all(
+                    pool, baseline, significance, given.get("seed"), folder
+                )
+                title = f"fotismos check: {summaries.outcome(found, significance)}"
+                if views:
+                    results.write(folder / results.PAGE, page.render(views, title))
+                else:
+                    results.clear(folder, (results.PAGE,))
+    place = str(folder / results.PAGE) if views else ""
+    for made in found:
+        if made.status == "error":
+            verbosity.echo(f"fotismos: error: {made.message}", err=True)
+    summaries.write_junit(junit, lambda: summaries.junit_of_checks(found))
+    address = (link or place) if views else ""
+    summaries.append(summary, lambda: summaries.of_checks(found, significance, address))
+    code = max(made.exit_code for made in found)
     if as_json:
-        click.echo(to_json(check_record.of_all(results, significance)), nl=False)
+        record = checks.Checks(passed=not code, significance=significance, checks=tuple(found))
+        click.echo(to_json(record), nl=False)
     elif not verbosity.is_quiet():
-        for line in lines.lines(results, significance):
-            click.echo(line)
-        if page:
-            click.echo(f"page: {page}")
-    elif any(result.exit_code for result in results):
-        click.echo(lines.verdict(results, significance))
-    for line in notes:
-        click.echo(line, err=as_json)
-    context.exit(max(result.exit_code for result in results))
+        verbosity.tell(summaries.lines(found, significance))
+        if place:
+            click.echo(f"page: {place}")
+    elif code:
+        click.echo(summaries.outcome(found, significance))
+    context.exit(code)
 
 
 def _require_consistent(

@@ -1,14 +1,21 @@
 """``fotismos compare``: how far textbook shading is from physics."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from reports import jobs, opening
-from reports.ci import asked
+from reports import jobs
+from reports.ci import gates
+from reports.ci import summary as summaries
 from reports.run import batch
 from reports.terminal import verbosity
+
+if TYPE_CHECKING:
+    from reports.page.scene_view import SceneView
 
 
 @click.command()
@@ -21,27 +28,11 @@ from reports.terminal import verbosity
 @jobs.workers_option
 @jobs.scheduler_option
 @jobs.rendering_options
-@click.option(
-    "--image",
-    multiple=True,
-    metavar="FILE",
-    help="A picture of the scene, .exr (FILE.exr:LAYER) or .png, that replaces the heuristic half;"
-    " several are repeats, which show its noise.",
-)
-@click.option(
-    "--transfer",
-    type=click.Choice(["linear", "srgb"]),
-    help="Transfer function of the picture. [default: linear for .exr]",
-)
+@jobs.option("image")
+@jobs.option("transfer")
 @verbosity.quiet_option
 @verbosity.verbose_option
-@click.option(
-    "--noise",
-    type=float,
-    metavar="DE",
-    help="Continue until 95 % of pixels have noise under this ΔE2000, up to --spp samples per"
-    " pixel. [default limit: 4096]",
-)
+@jobs.option("noise")
 @jobs.scene_options
 @click.option(
     "--why/--no-why",
@@ -50,9 +41,9 @@ from reports.terminal import verbosity
     help="Find causes and remedies, at a small size; of a picture, only what it is nearest to."
     " [default: why]",
 )
-@opening.option
+@jobs.open_option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
-@asked.with_options(*asked.bounds, *asked.files)
+@jobs.with_options(*gates.options, *summaries.options)
 @click.pass_context
 def compare(
     context: click.Context,
@@ -64,7 +55,7 @@ def compare(
     cost: bool,
     scripts: bool,
     timeout: float,
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
     is_opened: bool,
     max_mean: float | None,
@@ -81,8 +72,8 @@ def compare(
     subfolders that no other file includes. Python files in a folder are code, and run only with
     --scripts. Writes OUTPUT/index.html and tables of all scenes, and for each scene
     comparison.json, comparison.exr and pictures. If one scene fails, the others are still
-    compared. An interrupted run keeps its finished scenes and passes: the same command resumes it,
-    and gives the same image.
+    compared. An interrupted run keeps its finished scenes: the same command
+    resumes it.
 
     \b
     Examples:
@@ -101,10 +92,30 @@ def compare(
     if rendering["image"] and len(scenes) > 1:
         raise click.UsageError("--image goes with one scene.")
     request = jobs.request(rendering)
+    heuristic = (rendering["heuristic"] or "").partition(":")[0]
+    pictures = [word.partition(":")[0] for word in rendering["image"]]
+    summaries.require_free(
+        junit, summary, [*scenes, *pictures, *([heuristic] if heuristic else ())]
+    )
     with_cost |= cost
-    wanted = batch.Wanted(request, figures, with_cost=with_cost, fresh=fresh, with_scripts=scripts)
-    words = {"max_mean": max_mean, "max_visible": max_visible, "junit": junit}
-    judge = asked.Judge(words | {"summary": summary, "link": link})
-    rendered = jobs.pool(timeout, workers, scheduler)
-    batch.run(scenes, output, wanted, rendered, seen=opening.seen(is_opened), judge=judge)
-    context.exit(judge.exit_code)
+    job = batch.Job(request, figures, with_cost=with_cost, fresh=fresh)
+    failed = False
+
+    def finish(folder: Path, views: Sequence[SceneView]) -> None:
+        """Print the gates, and write the files for CI."""
+        nonlocal failed
+        found = gates.evaluate([view.record for view in views], max_mean, max_visible)
+        if found:
+            verbosity.tell(gates.lines(found))
+        failed = any(gate.state == gates.FAILED for gate in found)
+        page = link or str(folder / "index.html")
+        summaries.write_junit(junit, lambda: summaries.junit_of_gates(found))
+        if summary is not None:
+            summaries.append(summary, lambda: summaries.of_comparison(views, found, page))
+
+    scenes = tuple(jobs.expand(scenes, scripts))
+    rendered = jobs.pool(timeout, len(scenes), workers, scheduler)
+    batch.run(
+        scenes, output, job, rendered, on_page=jobs.open_page if is_opened else None, finish=finish
+    )
+    context.exit(int(failed))

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from comparisons.processes.worker import Task
+from comparisons.processes.pool import Task
 from heuristic.errors import InputError
 from reports import jobs
 from reports.run import tasks
@@ -41,9 +41,10 @@ def cost(
     """Measure what each step of accuracy costs in time, and which effect is worth paying for.
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
-    prices each effect in which textbook shading differs. Writes a page, cost.json, cost.svg and
-    pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without --resolution the film is reduced
-    to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
+    attributes error and time to each effect in which textbook shading differs. Writes a page,
+    cost.json, cost.svg and pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without
+    --resolution the film is reduced to a width of 128 pixels; --spp gives the largest count of
+    samples per pixel, 64 if omitted.
 
     \b
     Examples:
@@ -56,20 +57,20 @@ def cost(
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons.records import to_json
-        from reports.run.output import below, held, require_free_folders
-        from reports.run.places import FIGURES, PAGE, TABLES, places
+        from reference.records import to_json
+        from reports.run.results import FIGURES, PAGE, TABLES, hold, own, places
         from reports.terminal import cost_tables, progress, tables
 
-        with held(output, jobs.command_line()) as held_folder:
-            folder = below(held_folder, "cost")
+        with hold(output, jobs.command_line()) as top:
+            folder = own(top / "cost")
             (place,) = places(folder, [scene])
-            require_free_folders(folder, place, TABLES, *([FIGURES] if figures else ()))
+            for name in (TABLES, FIGURES) if figures else (TABLES,):
+                own(folder / name)
             for_print = folder / FIGURES if figures else None
             with progress.shown() as bar:
                 asked = (scene, jobs.request(rendering), rounds, at, is_measured)
                 words = (*asked, folder / place, for_print)
-                record = pool.do(Task(place, tasks.priced, words, bar.of(place)))
+                record = pool.do(Task(place, tasks.measured, words, bar.of(place)))
             tables.write_cost(folder / TABLES, place, record)
     if as_json:
         click.echo(to_json(record), nl=False)

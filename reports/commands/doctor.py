@@ -1,19 +1,33 @@
 """``fotismos doctor``: versions of the installation, and whether it renders."""
 
 import platform
+import re
+import tomllib
 from collections.abc import Iterable, Iterator
+from importlib import metadata
+from pathlib import Path
 
 import click
 
-from comparisons.processes.worker import Task
-from heuristic import backend
+from comparisons.processes.pool import Task
+from heuristic import llvm
 from heuristic.errors import InstallationError
 from heuristic.version import __version__
 from reports import jobs
-from reports.terminal.version_lines import version_lines
 
 TIMEOUT_S = 300
 """Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
+
+PROJECT = Path(__file__).parents[2] / "pyproject.toml"
+
+CHANGES = {
+    "mitsuba": "The documentation's figures, baselines and kept images were made with the pinned"
+    " one: images may differ, and `check` may report that they moved.",
+    "drjit": "Mitsuba works only with the Dr.Jit that it was built with, and may not even load.",
+}
+"""What another version than the pinned one changes; whether meshes work, ``doctor`` tries."""
 
 
 @click.command()
@@ -24,24 +38,16 @@ def doctor() -> None:
     Examples:
       fotismos doctor
     """  # noqa: D301 click reads the \b as: keep these lines
-    for line in examine(backend.VARIANTS):
+    for line in examine(llvm.VARIANTS):
         click.echo(line)
 
 
 def examine(variants: Iterable[str]) -> Iterator[str]:
-    """Yield lines on versions, LLVM, a test rendering for each variant, meshes, OpenGL and metrics.
-
-    Raises
-    ------
-    InstallationError
-        If Dr.Jit finds no usable LLVM.
-    LostProcessError
-        If rendering ends its process.
-    """
+    """Yield lines on versions, LLVM, test renderings, meshes, OpenGL and metrics."""
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
     yield from version_lines()
-    info = backend.check()
+    info = llvm.check()
     version = ".".join(map(str, info.version or ()))
     yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
     if info.note:
@@ -49,9 +55,8 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
-        yield f"meshes          {pool.do(Task('meshes', meshed, (backend.VARIANTS[0],)))}"
+        yield f"meshes          {pool.do(Task('meshes', meshed, (llvm.VARIANTS[0],)))}"
         yield f"GLSL            {pool.do(Task('GLSL', shaded, ()))}"
-        yield f"three.js        {pool.do(Task('three.js', drawn, ()))}"
         apart = pool.do(Task("colour differences", compared, ()))
         yield f"metrics         at most {apart:.0e} from those of colour-science"
 
@@ -61,62 +66,45 @@ def rendered(variant: str) -> str:
     from reference.scene.graph import set_variant
 
     set_variant(variant)
-    from comparisons.compare import Options, compare
+    from comparisons.compare import compare
     from comparisons.gallery.builtin import builtin
+    from comparisons.options import Options
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
 
 
 def meshed(variant: str) -> str:
-    """Make and read a mesh, and return through which interface, or what breaks."""
+    """Make and read a mesh, and return that it can be done, or what breaks."""
     from reference.scene.graph import set_variant
 
     set_variant(variant)
-    from heuristic import mesh_arrays
+    from heuristic import meshes
 
     try:
-        return f"are made and read, as {mesh_arrays.tried()}"
+        meshes.require_readable()
     except InstallationError as error:
         return (
             f"cannot be made or read ({error}), so scenes with meshes cannot be compared. Install"
             " the pinned version of Mitsuba: `./run` does."
         )
+    return "are made and read"
 
 
 def shaded() -> str:
     """Compile and run a small shader, and return on which device, or what to install."""
-    from heuristic.glsl import gpu, shader_files
+    from heuristic.glsl import shader_files
 
     try:
-        device = gpu.device()
+        device = shader_files.opengl()
     except InstallationError as error:
         return f"cannot be run; only --heuristic FILE.glsl needs it: {error}"
-    shader_files.tried("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
+    shader_files.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
     return f"runs on {device.renderer}{', a software GPU' if device.is_software else ''}"
 
 
-def drawn() -> str:
-    """Draw nothing with three.js, and return its version, or what to install."""
-    from heuristic.three_js import browser
-
-    identity = [[float(row == column) for column in range(4)] for row in range(4)]
-    empty = {"meshes": [], "lights": [], "view": identity, "projection": identity}
-    try:
-        browser.draw(empty | {"width": 2, "height": 2})
-    except InstallationError as error:
-        return f"cannot be run; only --heuristic three:phong needs it: {error}"
-    return f"draws, version {browser.version()}"
-
-
 def compared() -> float:
-    """Return how far colour differences are from colour-science's.
-
-    Raises
-    ------
-    InstallationError
-        If they are too far.
-    """
+    """Return how far the compiled colour differences are from colour-science's."""
     from comparisons.departure import definitions
 
     apart = definitions.farthest()
@@ -126,3 +114,25 @@ def compared() -> float:
             f" {definitions.AGREEMENT:g} is allowed. Install the pinned versions: `./run` does."
         )
     return apart
+
+
+def pinned() -> dict[str, str]:
+    """Return the versions that the installed package, or else the checkout, requires exactly."""
+    try:
+        required = metadata.requires("fotismos") or []
+    except metadata.PackageNotFoundError:
+        project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
+        required = project["dependencies"]
+    found = (re.fullmatch(r"([\w-]+) *== *([\w.]+)", text) for text in required)
+    return {match[1]: match[2] for match in found if match}
+
+
+def version_lines() -> Iterator[str]:
+    """Yield a line per library, and one on what changes if it has another version than pinned."""
+    pins = pinned()
+    for library in LIBRARIES:
+        version = metadata.version(library)
+        pin = pins.get(library, version)
+        yield f"{library:<15} {version}" + (f"; {pin} is pinned" if version != pin else "")
+        if version != pin:
+            yield f"{'':<15} {CHANGES[library]}"

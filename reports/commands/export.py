@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from comparisons.processes.worker import Task
+from comparisons.processes.pool import Task
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity
@@ -22,9 +22,8 @@ from reports.terminal import verbosity
 def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     """Write a scene for another program to render, for `compare --image`.
 
-    Writes to OUTPUT/export/SCENE: the camera as matrices of Mitsuba and OpenGL, geometry as glTF
-    and OBJ, lights and materials as paired, the surface in each pixel as EXR, and a README on
-    conventions.
+    Writes to OUTPUT/export/SCENE: the camera as matrices of Mitsuba and OpenGL, geometry as glTF,
+    lights and materials as paired, the surface in each pixel as EXR, and a README on conventions.
 
     \b
     Examples:
@@ -34,13 +33,11 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
-        from reports.run.output import below, held, require_free_folders
-        from reports.run.places import places
+        from reports.run.results import hold, own, places
 
-        with held(output, jobs.command_line()) as held_folder:
-            folder = below(held_folder, "export")
+        with hold(output, jobs.command_line()) as top:
+            folder = own(top / "export")
             (place,) = places(folder, [scene])
-            require_free_folders(folder, place)
             words = (scene, jobs.request(rendering), folder / place)
             pool.do(Task(place, tasks.exported, words))
     verbosity.tell_where(folder / place)

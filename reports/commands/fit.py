@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from comparisons.processes.worker import Task
+from comparisons.processes.pool import Task
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity
@@ -37,12 +37,6 @@ from reports.terminal import verbosity
     " has none.",
 )
 @jobs.json_option
-@click.option(
-    "--markdown",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Also write the departures of all scenes as a Markdown table.",
-)
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
@@ -53,7 +47,6 @@ def fit(
     output: Path,
     form: str,
     as_json: bool,
-    markdown: Path | None,
     timeout: float,
     **words: Any,
 ) -> None:
@@ -71,30 +64,25 @@ def fit(
     jobs.require_known(scenes)
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons import atomic
         from comparisons.fit.fit import FitOptions
-        from comparisons.records import plain
         from heuristic.materials import FORMS
+        from reference.records import plain
         from reports.run import fit_files
-        from reports.run.output import below, held, require_free_folders
-        from reports.run.places import places
+        from reports.run.results import hold, own, places
         from reports.terminal import progress
 
         fitting = {key: words.pop(key) for key in ("loss", "intensities")}
         chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting)
-        told = (jobs.request(words), chosen, fitting | {"form": form})
-        with held(output, jobs.command_line()) as held_folder:
-            folder = below(held_folder, "fit")
-            found = places(folder, scenes)
-            require_free_folders(folder, *found)
+        common = (jobs.request(words), chosen, fitting | {"form": form})
+        with hold(output, jobs.command_line()) as top:
+            folder = own(top / "fit")
+            folders = places(folder, scenes)
             with progress.shown() as bar:
-                wanted = [
-                    Task(place, tasks.fitted, (scene, *told, folder / place), bar.of(place))
-                    for place, scene in found.items()
+                fits = [
+                    Task(place, tasks.fitted, (scene, *common, folder / place), bar.of(place))
+                    for place, scene in folders.items()
                 ]
-                records = [outcome.result() for _, outcome in pool.each(wanted)]
-    if markdown:
-        atomic.put(markdown, "\n".join(fit_files.markdown(records, scenes)) + "\n")
+                records = [outcome.result() for _, outcome in pool.each(fits)]
     if as_json:
         click.echo(json.dumps(plain(records), indent=2, ensure_ascii=False))
         return

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from comparisons.processes.worker import Task
+from comparisons.processes.pool import Task
 from reports import jobs
 from reports.run import tasks
 from reports.terminal import verbosity
@@ -52,8 +52,8 @@ def plan(
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons.records import to_json
-        from reports.terminal import choice_lines, plan_lines, progress
+        from reference.records import to_json
+        from reports.terminal import cost_tables, progress, tables
 
         lines: Iterable[str]
         request, code = jobs.request(rendering), 0
@@ -61,18 +61,18 @@ def plan(
             with progress.shown() as bar:
                 words = (scene, request, within, metric)
                 found = pool.do(Task(scene, tasks.chosen, words, bar.of(scene)))
-            lines, code = choice_lines.lines(found), int(found.chosen is None)
+            lines, code = cost_tables.choice_lines(found), int(found.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                task = Task(scene, tasks.verified, (scene, request, None, True), bar.of(scene))
+                task = Task(scene, tasks.verified, (scene, request, None), bar.of(scene))
                 found = pool.do(task)
-            lines = plan_lines.verification_lines([found])
+            lines = tables.verification_lines([found])
         else:
             found = pool.do(Task(scene, tasks.planned, (scene, request)))
-            lines = plan_lines.lines(found)
+            lines = tables.plan_lines(found)
     if as_json:
-        lines = [to_json(found).rstrip()]
-    for line in lines:
-        click.echo(line)
+        click.echo(to_json(found).rstrip())
+    else:
+        verbosity.tell(lines)
     if code:
         click.get_current_context().exit(code)

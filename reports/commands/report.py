@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.worker import Task
-from reports import jobs, opening
+from comparisons.processes.pool import Task
+from reports import jobs
 from reports.run import batch, tasks
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
-    from comparisons.case import Request
+    from comparisons.options import Options
 
 VERIFIED_AT = (64, 64)
 """Resolution at which a report verifies its plans."""
@@ -37,13 +36,13 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.timeout_option
-@jobs.all_workers_option
+@jobs.workers_option
 @jobs.scheduler_option
 @jobs.rendering_options
 @verbosity.quiet_option
 @verbosity.verbose_option
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
-@opening.option
+@jobs.open_option
 def report(
     output: Path,
     figures: bool,
@@ -55,11 +54,10 @@ def report(
     is_opened: bool,
     **rendering: Any,
 ) -> None:
-    """Compare all built-in scenes, price their effects, and write one report.
+    """Compare all built-in scenes, attribute their errors to effects, and write one report.
 
-    Writes the files of `compare`; the page also has verified plans, the hard cases and the index of
-    equations. The page appears after some seconds, with all scenes at a small size, and is written
-    again as they are refined.
+    Writes the files of `compare`; the page also has verified plans and the hard cases. The page is
+    written again after each scene.
 
     \b
     Examples:
@@ -73,35 +71,28 @@ def report(
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
-    wanted = batch.Wanted(request, figures, not quick, with_cost=True, fresh=fresh, coarse=quick)
-    rendered = jobs.pool(timeout, workers, scheduler)
-    more = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
-    batch.run(tuple(SCENES), output, wanted, rendered, more, opening.seen(is_opened))
+    job = batch.Job(request, figures, with_cost=True, fresh=fresh, coarse=quick)
+    rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
+    further = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
+    batch.run(tuple(SCENES), output, job, rendered, further, jobs.open_page if is_opened else None)
 
 
-def _verified(names: Sequence[str], request: Request, quick: bool) -> batch.More:
+def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Further:
     """Evaluate the hard cases, and compare the plans of scenes with everything simulated."""
     from comparisons.check.moved import level_of_each
     from comparisons.verification import LEVEL
 
     size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
-    small = replace(request, resolution=size, spp=None)
+    small = request.changed(resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
     verified = [  # the last scenes trace paths, which take longest
-        Task(name, tasks.timed, (tasks.verified, name, small, level, False))
-        for name in reversed(names)
+        Task(name, tasks.timed, (tasks.verified, name, small, level)) for name in reversed(names)
     ]
     cases = Task(HARD, tasks.timed, (tasks.hard_cases,))
     shown = partial(_shown, names)
-    return batch.More("verification and hard cases", [cases, *verified], shown)
+    return batch.Further("verification and hard cases", [cases, *verified], shown)
 
 
 def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
     """Return the page's content of the results of tasks."""
-    from heuristic import equations
-
-    return {
-        "verifications": [found[name] for name in names],
-        "hard_cases": found[HARD],
-        "equations": equations.index(),
-    }
+    return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}

@@ -1,1 +1,1 @@
-"""Files: ownership, layers, pictures."""
+"""Files: layers, pictures, exports."""

@@ -36,13 +36,6 @@ def write(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str
         float32; the others are half.
     header
         Metadata as strings, e.g. seed, samples and versions. BT.709's chromaticities are added.
-
-    Raises
-    ------
-    InputError
-        If layers differ in size or have another number of channels.
-    OutputError
-        If the file cannot be written.
     """
     import OpenEXR
 

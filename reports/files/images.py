@@ -1,4 +1,4 @@
-"""8-bit pictures (Pillow) of linear images and of maps, and their colour bars.
+"""8-bit pictures (Pillow) of linear images and maps, their colour bars, and small WebP pictures.
 
 Colour maps are Matplotlib's tables, read without pyplot: magma for errors, RdBu for signed values
 (both readable with common colour-vision deficiencies). The caller fixes the ranges, which are
@@ -7,18 +7,29 @@ printed next to the picture; values beyond them take the end's colour.
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from functools import lru_cache
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from comparisons.comparison import Images
 from comparisons.departure import marks
+from comparisons.departure.colour import to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
-from comparisons.record import Images
+from reference.records import Record
 
 Bytes = NDArray[np.uint8]
+
+#: Quality of WebP pictures, from 0 to 100.
+QUALITY = 80
+
+#: Previews in a row of a sheet.
+COLUMNS = 4
 
 #: Colour maps by purpose.
 ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
@@ -32,10 +43,9 @@ UNDETERMINED = (240, 201, 119)
 
 
 def tonemap(rgb: ArrayLike, exposure: float = 1.0) -> Image.Image:
-    """Linear RGB (H, W, 3) as sRGB: × exposure, clipped to [0, 1], curve of IEC 61966-2-1."""
+    """Linear RGB (H, W, 3) as sRGB: × exposure, clipped to [0, 1], as 8 bits."""
     linear = np.clip(np.asarray(rgb, np.float32) * np.float32(exposure), 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return Image.fromarray(np.round(255.0 * encoded).astype(np.uint8))
+    return Image.fromarray(np.round(255.0 * to_srgb(linear)).astype(np.uint8))
 
 
 def error_map(values: ArrayLike, vmax: float, colormap: str = ERROR_COLOURS) -> Image.Image:
@@ -136,3 +146,55 @@ def _table(colormap: str) -> Bytes:
 
     colours = colormaps[colormap].resampled(256)(np.arange(256))[:, :3]
     return np.round(255 * colours).astype(np.uint8)
+
+
+# --- Small pictures for the page ---------------------------------------------------------------
+
+
+class Sheet(Record):
+    """Previews of `width` by `height` pixels in rows of `COLUMNS`, as one WebP file."""
+
+    width: int
+    height: int
+    webp: bytes
+
+
+def sheet(previews: Sequence[Image.Image]) -> Sheet | None:
+    """Return the sheet of previews of one size, in order; None for fewer than two."""
+    if len(previews) < 2:
+        return None
+    width, height = previews[0].size
+    rows = -(-len(previews) // COLUMNS)
+    whole = Image.new("RGB", (width * COLUMNS, height * rows))
+    for place, preview in enumerate(previews):
+        row, column = divmod(place, COLUMNS)
+        whole.paste(preview, (column * width, row * height))
+    return Sheet(width, height, webp(whole))
+
+
+def webp(picture: Image.Image) -> bytes:
+    """Return the WebP file of a picture."""
+    buffer = BytesIO()
+    picture.save(buffer, "WEBP", quality=QUALITY, method=4)
+    return buffer.getvalue()
+
+
+@lru_cache(maxsize=4096)
+def webp_of(png: bytes) -> bytes:
+    """Return a small PNG picture as WebP, kept for the next time that the page is written."""
+    return webp(Image.open(BytesIO(png)).convert("RGB"))
+
+
+def webp_uri(file: bytes) -> str:
+    """Return a WebP file as an address that holds it."""
+    return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+
+
+def placed(shown: Sheet) -> dict[str, Any]:
+    """Return the sheet, and where its pictures are, for the page's scripts."""
+    return {
+        "sheet": webp_uri(shown.webp),
+        "width": shown.width,
+        "height": shown.height,
+        "columns": COLUMNS,
+    }

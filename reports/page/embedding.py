@@ -1,13 +1,9 @@
-"""A comparison's images inside the page, as numbers: exact to the digits that the page prints.
+"""A comparison's images inside the page, as half-precision numbers.
 
-Every value is rounded to three significant decimal digits, metrics other than the leading one to
-two and the standard error to one, and stored as a 16-bit code. So the page prints the EXR's own
-value, rounded once; half floats would take more bits and sometimes print another last digit. With
-three digits, steps between codes are at most 1 %, near white one 8-bit level.
-
-A plane's codes are replaced by their differences to a base plane (green, for red and blue), then
-to the left neighbour, and split into low and high bytes; all planes are deflated together.
-``templates/viewer/decoding.js`` reverses this.
+A half float has 11 bits, three decimal digits. Metrics other than the leading one keep 8 bits and
+the standard error 5, which packs better. A plane's codes are replaced by their differences to a
+base plane (green, for red and blue), then to the left neighbour, and split into low and high bytes;
+all planes are deflated together. ``templates/viewer/decoding.js`` reverses this.
 """
 
 from __future__ import annotations
@@ -23,31 +19,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import marks
 from comparisons.departure.metrics import LEADING, drawn
-from comparisons.records import Record, plain
+from reference.records import Record, plain
 
-#: Significant digits of values and of the leading metric, of the other metrics, and of the standard
-#: error, which is averaged over squares of `POOLED` by `POOLED` pixels.
-DIGITS, OTHER_DIGITS, ERROR_DIGITS, POOLED = 3, 2, 1, 2
+BITS = {3: 11, 2: 8, 1: 5}
+"""Bits of precision by the digits printed."""
 
-#: Decimal exponents of the smallest and the largest magnitudes; smaller ones are 0.
-EXPONENTS = (-18, 16)
+DIGITS, OTHER_DIGITS, ERROR_DIGITS = 3, 2, 1
+"""Of values and the leading metric, of the other metrics, and of the standard error."""
 
-#: Added to the code of a magnitude if the value is negative.
-NEGATIVE = 0x8000
+POOLED = 2
+"""The standard error is averaged over squares of this many pixels a side."""
 
-#: Smaller differences are printed as "< 0.01", and stored as half of it, if maps reach 1.
+LARGEST = 65504.0
+"""The largest half float; greater values are clipped in the page."""
+
 LEAST = 0.01
+"""Smaller differences are printed as "< 0.01", and stored as half of it, if maps reach 1."""
 
-#: Pixels; longer images are averaged over square blocks inside the page, never in the files.
 LONGEST = 1024
+"""Pixels; longer images are averaged over square blocks inside the page, never in the files."""
 
-#: Bits of the plane "flags".
 SIGNIFICANT, COUNTED, UNDETERMINED = 1, 2, 4
+"""Bits of the plane "flags"."""
 
 Codes = NDArray[np.uint16]
-
-#: Looked up, since powers would dominate the time of encoding.
-_TENS = 10.0 ** np.arange(EXPONENTS[1] - EXPONENTS[0] + DIGITS)
 
 
 class Plane(Record):
@@ -61,12 +56,8 @@ class Plane(Record):
 class Embedded(Record):
     """The images of a comparison, for the page.
 
-    width, height
-        Of the planes. Their pixels are means over `block` × `block` pixels of the image.
-    planes
-        The content of `data`, in order.
-    data
-        The planes, deflated (RFC 1950), in base64.
+    ``width`` and ``height`` are of the planes, whose pixels are means over ``block`` × ``block``
+    pixels of the image. ``data`` has the planes in order, deflated (RFC 1950), in base64.
     """
 
     width: int
@@ -76,7 +67,7 @@ class Embedded(Record):
     data: str
 
     def manifest(self) -> dict[str, Any]:
-        """The description needed to read `data`, as plain data."""
+        """Return the description needed to read `data`, as plain data."""
         return plain(structs.replace(self, data=""))
 
 
@@ -96,7 +87,7 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     planes, codes = [], {}
 
     def add(name: str, values: NDArray, digits: int, base: str | None = None) -> None:
-        planes.append(Plane(name, digits, base))
+        planes.append(Plane(name=name, digits=digits, base=base))
         codes[name] = encode(values, digits) if digits else values
 
     for layer in ("heuristic", "reference"):
@@ -109,66 +100,33 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
             values = np.where((values > 0.0) & (values < LEAST), LEAST / 2, values)
         add(name, values, DIGITS if name == LEADING.name else OTHER_DIGITS)
     deviations = [_means(channels[f"reference_stderr.{colour}"], block) for colour in "RGB"]
-    add("standard_error", _pooled(np.max(deviations, axis=0)), ERROR_DIGITS)
+    pooled = _means(np.max(deviations, axis=0), POOLED)
+    rows, columns = np.shape(deviations[0])
+    pooled = pooled.repeat(POOLED, axis=0).repeat(POOLED, axis=1)[:rows, :columns]
+    add("standard_error", pooled, ERROR_DIGITS)
     marked = np.asarray(channels["significant.Y"], np.float64)
     significant = _means(marked == marks.MARKED, block) > 0.0
     undetermined = (_means(marked == marks.UNDETERMINED, block) > 0.0) & ~significant
     flags = SIGNIFICANT * significant + COUNTED * (_means(counted, block) > 0.0)
     flags = flags + UNDETERMINED * undetermined
     add("flags", flags.astype(np.uint16), 0)
-
-    height, width = flags.shape
-    return Embedded(width, height, block, tuple(planes), packed(planes, codes))
-
-
-def _pooled(values: NDArray) -> NDArray:
-    """Return the means over squares, at all their pixels, (H, W)."""
-    height, width = values.shape
-    means = _means(values, POOLED)
-    return means.repeat(POOLED, axis=0).repeat(POOLED, axis=1)[:height, :width]
-
-
-def embed_colours(image: NDArray, digits: int) -> Embedded:
-    """Encode an image (H, W, 3) as planes R, G and B of some digits."""
-    planes = [Plane(colour, digits) for colour in "RGB"]
-    codes = {colour: encode(image[..., place], digits) for place, colour in enumerate("RGB")}
-    height, width, _ = image.shape
-    return Embedded(width, height, 1, tuple(planes), packed(planes, codes))
+    return Embedded(
+        width=columns, height=rows, block=block, planes=tuple(planes), data=packed(planes, codes)
+    )
 
 
 def packed(planes: Sequence[Plane], codes: Mapping[str, Codes]) -> str:
-    """The named codes of planes as in `Embedded.data`."""
+    """Return the named codes of planes as in `Embedded.data`."""
     raw = b"".join(_bytes(codes[plane.name], codes.get(plane.base or "")) for plane in planes)
-    return deflated(raw)
-
-
-def deflated(raw: bytes, level: int = 6) -> str:
-    """Return bytes, deflated (RFC 1950), in base64."""
-    return base64.b64encode(zlib.compress(raw, level)).decode("ascii")
+    return base64.b64encode(zlib.compress(raw)).decode("ascii")
 
 
 def encode(values: ArrayLike, digits: int = DIGITS) -> Codes:
-    """The codes of finite values: 0 for 0, rising with the magnitude, + `NEGATIVE` for the sign.
-
-    A magnitude m · 10^(e − digits + 1), with m of `digits` digits, has the code
-    9 · 10^(digits−1) · (e − lowest) + m − 10^(digits−1) + 1. Ties are rounded to even, as
-    Python prints them. Magnitudes beyond `EXPONENTS` are clipped.
-    """
-    values = np.asarray(values, np.float64)
-    lowest, highest = EXPONENTS
-    unit = 10 ** (digits - 1)
-    size = np.clip(np.abs(values), 0.0, (10.0 - 5.0 / unit) * 10.0**highest)
-    exponent = np.floor(np.log10(np.maximum(size, 10.0**lowest))).astype(int)
-    mantissa = np.rint(_scaled(size, digits - 1 - exponent)).astype(int)
-    carried = mantissa == 10 * unit  # 9.996 is 10.0
-    exponent, mantissa = exponent + carried, np.where(carried, unit, mantissa)
-    code = np.where(mantissa < unit, 0, 9 * unit * (exponent - lowest) + mantissa - unit + 1)
-    return np.where((values < 0) & (code > 0), code + NEGATIVE, code).astype(np.uint16)
-
-
-def _scaled(size: NDArray, power: NDArray) -> NDArray:
-    # Powers of ten are exact, so ties stay ties; one of the two factors is 1.
-    return size * _TENS[np.maximum(power, 0)] / _TENS[np.maximum(-power, 0)]
+    """Return half floats as integers, rounded to the bits that some digits need."""
+    codes = np.clip(values, -LARGEST, LARGEST).astype(np.float16).view(np.uint16)
+    step = 1 << (BITS[3] - BITS[digits])
+    rounded = np.minimum((codes & 0x7FFF) + step // 2, 0x7BFF) & ~np.uint16(step - 1)
+    return np.where(rounded > 0, rounded | (codes & 0x8000), 0).astype(np.uint16)
 
 
 def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:

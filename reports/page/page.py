@@ -12,42 +12,67 @@ text.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from msgspec import structs
 
+from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import LEADING, METRICS
-from comparisons.records import plain
+from reference.records import plain
 from reports import glossary, verdict
 from reports.charts import histograms, vega
-from reports.page import overview, templating, verdict_view, viewer_data
-from reports.page.legends import legends
+from reports.charts.theme import EFFECT_COLOURS
+from reports.page import templating, viewer_data
 from reports.page.scene_view import Making, SceneView
-from reports.run.stages import Failure, Run
+from reports.run.results import Failure, RunRecord
 
 if TYPE_CHECKING:  # few pages need these
-    from comparisons.hard.collection import HardCases
+    from comparisons.hard.hard_cases import HardCases
     from comparisons.verification import Verification
-    from heuristic.equations import Entry
 
 #: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
 
+ROOM = 1.04
+"""Width of the bars, relative to the longest."""
+
 #: The parts of the page's style and of its script, in order.
 STYLES = (
-    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "points", "help",
+    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "help",
     "print",
 )  # fmt: skip
 SCRIPTS = (
     "page", "numbers", "help", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
-    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "caption", "saving",
-    "pointer", "controls", "viewer", "keyboard", "overview", "points", "charts", "verdict",
-    "vectors", "termrows", "terms", "switchboard", "objects", "lazy", "main",
+    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving",
+    "pointer", "controls", "viewer", "keyboard", "verdict",
+    "termrows", "terms", "switchboard", "lazy", "main",
 )  # fmt: skip
 
 
-class Scene(SceneView, kw_only=True):
+#: Fewest scenes for a meaningful ranking.
+FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How two metrics rank scenes, from −1 (opposite) over 0 (unrelated) to 1 (alike).
+
+    Attributes
+    ----------
+    spearman
+        Correlation of the ranks.
+    kendall
+        Share of the pairs of scenes in the same order, minus the share in opposite order
+        (τ_b, which leaves ties out).
+    """
+
+    spearman: float
+    kendall: float
+
+
+class PageScene(SceneView, kw_only=True):
     """A scene in the page, and its name in the page's address."""
 
     id: str
@@ -63,80 +88,77 @@ class FailedScene(Failure, kw_only=True):
 def render(
     views: Sequence[SceneView],
     title: str = TITLE,
-    equations: Sequence[Entry] = (),
     verifications: Sequence[Verification] = (),
     hard_cases: HardCases | None = None,
     failures: Sequence[Failure] = (),
-    run: Run | None = None,
+    run: RunRecord | None = None,
     making: Making | None = None,
 ) -> str:
     """One HTML page of all scenes, in the given order.
 
-    `equations` is the index of `heuristic.equations`; it, `verifications` and `hard_cases` are
-    separate sections, omitted if empty. `failures` are the scenes that could not be compared. `run`
-    says where the time went, `making` how far an unfinished run is.
+    `verifications` and `hard_cases` are separate sections, omitted if empty. `failures` are the
+    scenes that could not be compared. `run` says where the time went, `making` how far an
+    unfinished run is.
     """
     taken: set[str] = set()
     scenes = [_scene(view, taken) for view in views]
     failed = [
-        FailedScene(failure.scene, failure.error, id=overview.identifier(failure.scene, taken))
+        FailedScene(failure.scene, failure.error, id=_identifier(failure.scene, taken))
         for failure in failures
     ]
-    charted = any(scene.histograms or scene.charts for scene in scenes)
     return (
         templating.environment()
         .get_template("page.html.j2")
         .render(
             title=title,
             style=templating.style(STYLES),
-            scripts=templating.scripts(SCRIPTS, charted),
+            scripts=templating.scripts(SCRIPTS),
             page_data=_page_data(scenes, failed),
-            verdict=verdict_view.context(scenes) if scenes else None,
+            verdict=_verdict(scenes) if scenes else None,
             scenes=scenes,
             failures=failed,
             metrics=METRICS,
             leading=LEADING,
-            columns=overview.columns(),
-            legends=legends(),
+            legends=viewer_data.legends(),
             glossary=glossary.GROUPS,
-            equations=equations,
             verifications=verifications,
-            **_of_few_pages(scenes, hard_cases),
+            hard_cases=hard_cases,
+            ranking=rankings([scene.record for scene in scenes]),
             run=run,
             making=making,
         )
     )
 
 
-def _of_few_pages(scenes: Sequence[Scene], hard_cases: HardCases | None) -> dict[str, Any]:
-    """Content of few pages, made by modules that the others do not import."""
-    costs = [scene.cost.record for scene in scenes if scene.cost]
-    shown: dict[str, Any] = {"cost_rows": (), "hard_cases": hard_cases, "ranking": {}}
-    if len(scenes) > 1:
-        from reports.ranking import rankings
+def _verdict(scenes: Sequence[PageScene]) -> dict[str, Any]:
+    """Return the data of the first screen: the verdict, and a bar for each scene, worst first."""
+    found = [verdict.finding(s.record, s.cost.record if s.cost else None) for s in scenes]
+    rows = sorted(zip(scenes, found, strict=True), key=lambda row: -row[1].mean)
+    names = verdict.ranked(found)
+    return {
+        "sentences": verdict.sentences(found),
+        "rows": rows,
+        "about": {s.id: verdict.about(f) for s, f in zip(scenes, found, strict=True)},
+        "tolerances": verdict.TOLERANCES,
+        "usual": verdict.USUAL,
+        "share": verdict.SHARE,
+        "top": ROOM * max((f.mean for f in found), default=1.0) or 1.0,
+        "effects": {name: EFFECT_COLOURS[name] for name in names},
+        "with_causes": verdict.WITH_CAUSES,
+        "has_remedies": any(f.remedies for f in found),
+        "has_causes": any(f.remedies or f.nearest for f in found),
+    }
 
-        shown["ranking"] = rankings([scene.record for scene in scenes])
-    if costs:
-        from reports.page.costs import cost_overview
 
-        shown["cost_methods"] = cost_overview.methods(costs)
-        shown["cost_rows"] = cost_overview.rows(costs)
-    if hard_cases:
-        from reports.page.hard_cases import GROUPS, grey
-
-        shown |= {"hard_groups": GROUPS, "grey": grey}
-    return shown
-
-
-def _scene(view: SceneView, taken: set[str]) -> Scene:
-    return Scene(
+def _scene(view: SceneView, taken: set[str]) -> PageScene:
+    return PageScene(
         **structs.asdict(view),
-        id=overview.identifier(view.record.scene, taken),
+        id=_identifier(view.record.scene, taken),
         histograms=tuple(histograms.figures(view.record)),
     )
 
 
-def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[str, Any]:
+def _page_data(scenes: Sequence[PageScene], failed: Sequence[FailedScene]) -> dict[str, Any]:
     """The data of the page's script: the scenes, and how maps are drawn."""
     return {
         "scenes": [
@@ -148,7 +170,7 @@ def _page_data(scenes: Sequence[Scene], failed: Sequence[FailedScene]) -> dict[s
     }
 
 
-def _scene_data(scene: Scene) -> dict[str, Any]:
+def _scene_data(scene: PageScene) -> dict[str, Any]:
     record = scene.record
     return {
         "id": scene.id,
@@ -161,8 +183,40 @@ def _scene_data(scene: Scene) -> dict[str, Any]:
         "best": viewer_data.best_exposures(record.metrics),
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(scene.cost.effects) if scene.cost else None,
-        "between": plain(scene.cost.between) if scene.cost else None,
         "terms": scene.terms.manifest() if scene.terms else None,
-        "keys": overview.keys(record),
-        "significant": overview.is_significant(record),
+    }
+
+
+def _identifier(name: str, taken: set[str]) -> str:
+    """Return a name for a scene in the page's address: plain characters; added to `taken`."""
+    plain = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
+    chosen, count = plain or "scene", 1
+    while chosen in taken:
+        count += 1
+        chosen = f"{plain or 'scene'}-{count}"
+    taken.add(chosen)
+    return chosen
+
+
+def rankings(records: Sequence[ComparisonRecord]) -> dict[str, dict[str, Agreement]]:
+    """Return the agreement of each pair of metrics on means without noise, by their names.
+
+    Empty for fewer than `FEWEST` scenes. A metric with the same value in all scenes ranks nothing,
+    and is left out.
+    """
+    if len(records) < FEWEST:
+        return {}
+    from scipy.stats import kendalltau, spearmanr  # takes a second to import
+
+    values = {name: [r.metrics[name].debiased for r in records] for name in METRICS}
+    values = {name: means for name, means in values.items() if np.ptp(means) > 0.0}
+    return {
+        one: {
+            other: Agreement(
+                float(spearmanr(values[one], values[other]).statistic),
+                float(kendalltau(values[one], values[other]).statistic),
+            )
+            for other in values
+        }
+        for one in values
     }

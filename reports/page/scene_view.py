@@ -9,12 +9,16 @@ from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
-from comparisons.records import Record
+from reference.records import Record
 from reports.charts.vega import Figure
-from reports.files.sheets import Sheet
+from reports.files import images
+from reports.files.images import Sheet
 from reports.page.embedding import Embedded
-from reports.page.lit import Lit
 from reports.page.terms_view import TermsView
+from reports.terminal.words import number, seconds
+
+LEAST = 0.01
+"""ΔE2000: smaller means are rounding or remaining noise."""
 
 
 class EffectMap(Record):
@@ -30,9 +34,7 @@ class EffectMap(Record):
 class CostView(Record):
     """A page's data of a study.
 
-    ``images`` are PNG files by their bare names; ``sheet`` has the corners of the lattice,
-    ``points`` the measured points and then the reference. ``between`` is the part of the
-    reference's light that comes from between surfaces, from 0 to 1.
+    ``images`` are PNG files by their bare names; ``sheet`` has the hybrids.
     """
 
     record: Cost
@@ -40,26 +42,41 @@ class CostView(Record):
     noise: str
     effects: EffectMap
     sheet: Sheet | None = None
-    points: Sheet | None = None
-    between: Embedded | None = None
 
     def picture(self, kind: str, name: str) -> bytes:
-        """Return the picture of a rung, a part or an effect."""
+        """Return the picture of a method, a part or an effect."""
         return self.images[picture_name(kind, name)]
 
     @property
     def switchboard(self) -> dict[str, Any]:
-        """The data of the switchboard's script; empty without a sheet."""
-        from reports.page import switchboard
+        """The switchboard's data: previews of combinations of effects; empty without a sheet."""
+        if not self.sheet:
+            return {}
+        effects = [one.effect for one in self.record.attribution.effects]
+        return images.placed(self.sheet) | {
+            "hybrids": [
+                {
+                    "on": [effects.index(effect) for effect in hybrid.effects],
+                    "error": number(hybrid.error) if hybrid.error >= LEAST else f"< {LEAST}",
+                    "time": seconds(max(hybrid.seconds, 0.0)),
+                }
+                for hybrid in self.record.attribution.hybrids
+            ],
+        }
 
-        return switchboard.data(self.record, self.sheet) if self.sheet else {}
 
-    @property
-    def measured(self) -> dict[str, Any]:
-        """The data of the script that shows the points' pictures; empty without them."""
-        from reports.page.costs import point_pictures
+class Before(Record):
+    """What moved in a scene since its baseline.
 
-        return point_pictures.data(self.record, self.points) if self.points else {}
+    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are PNG files: the halves
+    as they were, and ΔE2000 between then and now.
+    """
+
+    sentences: tuple[str, ...]
+    moved: tuple[tuple[str, ...], ...]
+    tested: int
+    pictures: dict[str, bytes]
+    command: str
 
 
 class SceneView(Record):
@@ -77,12 +94,10 @@ class SceneView(Record):
         Labels and paths relative to the page, shown as links.
     charts, cost
         The study of cost, if there is one.
-    is_coarse
-        Whether it is a small preview, which the page replaces later.
     terms
         The terms of equation 8.10 at a grid of pixels.
-    lit
-        The shape and the material that each pixel sees.
+    before
+        What moved since a baseline, on the page of a check.
     """
 
     record: ComparisonRecord
@@ -91,14 +106,13 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     charts: tuple[Figure, ...] = ()
     cost: CostView | None = None
-    is_coarse: bool = False
     terms: TermsView | None = None
-    lit: Lit | None = None
+    before: Before | None = None
 
 
 @dataclass(frozen=True)
 class Making:
-    """The number of refined scenes of an unfinished run."""
+    """The number of finished scenes of an unfinished run."""
 
     done: int
     total: int

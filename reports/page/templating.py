@@ -7,27 +7,30 @@ import hashlib
 import math
 from collections.abc import Iterable
 from functools import lru_cache
+from pathlib import Path
 
-from jinja2 import Environment
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from comparisons.records import plain
+from reference.records import plain
 from reports import verdict
-from reports.charts import theme, vega
-from reports.files import images, sheets
-from reports.page import TEMPLATES, embedding, templates, viewer_data
-from reports.terminal.nearest_lines import caution, lacking
-from reports.terminal.printing import (
+from reports.charts import theme
+from reports.files import images
+from reports.page import viewer_data
+from reports.terminal.words import (
     NOTICEABLE,
     about_noise,
-    code_spans,
+    caution,
     difference,
+    lacking,
     may_be_none,
     number,
     parameter,
     percent,
     seconds,
 )
+
+TEMPLATES = Path(__file__).parent / "templates"
 
 #: Pictures narrower than this are enlarged without smoothing.
 PIXELATED_BELOW = 400
@@ -40,8 +43,16 @@ FORMS = {form.__name__: form for form in (number, difference, parameter, seconds
 EARLY = """const framed = location.protocol === "about:" ? " framed" : "";
 document.documentElement.className = `js${framed}`;"""
 
-#: Tells the page that the module before it has run; inline modules have no such event.
-LOADED = '\nwindow.dispatchEvent(new Event("vega"));'
+
+def templates() -> Environment:
+    """Return an environment of the templates of all pages, which escapes everything."""
+    return Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
 
 
 def style(parts: Iterable[str]) -> Markup:
@@ -49,17 +60,16 @@ def style(parts: Iterable[str]) -> Markup:
     return Markup("".join(_source(f"styles/{part}.css") for part in parts))
 
 
-def scripts(parts: Iterable[str], is_charted: bool, last: str = "") -> list[dict[str, Markup]]:
-    """Return a page's scripts: one that runs early, Vega if the page has charts, and its own.
+def scripts(parts: Iterable[str], last: str = "") -> list[dict[str, Markup]]:
+    """Return a page's scripts: one that runs early, and its own.
 
     Each has its ``code``, and the ``source`` by which the page's policy allows it. The page's own
     consists of some parts and then ``last``.
     """
     code = "\n".join([*(_source(f"viewer/{part}.js") for part in parts), last])
-    charts = [vega.bundle() + LOADED] if is_charted else []
     return [
         {"code": Markup(script), "source": _hash(script)}
-        for script in (EARLY, *charts, '"use strict";\n' + code)
+        for script in (EARLY, '"use strict";\n' + code)
     ]
 
 
@@ -83,15 +93,13 @@ def environment() -> Environment:
     environment.filters.update(
         FORMS,
         judged=verdict.judged,
-        code_spans=code_spans,
         region_view=viewer_data.region_view,
         plain=plain,
         lacking=lacking,
         caution=caution,
         uri=_data_uri,
-        webp_uri=sheets.webp_uri,
-        webp_of=sheets.webp_of,
-        deflated=lambda code: embedding.deflated(code.encode(), 9),
+        webp_uri=images.webp_uri,
+        webp_of=images.webp_of,
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
     environment.globals.update(

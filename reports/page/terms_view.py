@@ -8,41 +8,18 @@ images (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from msgspec import field, structs
+from msgspec import field
 from numpy.typing import NDArray
 
 from comparisons.departure.regions import Region
-from comparisons.records import Record, plain
-from comparisons.terms import polar
-from comparisons.terms.term_grid import TermGrid
+from comparisons.pixel_terms import TermGrid, TermMaterial
+from reference.records import Record, plain
 from reports.page.embedding import Embedded, Plane, packed
 
 LARGEST = 65535
-
-View = TypeVar("View", bound=Record)
-
-
-class MaterialView(Record):
-    """A material of the grid; see :class:`comparisons.terms.term_grid.TermMaterial`."""
-
-    name: str
-    k_i: tuple[float, ...]
-    k_a: tuple[float, ...]
-    k_d: tuple[float, ...]
-    k_s: tuple[float, ...]
-    n: float
-    form: str
-    ambient: tuple[float, ...]
-
-
-class LightView(Record):
-    """A light of the grid, and its ``I_p0``."""
-
-    name: str
-    intensity: tuple[float, ...]
 
 
 class PickedTerms(Record):
@@ -65,8 +42,8 @@ class TermsView(Record):
         Planes over the grid of pixels; None without terms.
     tops
         Of the named planes of values ≥ 0.
-    lobes
-        Planes over incidences and directions of view, by the material's number.
+    lights
+        Names, and their ``I_p0``.
     missing
         Why there are no terms.
     picked
@@ -74,22 +51,18 @@ class TermsView(Record):
     """
 
     grid: Embedded | None = None
-    lobes: Embedded | None = None
     tops: dict[str, float] = field(default_factory=dict)
-    materials: tuple[MaterialView, ...] = ()
-    lights: tuple[LightView, ...] = ()
+    materials: tuple[TermMaterial, ...] = ()
+    lights: tuple[dict[str, Any], ...] = ()
     missing: str = ""
     picked: PickedTerms | None = None
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        shown = plain(structs.replace(self, picked=None))
+        shown = plain(self)
         del shown["picked"]
         return shown | {
             "grid": self.grid.manifest() if self.grid else None,
-            "incidences": polar.INCIDENCES.tolist(),
-            "views": polar.VIEWS.tolist(),
-            "grazing": polar.GRAZING,
         }
 
 
@@ -99,33 +72,34 @@ def view(
     """Return the page's data of a grid of terms, or the reason why there is none."""
     if grid is None:
         return TermsView(missing=missing) if missing else None
-    tops: dict[str, float] = {}
     seen = grid.material >= 0
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
-    planes = {"material": (grid.material + 1).astype(np.uint16)}
-    planes["cos_view"] = _cosines(grid.cos_view, seen)
+    cosines, amounts = {"cos_view": grid.cos_view}, dict[str, NDArray]()
     for number, light in enumerate(grid.lights):
-        for name in ("cos_incidence", "cos_view"):
-            planes[f"{number}.{name}"] = _cosines(getattr(light, name), seen)
-        amounts = {"attenuation": light.attenuation * seen, "lobe": light.lobe * shiny}
-        for name, amount in amounts.items():
-            planes[f"{number}.{name}"] = _amounts(f"{number}.{name}", amount, tops)
+        cosines |= {
+            f"{number}.cos_incidence": light.cos_incidence,
+            f"{number}.cos_view": light.cos_view,
+        }
+        amounts |= {
+            f"{number}.attenuation": light.attenuation * seen,
+            f"{number}.lobe": light.lobe * shiny,
+        }
     if grid.others is not None:
-        for channel, colour in enumerate("RGB"):
-            planes[f"others.{colour}"] = _amounts(
-                f"others.{colour}", grid.others[..., channel] * seen, tops
-            )
-    lobes = {
-        f"physical.{number}": _amounts(f"physical.{number}", material.physical, tops)
-        for number, material in enumerate(grid.materials)
-        if material.physical is not None
-    }
+        amounts |= {f"others.{c}": grid.others[..., i] * seen for i, c in enumerate("RGB")}
+    tops = {name: float(values.max(initial=0)) or 1.0 for name, values in amounts.items()}
+
+    planes = {"material": (grid.material + 1).astype(np.uint16)}
+    for name, values in cosines.items():
+        code = np.rint(LARGEST * (1 + np.clip(values, -1, 1)) / 2)
+        planes[name] = np.where(seen, code, 0).astype(np.uint16)
+    for name, values in amounts.items():
+        code = np.rint(LARGEST * np.sqrt(np.maximum(values, 0) / tops[name]))
+        planes[name] = code.astype(np.uint16)
     return TermsView(
         grid=_embedded(planes),
-        lobes=_embedded(lobes) if lobes else None,
         tops=tops,
-        materials=tuple(_of(MaterialView, material) for material in grid.materials),
-        lights=tuple(_of(LightView, light) for light in grid.lights),
+        materials=grid.materials,
+        lights=tuple({"name": each.name, "intensity": each.intensity} for each in grid.lights),
         picked=picked,
     )
 
@@ -138,36 +112,18 @@ def picked(
         return None
     middles = [(each.x + each.width // 2, each.y + each.height // 2) for each in regions[:1]]
     height, width, _ = reference.shape
-    found = [grid.at(*pixel) for pixel in (*middles, (width // 2, height // 2))]
-    seen = [terms for terms in found if terms]
+    seen = [t for pixel in (*middles, (width // 2, height // 2)) if (t := grid.at(*pixel))]
     if not seen:
         return None
     terms = next((terms for terms in seen if not any(terms.emission)), seen[0])
-    lit = (
-        (f"{light.name}, {name}", getattr(light, name))
-        for light in terms.lights
-        for name in ("diffuse", "specular")
-    )
     column, row = terms.pixel
-    rows = [("emission", terms.emission), ("ambient", terms.ambient), *lit]
-    rows = [*((name, rgb) for name, rgb in (*rows, ("other lights", terms.others)) if any(rgb))]
+    rows = [("emission", terms.emission), ("ambient", terms.ambient)]
+    for light in terms.lights:
+        rows += [(f"{light.name}, diffuse", light.diffuse)]
+        rows += [(f"{light.name}, specular", light.specular)]
+    rows = [(name, rgb) for name, rgb in (*rows, ("other lights", terms.others)) if any(rgb)]
     rows += [("textbook", terms.total), ("physical", tuple(reference[row, column].tolist()))]
     return PickedTerms(terms.pixel, terms.material.name, tuple(rows))
-
-
-def _of(kind: type[View], source: object) -> View:
-    return kind(**{name: getattr(source, name) for name in kind.__struct_fields__})
-
-
-def _cosines(values: NDArray, seen: NDArray) -> NDArray[np.uint16]:
-    codes = np.rint(LARGEST * (1 + np.clip(values, -1, 1)) / 2)
-    return np.where(seen, codes, 0).astype(np.uint16)
-
-
-def _amounts(name: str, values: NDArray, tops: dict[str, float]) -> NDArray[np.uint16]:
-    values = np.maximum(values, 0)
-    tops[name] = float(values.max(initial=0)) or 1.0
-    return np.rint(LARGEST * np.sqrt(values / tops[name])).astype(np.uint16)
 
 
 def _embedded(codes: dict[str, NDArray[np.uint16]]) -> Embedded:

@@ -1,19 +1,54 @@
-"""The viewer's data besides a scene's images: how maps are drawn, and where regions are."""
+"""The viewer's data besides images: legends, how maps are drawn, and where regions are."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-from comparisons.departure.colorimetry import BT709, rgb_to_xyz
-from comparisons.departure.metrics import LOG2_EPSILON
+from comparisons.departure.colour import BT709, rgb_to_xyz
+from comparisons.departure.metrics import LOG2_EPSILON, RATIO, drawn
 from comparisons.departure.regions import Region
 from comparisons.departure.statistics import Summary
 from reports.charts import theme
 from reports.files import images
-from reports.page.legends import legends
 
 #: Approximate screen pixels of a region that is opened from its link.
 REGION_SIZE = 420
+
+
+@dataclass(frozen=True)
+class Legend:
+    """A map: its kind, colour bar, labels from low to high, and a sentence.
+
+    ``kind`` is ``error``, ``ratio`` or ``mask``; ``top`` is the end of the bar.
+    """
+
+    name: str
+    title: str
+    kind: str
+    top: float = 1.0
+    bar: str = ""
+    labels: tuple[str, ...] = ()
+    note: str = ""
+
+
+def legends() -> tuple[Legend, ...]:
+    """The maps in the order of the page."""
+    bar, signed = map(images.colour_bar, (images.ERROR_COLOURS, images.SIGNED_COLOURS))
+    stops = f"≤ −{RATIO.limit:g}", "0", f"≥ +{RATIO.limit:g} {RATIO.unit}"
+    errors = (
+        Legend(m.name, m.label, "error", m.map_range[1], bar, _labels(*m.map_range), m.unit)
+        for m in drawn().values()
+    )
+    return (
+        *errors,
+        Legend(RATIO.name, RATIO.label, "ratio", RATIO.limit, signed, stops, RATIO.definition),
+        Legend("significant", "Shown to differ", "mask", note="shown to differ, however little"),
+    )
+
+
+def _labels(low: float, high: float) -> tuple[str, ...]:
+    return f"{low:g}", f"{(low + high) / 2:g}", f"≥ {high:g}"
 
 
 def drawing() -> dict[str, Any]:

@@ -1,59 +1,82 @@
-"""The files of an audit: its record, its page, and a chart of albedos."""
+"""The files of an audit: its record, its page, and a chart of the lobes in polar form."""
 
-from collections.abc import Iterable
+from math import cos, radians, sin
 from pathlib import Path
+from typing import Any
 
-from comparisons import records
+import altair as alt
+
 from comparisons.audit.audit_record import Audit
-from reports.charts import audit_charts, vega
-from reports.charts.theme import Spec
-from reports.files import ownership
-from reports.page import templates
-from reports.run.places import PAGE
-from reports.terminal import audit_words
-from reports.terminal.printing import number
+from reference import records
+from reports.charts import vega
+from reports.charts.theme import FAINT, Spec
+from reports.page.templating import templates
+from reports.run import results
+from reports.run.results import PAGE
+from reports.terminal import audit_lines
 
-ALBEDOS = {"white furnace": "seen", "energy": "returned"}
-"""Fields of a curve that the charts of a check show."""
+WIDTH = 270
+"""Pixels of a plot: with its axis it fits a phone."""
+
+INKS = ("#7a6fd0", "#2b93b8", "#3f9e5f")
+DASHES = ([1, 0], [6, 3], [2, 2])
+"""Colours and dashes of the lobes by light, visible on light and dark grounds."""
+
+
+def lobes(record: Audit) -> Spec:
+    """Return the chart: a radius is ``pi f``; the half circle is a white diffuse surface."""
+    charts = []
+    for curve in record.curves:
+        rows = [
+            {"x": value * sin(radians(view)), "y": value * cos(radians(view)), "angle": view,
+             "of": f"{light:g}°"}
+            for light, lobe in zip(record.lights, curve.lobes, strict=False)
+            for view, value in zip(record.views, lobe, strict=True)
+        ]  # fmt: skip
+        if rows:
+            charts.append(_chart(rows).properties(title=curve.material))
+    return vega.specification(alt.vconcat(*charts))
+
+
+def _chart(rows: list[dict[str, Any]]) -> alt.LayerChart:
+    reach = 1.05 * max(1.0, *(max(abs(row["x"]), row["y"]) for row in rows))
+    names = list(dict.fromkeys(row["of"] for row in rows))
+
+    def axis(channel: Any, low: float) -> Any:
+        scale = alt.Scale(domain=[low, reach], nice=False, zero=False)
+        return channel.title(None).scale(scale).axis(tickCount=4)
+
+    def style(channel: Any, styles: Any) -> Any:
+        legend = alt.Legend(orient="top", symbolSize=300, symbolType="stroke")
+        scale = alt.Scale(domain=names, range=list(styles))
+        return channel("of:N", title="light at", sort=names, legend=legend, scale=scale)
+
+    angles = [radians(step) for step in range(-90, 91, 5)]
+    circle = [{"x": sin(angle), "y": cos(angle), "angle": angle} for angle in angles]
+    diffuse = alt.Chart(alt.Data(values=circle)).mark_line(color=FAINT, strokeWidth=1)
+    lines = alt.Chart(alt.Data(values=rows)).mark_line(clip=True, strokeWidth=2)
+    lines = lines.encode(color=style(alt.Color, INKS), strokeDash=style(alt.StrokeDash, DASHES))
+    layers = [
+        each.encode(x=axis(alt.X("x:Q"), -reach), y=axis(alt.Y("y:Q"), 0), order="angle:Q")
+        for each in (diffuse, lines)
+    ]
+    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
 
 
 def write(place: Path, record: Audit) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
-    ownership.folder(place)
-    ownership.write(place / "audit.svg", vega.paper(audit_charts.albedo_chart(record)))
-    ownership.write(place / PAGE, render(record))
-    ownership.write(place / "audit.json", records.to_json(record))
+    results.own(place)
+    results.write(place / "audit.svg", vega.paper(lobes(record)))
+    results.write(place / PAGE, render(record))
+    results.write(place / "audit.json", records.to_json(record))
 
 
 def render(record: Audit) -> str:
     """Return the page of an audit: one file, without scripts."""
     environment = templates()
-    environment.filters.update(number=number, found=audit_words.found)
+    environment.filters["found"] = audit_lines.value_of
     return environment.get_template("audit.html.j2").render(
         record=record,
-        title=audit_words.titled(record),
-        headline=audit_words.headline(record),
-        meanings=audit_words.MEANINGS,
-        charts=_charts(record),
+        headline=audit_lines.headline(record),
+        lobes=vega.figure("Lobes", lobes(record)),
     )
-
-
-def _charts(record: Audit) -> dict[str, list[vega.Figure]]:
-    """Return the charts of each check, and the lobes."""
-    found = {
-        check: _figures(audit_charts.albedo_charts(record, field))
-        for check, field in ALBEDOS.items()
-    }
-    viewers = {each.material: f"Seen by the {each.viewer}." for each in record.sunsets}
-    found["horizon"] = [
-        vega.figure(material, spec, viewers[material])
-        for material, spec in audit_charts.sunset_charts(record)
-    ]
-    chart = audit_charts.asymmetry_chart(record)
-    found["reciprocity"] = [vega.figure(record.asymmetry.material, chart)]
-    found["lobes"] = _figures(audit_charts.lobe_charts(record))
-    return found
-
-
-def _figures(charts: Iterable[tuple[str, Spec]]) -> list[vega.Figure]:
-    return [vega.figure(name, spec) for name, spec in charts]

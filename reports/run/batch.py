@@ -1,251 +1,276 @@
-"""Comparing scenes one after another, and writing their results and the page.
+"""All scenes of a command: comparing them, writing their results and the page.
 
 A scene that cannot be compared does not stop the others: the page names it with its error, and the
-command ends with that error's exit code. Scenes are compared in a separate process, which one of
-them may kill. The page is written with the first picture, and again as the run continues.
+command ends with that error's exit code. Scenes are compared in separate processes, which one of
+them may kill. The page is written again after each scene.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from itertools import chain
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from comparisons.processes.pool import Pool
-from comparisons.processes.worker import Task
-from heuristic.errors import FotismosError, InstallationError, LostProcessError
+from comparisons.processes.pool import Pool, Task
+from heuristic.errors import FotismosError, InstallationError, OutputError
 from reports import jobs
-from reports.run import single
-from reports.run.single import Wanted
 from reports.terminal import verbosity
 
 if TYPE_CHECKING:
+    from comparisons.options import Options
     from reports.page.scene_view import SceneView
-    from reports.run.growing import Growing
-    from reports.run.stages import Run
+    from reports.run.results import Failure, RunRecord
     from reports.terminal.progress import Bar
 
-Calls = Mapping[str, tuple[str, Path, str, Wanted]]
-"""The arguments of :func:`reports.run.single.compare` for each place."""
+SCENE, FURTHER = 8.0, 1.0
+"""Relative times of a scene and of a further task, to estimate the time left."""
 
-SKETCH, WHOLE, MORE = 1.0, 8.0, 1.0
-"""Relative times of a sketch, a scene and a further task, to estimate the time left."""
+SHARE = 0.1
+"""Greatest share of the time that writing unfinished pages may take."""
 
 
 @dataclass(frozen=True)
-class More:
+class Job:
+    """What a command does with each of its scenes.
+
+    ``request`` says how to render; ``fresh`` renders finished scenes again; ``coarse`` finds causes
+    with less effort.
+    """
+
+    request: Options
+    figures: bool = False
+    with_cost: bool = False
+    fresh: bool = False
+    coarse: bool = False
+
+
+@dataclass(frozen=True)
+class Further:
     """Further content of a page: the tasks that make it, begun while the last scenes are rendered.
 
     ``tasks`` return a result and the seconds that it took, which count towards ``stage``;
-    ``shown`` makes the page's content of the results by the tasks' names.
+    ``content`` makes arguments of :func:`reports.page.page.render` from results by task name.
     """
 
     stage: str
     tasks: Sequence[Task]
-    shown: Callable[[Mapping[str, Any]], dict[str, Any]]
+    content: Callable[[Mapping[str, Any]], dict[str, Any]]
+
+
+@dataclass
+class Batch:
+    """The results so far, by the names of the scenes' folders.
+
+    ``stages`` is wall time in seconds. ``on_page`` is called with the page's path once it exists.
+    """
+
+    folder: Path
+    places: Mapping[str, str]
+    on_page: Callable[[Path], object] | None
+    command: str
+    stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    views: dict[str, SceneView] = field(default_factory=dict)
+    errors: dict[str, FotismosError] = field(default_factory=dict)
+    next_page: float = 0.0
+
+    @property
+    def ordered(self) -> list[SceneView]:
+        """The views in the order of the scenes."""
+        return [self.views[place] for place in self.places if place in self.views]
+
+    @property
+    def done(self) -> int:
+        """The number of scenes that are over."""
+        return len(self.views) + len(self.errors)
+
+    def failures(self) -> list[Failure]:
+        """The scenes that could not be compared, in order."""
+        from reports.run.results import Failure
+
+        errors = self.errors
+        return [Failure(place, str(errors[place])) for place in self.places if place in errors]
+
+    def record(self) -> RunRecord:
+        """The record of the run, with its stages until now."""
+        from comparisons import record
+        from reports.run.results import START, RunRecord
+
+        other = perf_counter() - START - sum(self.stages.values())
+        return RunRecord(
+            command=self.command,
+            stages=dict(self.stages) | {"other": max(0.0, other)},
+            failures=tuple(self.failures()),
+            machine=record.machine(),
+            versions=record.versions(),
+        )
+
+    def write_page(self, is_interrupted: bool = False, **content: Any) -> None:
+        """Write the page, with further arguments of :func:`reports.page.page.render`."""
+        from reports.page import page
+        from reports.page.scene_view import Making
+        from reports.run import results
+
+        begin, path = perf_counter(), self.folder / results.PAGE
+        if is_interrupted or self.done < len(self.places):
+            content["making"] = Making(self.done, len(self.places), is_interrupted)
+        results.write(path, page.render(self.ordered, failures=self.failures(), **content))
+        end = perf_counter()
+        self.stages["page"] += end - begin
+        self.next_page = end + (end - begin) / SHARE
+        if self.on_page:
+            self.on_page(path)
+            self.on_page = None
+
+    def grow_page(self) -> None:
+        """Write the page of an unfinished run, unless that took long just now."""
+        if self.done < len(self.places) and perf_counter() >= self.next_page:
+            try:
+                self.write_page()
+            except OutputError:
+                self.next_page = perf_counter()  # the next scene tries again
 
 
 def run(
-    names: Iterable[str],
+    scenes: Sequence[str],
     folder: Path,
-    wanted: Wanted,
+    job: Job,
     pool: Pool,
-    more: More | None = None,
-    seen: Callable[[Path], object] = lambda _: None,
-    judge: Callable[[Path, Sequence[SceneView]], None] | None = None,
+    further: Further | None = None,
+    on_page: Callable[[Path], object] | None = None,
+    finish: Callable[[Path, Sequence[SceneView]], None] | None = None,
 ) -> None:
-    """Compare scenes, and write the results of each, then the page and tables of all.
+    """Compare scenes in a pool, and write the results of each, then the page and tables of all.
 
-    Parameters
-    ----------
-    names
-        Built-in scenes, files and folders.
-    folder
-        For the results.
-    wanted
-        What to do with each scene.
-    pool
-        Processes that compare the scenes; it is ended.
-    more
-        Further content of the page.
-    seen
-        Called with the page's path once the page exists.
-    judge
-        Called at the end with the output folder and the views of the compared scenes.
-
-    Raises
-    ------
-    FotismosError
-        The gravest error among scenes that could not be compared.
+    ``on_page`` is called with the page's path once it exists; ``finish`` at the end with the output
+    folder and the views of the compared scenes. The gravest error of a scene is raised at last.
     """
     with pool as pool:
         pool.start()
-        from reports.files import ownership
-        from reports.run import output, stages
-        from reports.run.growing import Growing
-        from reports.run.places import places
+        from reports.run import results
+        from reports.run.results import FIGURES, START, TABLES
         from reports.terminal import progress
 
-        scenes = jobs.expand(names, wanted.with_scripts)
-        requests = dict(zip(scenes, jobs.requests(wanted.request, scenes), strict=True))
+        requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
         command = jobs.command_line()
-        with output.held(folder, command) as folder:
-            found = places(folder, scenes)
-            output.require_free(folder, found, wanted.figures)
-            record = stages.Run(command)
-            growing = Growing(folder, found, seen)
-            each = {
-                place: (name, folder, place, replace(wanted, request=requests[name]))
-                for place, name in found.items()
+        with results.hold(folder, command) as folder:
+            places = results.places(folder, scenes)
+            for name in (TABLES, FIGURES) if job.figures else (TABLES,):
+                results.own(folder / name)
+            batch = Batch(folder, places, on_page, command)
+            batch.stages["start-up"] = perf_counter() - START
+            calls = {
+                place: (scene, folder, place, replace(job, request=requests[scene]))
+                for place, scene in places.items()
             }
-            shown, error = {}, None
-            total = (SKETCH * wanted.sketched + WHOLE) * len(found)
-            total += MORE * len(more.tasks) if more else 0.0
+            content = {}
+            total = SCENE * len(places) + (FURTHER * len(further.tasks) if further else 0.0)
             try:
                 with progress.shown(total=total) as bar:
-                    if wanted.sketched:
-                        with record.timing("first pictures"):
-                            _sketch(pool, growing, each, bar)
-                    others = _compare(pool, record, growing, each, bar, more)
-                    if more and growing.views:
-                        shown = _further(more, record, others)
+                    content = _compare(pool, batch, calls, bar, further)
             except KeyboardInterrupt:
-                pool.end()  # before clearing away its half written files
-                ownership.recover(folder)
-                if growing.has_begun:
-                    _write(record, growing, wanted.figures, shown, is_interrupted=True)
+                pool.end()
+                if batch.done:
+                    _write(batch, job.figures, is_interrupted=True)
                 raise
-            except FotismosError as raised:
-                if not growing.views:
-                    raise
-                error = raised
-            _write(record, growing, wanted.figures, shown)
-            if judge is not None:
-                judge(folder, [growing.views[place] for place in found if place in growing.views])
-    if error:
-        raise error
-    if growing.failures:
-        error = max(growing.failures.values(), key=lambda error: error.exit_code)
-        count = f"{len(growing.failures)} of {len(found)} scenes failed, "
+            _write(batch, job.figures, content)
+            if finish is not None:
+                finish(folder, batch.ordered)
+    if batch.errors:
+        error = max(batch.errors.values(), key=lambda error: error.exit_code)
+        count = f"{len(batch.errors)} of {len(places)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _verdict(views: Sequence[SceneView]) -> list[str]:
-    """Return the lines of the verdict and its advice."""
-    from reports import verdict
-
-    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
-    return ["", *verdict.sentences(found), *verdict.advice(found)]
-
-
-def _tasks(function: Callable[..., object], each: Calls, bar: Bar) -> Iterator[Task]:
-    from comparisons.case import name_of
-
-    return (
-        Task(place, function, words, bar.of(name_of(words[0]))) for place, words in each.items()
-    )
-
-
-def _sketch(pool: Pool, growing: Growing, each: Calls, bar: Bar) -> None:
-    """Collect coarse views of the scenes, or the final views of finished ones."""
-    bar.begin("first pictures", len(each), SKETCH)
-    for task, outcome in pool.each(_tasks(single.sketch, each, bar)):
-        try:
-            view = outcome.result()
-        except LostProcessError as error:  # it would be lost again
-            growing.failures[task.name] = error
-        except FotismosError:
-            continue  # the full size may succeed
-        else:
-            (growing.coarse if view.is_coarse else growing.views)[task.name] = view
-        finally:
-            bar.over(task.progress)
-        growing.offer()
-
-
 def _compare(
-    pool: Pool, record: Run, growing: Growing, each: Calls, bar: Bar, more: More | None
-) -> dict[str, Future[Any]]:
-    """Collect the views of the scenes that are compared, and the errors of the others.
+    pool: Pool,
+    batch: Batch,
+    calls: Mapping[str, tuple[Any, ...]],
+    bar: Bar,
+    further: Further | None,
+) -> dict[str, Any]:
+    """Collect the views and errors of scenes, and return the further content of the page."""
+    from comparisons.case import name_of
+    from reports.run import scene
+    from reports.terminal import tables
 
-    Returns the outcomes of further tasks.
-    """
-    from reports.terminal import carrier_lines, progress
-
-    further = {task.name: task for task in more.tasks} if more else {}
-    others: dict[str, Future[Any]] = {}
-    left = {p: w for p, w in each.items() if p not in growing.views and p not in growing.failures}
-    bar.begin("scenes", len(left), WHOLE, skipped=len(each) - len(left))
-    if more and not left:
-        bar.begin(more.stage, len(further), MORE)
-    for task, outcome in pool.each(chain(_tasks(single.compare, left, bar), further.values())):
-        if further.get(task.name) is task:
-            others[task.name] = outcome
-            bar.over(None, None if growing.is_whole else MORE)
+    others: dict[str, Any] = {}
+    names = {task.name for task in further.tasks} if further else set()
+    tasks = [
+        Task(place, scene.compare, call, bar.of(name_of(call[0]))) for place, call in calls.items()
+    ]
+    bar.begin("scenes", len(tasks), SCENE)
+    for task, outcome in pool.each([*tasks, *(further.tasks if further else ())]):
+        if task.name in names and task.progress is None:
+            assert further is not None
+            others[task.name], seconds = outcome.result()
+            batch.stages[further.stage] += seconds
+            bar.over(None, FURTHER)
             continue
         try:
             view, spent = outcome.result()
         except InstallationError:
             raise
         except FotismosError as error:
-            if len(each) == 1:
+            if len(calls) == 1:
                 raise
-            growing.failures[task.name] = error
-            growing.coarse.pop(task.name, None)
-            continue
+            batch.errors[task.name] = error
+        else:
+            batch.views[task.name] = view
+            for stage, seconds in spent.items():
+                batch.stages[stage] += seconds
+            verbosity.remark([*tables.details(view.record), *tables.shape_lines(view.record)])
         finally:
             bar.over(task.progress)
-        growing.views[task.name] = view
-        for stage, seconds in spent.seconds.items():
-            record.add(stage, seconds)
-        verbosity.remark([*progress.details(view.record), *carrier_lines.lines(view.record)])
-        growing.offer(at_once=bool(more) and growing.is_whole)
-        if more and growing.is_whole:
-            bar.begin(more.stage, len(further) - len(others), MORE)
-    return others
-
-
-def _further(more: More, record: Run, outcomes: Mapping[str, Future[Any]]) -> dict[str, Any]:
-    """Return the page's content of further tasks, and count their time."""
-    found = {}
-    for name, outcome in outcomes.items():
-        found[name], seconds = outcome.result()
-        record.add(more.stage, seconds)
-    return more.shown(found)
+        batch.grow_page()
+        if further and batch.done == len(calls):
+            bar.begin(further.stage, len(names), FURTHER)
+    return further.content(others) if further and batch.views else {}
 
 
 def _write(
-    run: Run,
-    growing: Growing,
+    batch: Batch,
     with_figures: bool,
-    shown: dict[str, Any],
+    content: Mapping[str, Any] | None = None,
     is_interrupted: bool = False,
 ) -> None:
-    """Write the page, record and tables of all scenes, and report the results."""
-    from reports.run import output
-    from reports.terminal import carrier_lines, progress, tables
+    """Write the page, record and tables of all scenes as far as possible, and print the results."""
+    from reference.records import to_json
+    from reports.run import results
+    from reports.terminal import tables
 
-    folder, run.failures = growing.folder, growing.failed()
-    run.begin_page()
-    views = [view for view in growing.shown() if not view.is_coarse]
+    views, folder = batch.ordered, batch.folder
     records = [view.record for view in views]
-    making = growing.making(is_interrupted) if is_interrupted or not growing.is_whole else None
-    steps = [
-        lambda: growing.write(failures=run.failures, run=run, making=making, **shown),
-        lambda: output.write_run(folder, run.record()),
+    run, errors = batch.record(), []
+    steps: list[Callable[[], object]] = [
+        lambda: batch.write_page(is_interrupted, run=run, **(content or {})),
+        lambda: results.write(folder / results.RUN, to_json(batch.record())),
     ]
     if views:
-        steps.append(lambda: tables.write(folder / output.TABLES, records))
-        steps.append(lambda: carrier_lines.write(folder / output.TABLES, records))
+        steps.append(lambda: tables.write(folder / results.TABLES, records))
     if views and with_figures:
         from reports.charts import figures
 
-        steps.append(lambda: figures.write_run(folder / output.FIGURES, records))
-    output.as_far_as_possible(*steps)
+        steps.append(lambda: figures.write_run(folder / results.FIGURES, records))
+    for step in steps:
+        try:
+            step()
+        except OutputError as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
     if views:
-        verbosity.tell(progress.summary(records))
-        verbosity.tell(_verdict(views))
-    verbosity.tell_where(folder / "index.html")
+        verbosity.tell(_summary(views))
+    verbosity.tell_where(folder / results.PAGE)
+
+
+def _summary(views: Sequence[SceneView]) -> Iterable[str]:
+    """Yield the table of scenes, the verdict and its advice."""
+    from reports import verdict
+    from reports.terminal import tables
+
+    yield from tables.summary([view.record for view in views])
+    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
+    yield from ("", *verdict.sentences(found), *verdict.advice(found))

@@ -1,23 +1,20 @@
 """Fits as tables for a terminal and in Markdown, and the files of one fit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 from PIL import Image, ImageDraw, ImageFont
 
 from comparisons.departure.metrics import LEADING, drawn
-from comparisons.records import to_json
-from reports.files import images, ownership
+from comparisons.fit.fit import Fit
+from comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
+from reference.records import to_json
+from reports.files import images
+from reports.run import results
 from reports.terminal import tables
-
-if TYPE_CHECKING:
-    from comparisons.fit.fit_record import FitRecord, Fitted, FittedMaterial, FormFit
-    from comparisons.fit.summary import Fit
 
 Cells = Sequence[str]
 """One row of a table."""
@@ -32,9 +29,9 @@ FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
 
 def write(folder: Path, fit: Fit) -> None:
     """Write ``fit.json`` and ``fit.png`` to a folder."""
-    ownership.folder(folder)
-    ownership.write(folder / "fit.png", picture(fit))
-    ownership.write(folder / "fit.json", to_json(fit.record))
+    results.own(folder)
+    results.write(folder / "fit.png", picture(fit))
+    results.write(folder / "fit.json", to_json(fit.record))
 
 
 def picture(fit: Fit) -> bytes:
@@ -47,7 +44,7 @@ def picture(fit: Fit) -> bytes:
     tiles = {
         "paired": images.tonemap(fit.images.before, exposure),
         "reference": images.tonemap(fit.images.reference, exposure),
-        f"fitted ({_form(fit.record.nearest)})": images.tonemap(fit.images.after, exposure),
+        f"fitted ({fit.record.nearest.form})": images.tonemap(fit.images.after, exposure),
         f"{LEADING.label} left, 0 to {high:g}": images.error_map(residual, high),
     }
     width, height = next(iter(tiles.values())).size
@@ -68,80 +65,28 @@ def picture(fit: Fit) -> bytes:
 def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
     best = record.nearest
-    yield f"{record.scene}: {record.loss.name} loss, {_form(best)} comes nearest"
+    yield f"{record.scene}: {record.loss.name} loss, {best.form} comes nearest"
     yield ""
     yield from tables.printed(_departures(record))
     yield ""
     yield from tables.printed(_parameters(best))
     for material in best.materials:
         if material.reference:
-            yield f"reference of {material.name}: {_described(material.reference)}"
+            yield f"reference of {material.name}: {described(material.reference)}"
     yield ""
-
-
-def markdown(records: Sequence[FitRecord], scenes: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of a Markdown page: departures of scenes before and after their fits."""
-    names = " ".join(scenes)
-    yield "# Fits: departure before and after"
-    yield ""
-    yield f"Made by `./run fit {names} --markdown docs/fit-figures.md`."
-    yield ""
-    yield (
-        "Mean colour difference from the reference with the paired parameters (*before*), with the"
-        " best parameters of the best form (*after*), and from the reference's noise alone"
-        " (*floor*). *Parameter error* and *model error* are the parts of the minimised loss that"
-        " the best parameters remove and leave. Metrics are not minimised: other parameters may"
-        " leave less of them."
-    )
-    yield ""
-    yield from tables.markdown(_scene_rows(records), right=2)
-    yield ""
-    yield "Paired → fitted parameters; a dash if the image does not determine them."
-    yield ""
-    yield from tables.markdown(_material_rows(records), right=7)
-
-
-def _scene_rows(records: Sequence[FitRecord]) -> Iterator[Cells]:
-    labels = (f"{metric.label}: before → after (floor)" for metric in drawn().values())
-    errors = ("parameter error (loss)", "model error (loss)")
-    yield "scene", "best form", *labels, *errors, "seconds"
-    for record in records:
-        departures = [record.nearest.departure[name] for name in drawn()]
-        cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
-        parts = _three(record.nearest.parameter_error), _three(record.nearest.loss)
-        yield record.scene, record.nearest.form, *cells, *parts, f"{record.time.total:.1f}"
-
-
-def _material_rows(records: Sequence[FitRecord]) -> Iterator[Cells]:
-    yield "scene", "form", "k_a", "k_d", "k_s", "n", "reference"
-    for record in records:
-        for fit in record.fits:
-            for material in () if fit.normalised else fit.materials:
-                yield record.scene, fit.form, *_material_cells(material)
-
-
-def _material_cells(material: FittedMaterial) -> Cells:
-    found = {p.name: f"{p.paired:.3g} → {_value(p)}" for p in material.parameters}
-    reference = _described(material.reference or {"plugin": ""})
-    return [*(found.get(name, "") for name in ("k_a", "k_d", "k_s", "n")), reference]
-
-
-def _form(fit: FormFit) -> str:
-    return fit.form + (" (normalised)" if fit.normalised else "")
 
 
 def _departures(record: FitRecord) -> Iterator[Cells]:
     def row(name: str, form: FormFit, field: str, loss: str = "") -> Cells:
         means = (getattr(form.departure[metric], field) for metric in drawn())
-        return name, *map(_three, means), loss
+        return name, *map(three_decimals, means), loss
 
     yield "mean of", *(metric.label for metric in drawn().values()), "loss"
-    nearest = record.nearest
-    paired = nearest.loss + nearest.parameter_error
-    yield row("paired", record.fits[0], "before", f"{paired:.4g}")
+    nearest, first = record.nearest, record.fits[0]
+    yield row("paired", first, "before", f"{nearest.loss + nearest.parameter_error:.4g}")
     for fit in record.fits:
-        yield row(_form(fit), fit, "after", f"{fit.loss:.4g}")
-    yield row("noise floor", record.fits[0], "noise_floor")
+        yield row(fit.form, fit, "after", f"{fit.loss:.4g}")
+    yield row("noise floor", first, "noise_floor")
     blank = [""] * len(drawn())
     yield "parameter error", *blank, f"{nearest.parameter_error:.4g}"
     yield "model error", *blank, f"{nearest.loss:.4g}"
@@ -149,51 +94,49 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
 
 def _parameters(fit: FormFit) -> Iterator[Cells]:
     yield "material or light", "parameter", "paired", "fitted", "95 %, by noise", ""
-    for owner in fit.materials:
-        for parameter in owner.parameters:
-            yield owner.name, *_parameter_cells(parameter)
+    for material in fit.materials:
+        for parameter in material.parameters:
+            yield material.name, *_parameter_cells(parameter)
     for parameter in fit.own:
         yield fit.form, *_parameter_cells(parameter)
     for light in fit.lights:
         yield light.light, *_parameter_cells(light)
 
 
-def _parameter_cells(parameter: Fitted) -> Cells:
+def _parameter_cells(parameter: FittedParameter) -> Cells:
     interval = parameter.interval
-    note = parameter.reason and f"not identifiable: {parameter.reason}"
-    if parameter.partners:
-        note += f" ({', '.join(parameter.partners)})"
-    if parameter.at_bound and not note:
-        note = "at its bound"
+    note = "at its bound" if parameter.at_bound else ""
+    if parameter.reason:
+        partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
+        note = f"not identifiable: {parameter.reason}{partners}"
     factor = " (factor)" if parameter.is_factor else ""
     return (
         f"{parameter.name} {parameter.channel}".strip() + factor,
         f"{parameter.paired:.4g}",
-        _value(parameter),
+        value_of(parameter),
         f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
         note,
     )
 
 
-def _value(parameter: Fitted) -> str:
+def value_of(parameter: FittedParameter) -> str:
+    """Return the fitted value, a dash if the image does not determine it."""
     return "–" if parameter.fitted is None else f"{parameter.fitted:.4g}"
 
 
-def _described(reference: Mapping[str, Any]) -> str:
-    words = [
-        f"{key} {_number(value)}"
-        for key, value in reference.items()
-        if key in ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
-    ]
+def described(reference: Mapping[str, Any]) -> str:
+    """Return the plugin and the leading parameters of a material in the reference."""
+
+    def number(value: Any) -> str:
+        if isinstance(value, list):
+            return f"({', '.join(map(number, value))})"
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    names = ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
+    words = [f"{name} {number(reference[name])}" for name in names if name in reference]
     return " ".join([reference["plugin"], ", ".join(words)]).strip()
 
 
-def _three(value: float) -> str:
+def three_decimals(value: float) -> str:
     """Three decimals, without a sign if all are 0."""
     return f"{value:.3f}".replace("-0.000", "0.000")
-
-
-def _number(value: Any) -> str:
-    if isinstance(value, list):
-        return "(" + ", ".join(f"{component:.3g}" for component in value) + ")"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -8,16 +8,16 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from comparisons.audit.audit import Kind
     from comparisons.audit.audit_record import Audit
-    from comparisons.case import Request
-    from comparisons.cost.choice import Choice
+    from comparisons.audit.checks import Kind
     from comparisons.cost.cost_record import Cost
+    from comparisons.cost.front import Choice
     from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit_record import FitRecord
-    from comparisons.hard.collection import HardCases
+    from comparisons.hard.hard_cases import HardCases
+    from comparisons.options import Options
     from comparisons.verification import Verification
-    from reports.terminal.plan_lines import PlanReport
+    from reports.terminal.tables import PlanReport
 
 
 def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
@@ -26,36 +26,35 @@ def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
     return function(*arguments), perf_counter() - begin
 
 
-def planned(name: str, request: Request) -> PlanReport:
+def planned(name: str, request: Options) -> PlanReport:
     """Return the plan of a scene."""
     from comparisons.case import open_case
-    from comparisons.compare import prepare
-    from reports.terminal import plan_lines
+    from comparisons.prepared import prepare
+    from reports.terminal import tables
 
     case = open_case(name, request)
-    return plan_lines.report(case.name, prepare(case.source, case.options), case.variant)
+    return tables.plan_report(case.name, prepare(case.source, case.options), case.variant)
 
 
 def verified(
-    name: str, request: Request, level: float | None, steps: bool, progress: Any = None
+    name: str, request: Options, level: float | None, progress: Any = None
 ) -> Verification:
     """Compare the plan of a scene with everything simulated.
 
-    ``level`` is the chance that a right plan is marked; None takes the default. ``steps`` also
-    measures the gain of each step of planning.
+    ``level`` is the chance that a right plan is marked; None takes the default.
     """
     from comparisons.case import open_case
     from comparisons.verification import LEVEL, verify
 
     case = open_case(name, request)
     usual = LEVEL if level is None else level
-    return verify(case.source, case.options, progress, usual, steps)
+    return verify(case.source, case.options, progress, usual)
 
 
-def chosen(name: str, request: Request, within: float, metric: str, progress: Any) -> Choice:
+def chosen(name: str, request: Options, within: float, metric: str, progress: Any) -> Choice:
     """Measure the ladder of a scene, and name the cheapest method within an error."""
     from comparisons.case import open_case
-    from comparisons.cost.choice import choose
+    from comparisons.cost.front import choose
 
     case = open_case(name, request)
     return choose(case.source, within, case.options, None, metric, progress)
@@ -64,18 +63,18 @@ def chosen(name: str, request: Request, within: float, metric: str, progress: An
 def hard_cases() -> HardCases:
     """Evaluate the hard cases."""
     from comparisons.case import RGB
-    from comparisons.hard import collection
+    from comparisons.hard.hard_cases import collect
     from heuristic import plugins
     from reference.scene.graph import set_variant
 
     set_variant(RGB)
     plugins.register()
-    return collection.collect()
+    return collect()
 
 
-def priced(
+def measured(
     name: str,
-    request: Request,
+    request: Options,
     rounds: int | None,
     at: tuple[int, int] | None,
     is_measured: bool,
@@ -88,7 +87,8 @@ def priced(
     ``at`` is a size to predict for, ``figures`` the folder for figures for print; None for none.
     """
     from comparisons.case import open_case
-    from comparisons.cost.cost import Effort, cost
+    from comparisons.cost.cost import cost
+    from comparisons.cost.measure import Effort
     from reports.charts.figures import write_cost
     from reports.run import cost_files
 
@@ -103,20 +103,20 @@ def priced(
     return study.record
 
 
-def exported(name: str, request: Request, place: Path) -> None:
+def exported(name: str, request: Options, place: Path) -> None:
     """Write the files that another program needs to render a scene."""
     from comparisons.case import open_case
-    from comparisons.exports.exported import exported
-    from reports.exports import export_files
+    from comparisons.plain_scene import plain_scene
+    from reports.files import export_files
 
     case = open_case(name, request)
     command = case.command(image="YOURS.exr")
-    export_files.write(place, exported(case.source, case.options), command)
+    export_files.write(place, plain_scene(case.source, case.options), command)
 
 
 def fitted(
     name: str,
-    request: Request,
+    request: Options,
     chosen: FitOptions,
     words: dict[str, Any],
     place: Path,
@@ -136,9 +136,9 @@ def fitted(
     return result.record
 
 
-def audited(kind: Kind, name: str, given: dict[str, Any], command: str, place: Path) -> Audit:
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, place: Path) -> Audit:
     """Audit a heuristic or a BSDF, and write the audit's files."""
-    from comparisons.audit.audit import audit
+    from comparisons.audit.checks import audit
     from comparisons.case import RGB
     from heuristic import plugins
     from reference.scene.graph import set_variant
@@ -146,6 +146,6 @@ def audited(kind: Kind, name: str, given: dict[str, Any], command: str, place: P
 
     set_variant(RGB)
     plugins.register()
-    record = audit(kind, name, given, command)
+    record = audit(kind, name, parameters, command)
     audit_files.write(place, record)
     return record

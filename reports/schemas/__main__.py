@@ -1,17 +1,18 @@
 """Write the published schemas: ``python -m reports.schemas``."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
-from comparisons import records
 from comparisons.audit.audit_record import Audit
 from comparisons.check.baseline import Baseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
-from comparisons.records import laid_out
-from reports.ci.check_record import Checks
-from reports.run.stages import RunRecord
+from reference import records
+from reference.records import laid_out
+from reports.ci.checks import Checks
+from reports.run.results import RunRecord
 
 FOLDER = Path(__file__).parent
 
@@ -33,5 +34,7 @@ def text(name: str) -> str:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:]:
+        sys.exit(__doc__)
     for name in PUBLISHED:
         (FOLDER / f"{name}.schema.json").write_text(text(name), encoding="utf-8")

@@ -1,31 +1,41 @@
-"""An audit in words: a table of its checks."""
+"""An audit in words: its verdict, and a table of the checks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from pathlib import Path
 
-from comparisons.audit.audit_record import Audit
+from comparisons.audit.audit_record import Audit, Checked
+from heuristic.heuristics import in_file
 from reports.terminal import tables
-from reports.terminal.audit_words import found
+from reports.terminal.words import number
+
+
+def headline(record: Audit) -> str:
+    """Return the subject with its parameters, and which checks failed."""
+    name = record.subject
+    if place := in_file(name):
+        file = Path(place[0]).name
+        name = f"{place[1]} ({file})" if place[1] else file
+    title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
+    failed = [check.name for check in record.checks if check.verdict == "does not hold"]
+    if not failed:
+        return f"{title}: all that was asked holds"
+    return f"{title}: {', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
+
+
+def value_of(check: Checked) -> str:
+    """Return the value of a check; a count has no decimals."""
+    value = check.value
+    return f"{value:g}" if value is not None and value == int(value) else number(value)
 
 
 def lines(record: Audit) -> Iterator[str]:
     """Yield the lines of an audit."""
-    given = ", ".join(f"{name} = {value}" for name, value in record.parameters.items())
-    yield f"{record.subject}{given and ', '}{given}: {verdict(record)}"
+    yield headline(record)
     yield ""
-    yield from tables.printed(_rows(record))
-    if record.suspicions:
-        yield from ("", *record.suspicions)
-
-
-def verdict(record: Audit) -> str:
-    """Return a phrase that names the checks that failed."""
-    failed = [check.name for check in record.checks if check.verdict == "does not hold"]
-    if not failed:
-        return "all that was asked holds"
-    return f"{', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
-
-
-def _rows(record: Audit) -> Iterator[Sequence[str]]:
-    yield "check", "verdict", "found", "expected", "worst case"
-    for check in record.checks:
-        yield check.name, check.verdict, found(check.value), check.expected, check.worst
+    rows = [
+        (check.name, check.verdict, value_of(check), check.expected, check.worst)
+        for check in record.checks
+    ]
+    yield from tables.printed([("check", "verdict", "found", "expected", "worst case"), *rows])
+    if record.mistakes:
+        yield from ("", *record.mistakes)

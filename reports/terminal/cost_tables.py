@@ -1,31 +1,28 @@
-"""The tables of ``fotismos cost`` on a terminal."""
+"""The tables of ``fotismos cost`` on a terminal, and the sentence of ``fotismos plan --within``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
+from comparisons.departure.metrics import METRICS
 from reports.glossary import meanings
 from reports.terminal.tables import printed
+from reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost_record import (
-        AskedPrice,
-        Cheapest,
-        Cost,
-        Estimated,
-        Interval,
-        Measured,
-        Prediction,
-        Range,
-        Reached,
-    )
+    from comparisons.cost.cost_record import Cost, Measured, Prediction, Reached, Seconds
+    from comparisons.cost.front import Choice
+    from reference.records import Estimated
 
 Rows: TypeAlias = Iterator[Sequence[str]]
 
+SHOWN_SPP = (1, 4, 16, 64, 256, 1024, 4096)
+"""Sample counts whose forecasts are shown, besides the measured ones."""
+
 
 def lines(record: Cost) -> Iterator[str]:
-    """Yield the lines of a study: rungs, equal time, equal error, prices, and parts."""
+    """Yield the lines of a study: methods, equal error, attribution, and parts."""
     reference = record.reference
     yield (
         f"{record.scene}, {record.resolution[0]}x{record.resolution[1]}, {record.rounds} rounds"
@@ -37,40 +34,88 @@ def lines(record: Cost) -> Iterator[str]:
     )
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
-    yield from _section("Error and time of each method", _rungs(record))
-    yield from _meanings(record)
-    for method in record.left_out:
-        yield f"left out: {method.name}: {method.reason}"
-    yield from _section("Best within a time", _equal_time(record))
+    yield from _section("Error and time of each method", _methods(record))
+    known = meanings()
+    for method in record.methods:  # the names of the others say what they are
+        if method.family == "physical" and method.name in known:
+            yield f"{method.name}: {known[method.name]}"
+    for left_out in record.left_out:
+        yield f"left out: {left_out.name}: {left_out.reason}"
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
-    if record.prices.effects:
-        yield from _section("Price of an effect", _prices(record))
+    if record.attribution.effects:
+        yield from _section("What each effect removes and adds", _attribution(record))
         yield "removed: Shapley value, the mean over all orders of adding the effects"
         yield "alone, last: added first, added last"
         yield noise(record)
         yield closure(record)
-    if len(record.objects) > 1 and record.prices.effects:
+    if len(record.objects) > 1 and record.attribution.effects:
         yield from _section("Mean ΔE2000 removed on each shape", _objects(record))
     yield from _section("Parts of the departure, linear", _parts(record))
     if record.prediction:
-        yield from predicted(record.prediction)
+        yield from _predicted(record.prediction)
 
 
-SHOWN_SPP = (1, 4, 16, 64, 256, 1024, 4096)
-"""Sample counts whose forecasts are shown, besides the measured ones."""
+def noise(record: Cost) -> str:
+    """Return the noise that was subtracted from the attribution, in a sentence."""
+    return f"Noise alone gives ΔE2000 = {record.attribution.floor:.2g}; it is subtracted."
 
 
-def predicted(prediction: Prediction) -> Iterator[str]:
-    """Yield the lines of a prediction at a size."""
+def closure(record: Cost) -> str:
+    """Return the sum of the attribution, and whether the rest is more than noise."""
+    left, departure = record.closure, record.attribution.departure
+    closes = left.low <= 0
+    verdict = "no more than noise" if closes else "more than noise: some effect is missing"
+    return (
+        f"With all effects simulated ΔE2000 = {left.mean:.2g} is left ({left.low:.2g} to"
+        f" {left.high:.2g}; {verdict}). What the effects remove and what is left add up to the"
+        f" departure, ΔE2000 = {departure:.4g}."
+    )
+
+
+def choice_lines(choice: Choice) -> Iterator[str]:
+    """Yield the method to take, its error and time, and the method that it replaces.
+
+    Then what each method in the sentence is.
+    """
+    label = METRICS[choice.metric].label
+    size = "x".join(map(str, choice.resolution))
+    within = parameter(choice.within)
+    chosen, full = choice.chosen, choice.full
+    if chosen is None:
+        yield (
+            f"At {size} no measured method stays within {label} {within}. The nearest is"
+            f" {_offer(choice.best, label)}. Give more samples with --spp, or a larger tolerance."
+        )
+    elif chosen.method == full.method:
+        yield f"At {size}: {_offer(chosen, label)}. Nothing cheaper stays within {within}."
+    else:
+        yield f"At {size}: {_offer(chosen, label)}, in place of {_offer(full, label)}."
+    known = meanings()
+    for method in dict.fromkeys(((chosen or choice.best).method, full.method)):
+        if method in known:
+            yield f"{method}: {known[method]}"
+
+
+def _offer(point: Measured, label: str) -> str:
+    once = f" and once {seconds(point.prepare_s)} to prepare" if point.prepare_s else ""
+    return (
+        f"{point.method} with {point.spp} samples per pixel: {label} {number(point.error.mean)} at"
+        f" {seconds(point.seconds.value)}{once}"
+    )
+
+
+def _predicted(prediction: Prediction) -> Iterator[str]:
     width, height = prediction.resolution
     sizes = ", ".join("x".join(map(str, size)) for size in prediction.fitted)
     yield from _section(f"Predicted at {width}x{height}", _forecasts(prediction))
     yield f"{prediction.level:.0%} intervals, from {sizes}. Times are of later frames."
     yield ""
     for row in prediction.cheapest:
-        yield _cheapest(row)
-    if prediction.prices:
-        yield from _section(f"Price of an effect at {width}x{height}", _asked(prediction.prices))
+        if row.seconds is None:
+            yield f"ΔE2000 = {row.error:g}: no method reaches it."
+        else:
+            time, interval = _timed(row.seconds.value, row.seconds)
+            yield f"ΔE2000 = {row.error:g}: {row.method}, {row.spp} samples, {time} ({interval})."
 
 
 def _forecasts(prediction: Prediction) -> Rows:
@@ -79,96 +124,34 @@ def _forecasts(prediction: Prediction) -> Rows:
     yield "method", "samples", "time", "interval", "mean ΔE2000", "interval", *measured
     for row in prediction.forecasts:
         if row.spp in SHOWN_SPP or row.measured:
-            found = row.measured
-            seen = (_time(found.seconds.median), f"{found.error:.3f}") if found else ("", "")
+            point = row.measured
+            found = (_time(point.seconds.value), f"{point.error.mean:.3f}") if point else ("", "")
             yield (
                 row.method,
                 f"{row.spp}",
                 *_timed(row.seconds.value, row.seconds),
-                f"{row.error.value:.3f}",
+                f"{row.error.mean:.3f}",
                 f"{row.error.low:.3f} to {row.error.high:.3f}",
-                *(seen if is_measured else ()),
+                *(found if is_measured else ()),
             )
 
 
-def _asked(prices: Iterable[AskedPrice]) -> Rows:
-    yield "effect", "removed", "interval", "adds", "interval"
-    for price in prices:
-        removes = price.removes
-        interval = f"{removes.low:.3f} to {removes.high:.3f}"
-        yield (
-            price.effect,
-            f"{removes.value:.3f}",
-            interval,
-            *_timed(price.adds_s.value, price.adds_s),
-        )
-
-
-def _cheapest(row: Cheapest) -> str:
-    if row.seconds is None:
-        return f"ΔE2000 = {row.error:g}: no method reaches it."
-    time, interval = _timed(row.seconds.value, row.seconds)
-    return f"ΔE2000 = {row.error:g}: {row.method}, {row.spp} samples, {time} ({interval})."
-
-
-def noise(record: Cost) -> str:
-    """Return the noise that was subtracted from the prices, in a sentence."""
-    return f"Noise alone gives ΔE2000 = {record.prices.floor:.2g}; it is subtracted."
-
-
-def closure(record: Cost) -> str:
-    """Return the sum of the prices, and whether the rest is more than noise."""
-    left, departure = record.closure, record.prices.departure
-    closes = left.low <= 0
-    judged = "they close" if closes else "more than noise: some effect has no price"
-    return (
-        f"With all effects simulated ΔE2000 = {left.mean:.2g} is left ({left.low:.2g} to"
-        f" {left.high:.2g}; {judged}). Prices and what is left add up to the departure,"
-        f" ΔE2000 = {departure:.4g}."
-    )
-
-
-def _rungs(record: Cost) -> Rows:
+def _methods(record: Cost) -> Rows:
     first = "first run (preparing)"
     yield "method", "samples", "median", "interval", first, "mean ΔE2000", "RMSE", ""
+    names = {method.name: method.names for method in record.methods}
     for point in record.points:
+        others = ", ".join(other for other in names[point.method] if other != point.method)
+        prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
         yield (
-            _all_names(record, point.rung),
+            f"{point.method} (= {others})" if others else point.method,
             f"{point.spp}",
-            *_timed(point.seconds.median, point.seconds),
-            _first(point),
-            f"{point.error:.3f} ± {point.error_stderr:.3f}",
+            *_timed(point.seconds.value, point.seconds),
+            f"{_time(point.first_s)}{prepared}",
+            _error(point),
             f"{max(point.mse, 0) ** 0.5:.2g}",
             "front" if point.pareto else "",
         )
-
-
-def _meanings(record: Cost) -> Iterator[str]:
-    """Yield what the physical methods leave out; the names of the others say it."""
-    known = meanings()
-    for rung in record.rungs:
-        if rung.family == "physical" and rung.name in known:
-            yield f"{rung.name}: {known[rung.name]}"
-
-
-def _first(point: Measured) -> str:
-    prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
-    return f"{_time(point.first_s)}{prepared}"
-
-
-def _equal_time(record: Cost) -> Rows:
-    yield "within", "method", "samples", "mean ΔE2000", "takes", "interval"
-    for row in record.equal_time:
-        best = row.best
-        yield (
-            _time(row.seconds),
-            *(_point(best) if best else ("none is as fast", "", "", "", "")),
-        )
-
-
-def _point(point: Measured) -> tuple[str, ...]:
-    error = f"{point.error:.3f} ± {point.error_stderr:.3f}"
-    return point.rung, f"{point.spp}", error, *_timed(point.seconds.median, point.seconds)
 
 
 def _equal_error(record: Cost) -> Rows:
@@ -185,22 +168,21 @@ def _reached(row: Reached) -> str:
     return f"{'at most ' if row.at_most else ''}{time} ({interval})"
 
 
-def _prices(record: Cost) -> Rows:
+def _attribution(record: Cost) -> Rows:
     yield "effect", "removed", "95 % interval", "alone", "last", "adds", "95 % interval"
-    for price in record.prices.effects:
-        removes = price.removes
+    for one in record.attribution.effects:
         yield (
-            price.effect,
-            f"{removes.value:.3f}",
-            f"{removes.low:.3f} to {removes.high:.3f}",
-            f"{price.alone:.3f}",
-            f"{price.last:.3f}",
-            *_timed(price.adds_s.value, price.adds_s),
+            one.effect,
+            f"{one.removes.value:.3f}",
+            f"{one.removes.low:.3f} to {one.removes.high:.3f}",
+            f"{one.alone:.3f}",
+            f"{one.last:.3f}",
+            *_timed(one.adds_s.value, one.adds_s),
         )
 
 
 def _objects(record: Cost) -> Rows:
-    effects = (price.effect for price in record.prices.effects)
+    effects = (one.effect for one in record.attribution.effects)
     yield "shape", "of the departure", "mean ΔE2000", *effects
     for row in record.objects:
         removes = (f"{each.value:.3f} ± {each.high - each.value:.3f}" for each in row.removes)
@@ -214,19 +196,16 @@ def _parts(record: Cost) -> Rows:
         yield part.name, *numbers, f"{part.dE2000:.3g}"
 
 
-def _all_names(record: Cost, name: str) -> str:
-    """Return a rung's name, with the methods that give the same image in this scene."""
-    (names,) = [rung.names for rung in record.rungs if rung.name == name]
-    others = ", ".join(other for other in names if other != name)
-    return f"{name} (= {others})" if others else name
+def _time(value: float) -> str:
+    return f"{value:.3g} s" if abs(value) >= 1 else f"{value * 1e3:.3g} ms"
 
 
-def _time(seconds: float) -> str:
-    return f"{seconds:.3g} s" if abs(seconds) >= 1 else f"{seconds * 1e3:.3g} ms"
+def _error(point: Measured) -> str:
+    return f"{point.error.mean:.3f} ± {point.error.high - point.error.mean:.3f}"
 
 
-def _timed(seconds: float, interval: Interval | Range | Estimated) -> tuple[str, str]:
-    return _time(seconds), f"{_time(interval.low)} to {_time(interval.high)}"
+def _timed(value: float, interval: Seconds | Estimated) -> tuple[str, str]:
+    return _time(value), f"{_time(interval.low)} to {_time(interval.high)}"
 
 
 def _section(title: str, rows: Rows) -> Iterator[str]:

@@ -1,27 +1,41 @@
-"""Tables on the terminal, the same for every command, and a run's metrics as CSV and Markdown."""
+"""Tables of results, on the terminal and as CSV and Markdown."""
 
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from msgspec.structs import asdict
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure.metrics import METRICS
-from comparisons.records import plain
-from reports.files import ownership
-from reports.terminal.printing import number, percent
+from comparisons import record as records_of
+from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
+from comparisons.departure.metrics import LEADING, METRICS
+from comparisons.departure.regions import ObjectShare
+from heuristic.heuristics import PHONG
+from reference.planning.effects import Decision, labelled
+from reference.planning.plan import Plan
+from reference.records import VERSION, Amount, Record, plain
+from reports.run import results
+from reports.terminal import verbosity
+from reports.terminal.words import lacking, nearest_lines, number, percent, seconds
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
+    from comparisons.prepared import Prepared
+    from comparisons.verification import Verification
 
 #: Characters per line of a printed table; longer cells are folded.
 WIDTH = 120
+
+#: Fields of the shapes and materials in ``carriers.csv``.
+SHARES = ("name", "material", "pixels", "share", "mean_dE2000", "effect")
 
 
 def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator[str]:
@@ -36,7 +50,7 @@ def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator
         justify: Literal["left", "right"] = "left" if is_left else "right"
         table.add_column(heading, overflow="fold", justify=justify)
     for row in others:
-        table.add_row(*row)
+        table.add_row(*(Text(verbosity.visible(cell)) for cell in row))
     console = Console(width=WIDTH, color_system=None)
     with console.capture() as capture:
         console.print(table)
@@ -55,49 +69,58 @@ def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
 
-def write(folder: Path, records: Iterable[ComparisonRecord]) -> None:
-    """Write a run's ``metrics.csv`` and ``metrics.md`` to a folder."""
-    ownership.folder(folder)
-    records = list(records)
-    ownership.write(folder / "metrics.csv", metrics_csv(records))
-    ownership.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
+def write(folder: Path, records: Sequence[ComparisonRecord]) -> None:
+    """Write a run's ``metrics.csv``, ``metrics.md`` and ``carriers.csv`` to a folder of ours."""
+    results.write(folder / "metrics.csv", metrics_csv(records))
+    results.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
+    results.write(folder / "carriers.csv", comma_separated(_shares(records)))
 
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the tables of a study of cost: ``name-cost``, ``name-prices`` and ``name-shapes``."""
-    ownership.folder(folder)
-    made = {"cost": methods(record), "prices": prices(record), "shapes": shapes(record)}
+    """Write the tables of a study of cost: ``name-cost``, ``-attribution``, ``-shapes``."""
+    results.own(folder)
+    made = {"cost": methods(record), "attribution": attribution(record), "shapes": shapes(record)}
     for part, rows in ((part, [*found]) for part, found in made.items()):
-        ownership.write(folder / f"{name}-{part}.csv", comma_separated(rows))
+        results.write(folder / f"{name}-{part}.csv", comma_separated(rows))
         shown = ([_shown(cell) for cell in row] for row in rows)
-        ownership.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
+        results.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
 
 
 def methods(record: Cost) -> Iterator[Sequence[Any]]:
     """Yield the rows of a study's methods: seconds for one image, and mean ΔE2000."""
-    yield "method", "spp", "median_s", "low_s", "high_s", "error", "error_stderr", "front"
+    yield (
+        "method",
+        "spp",
+        "median_s",
+        "low_s",
+        "high_s",
+        "error",
+        "error_low",
+        "error_high",
+        "front",
+    )
     for point in record.points:
-        seconds = point.seconds
-        times = seconds.median, seconds.low, seconds.high
+        seconds, error = point.seconds, point.error
+        numbers = seconds.value, seconds.low, seconds.high, error.mean, error.low, error.high
         front = "yes" if point.pareto else "no"
-        yield point.rung, point.spp, *times, point.error, point.error_stderr, front
+        yield point.method, point.spp, *numbers, front
 
 
-def prices(record: Cost) -> Iterator[Sequence[Any]]:
+def attribution(record: Cost) -> Iterator[Sequence[Any]]:
     """Yield the rows of the effects: the mean ΔE2000 that each removes, the seconds it adds."""
     yield "effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s"
-    for price in record.prices.effects:
-        removes = price.removes.value, price.removes.low, price.removes.high
-        yield price.effect, *removes, price.alone, price.last, price.adds_s.value
+    for one in record.attribution.effects:
+        removes = one.removes.value, one.removes.low, one.removes.high
+        yield one.effect, *removes, one.alone, one.last, one.adds_s.value
 
 
 def shapes(record: Cost) -> Iterator[Sequence[Any]]:
     """Yield the rows of the shapes: the mean ΔE2000 that each effect removes there."""
     yield "shape", "pixels", "share", "dE2000", "effect", "removes", "removes_low", "removes_high"
     for row in record.objects:
-        for price, removes in zip(record.prices.effects, row.removes, strict=True):
+        for one, removes in zip(record.attribution.effects, row.removes, strict=True):
             found = removes.value, removes.low, removes.high
-            yield row.name, row.pixels, row.share, row.departure, price.effect, *found
+            yield row.name, row.pixels, row.share, row.departure, one.effect, *found
 
 
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
@@ -125,10 +148,24 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def comma_separated(rows: Iterable[Sequence[Any]]) -> str:
-    """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full."""
+    """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full.
+
+    Texts that a spreadsheet would compute as formulas begin with an apostrophe.
+    """
     text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([*map(_inert, row)] for row in rows)
     return text.getvalue()
+
+
+def _inert(cell: Any) -> Any:
+    is_formula = isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{cell}" if is_formula else cell
+
+
+def escaped(text: str) -> str:
+    """Return text in one line that Markdown shows unchanged; `markdown` escapes bars."""
+    text = verbosity.visible(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
+    return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
 def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
@@ -148,7 +185,7 @@ def _metrics(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
             for m in (record.metrics[name] for name in METRICS)
         )
         significant = percent(record.significant.fraction)
-        yield record.scene, *means, significant, f"{record.plan.spp}"
+        yield escaped(record.scene), *means, significant, f"{record.plan.spp}"
 
 
 def _row(cells: Sequence[str]) -> str:
@@ -156,4 +193,228 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def _shown(cell: Any) -> str:
-    return number(cell) if isinstance(cell, float) else str(cell)
+    return number(cell) if isinstance(cell, float) else escaped(str(cell))
+
+
+# --- Lines on a run ----------------------------------------------------------------------------
+
+
+def summary(records: Iterable[ComparisonRecord]) -> Iterator[str]:
+    """Yield a line for each scene: departure, noise, shape, and times."""
+    records = list(records)
+    for record in records:
+        if record.picture:
+            yield from _picture(record, record.picture)
+    yield from printed(_table(records), right=1)
+    for record in records:
+        yield from nearest_lines(record)
+        if record.heuristic != PHONG.name and not record.picture:
+            yield f"{record.scene}: heuristic {record.heuristic}"
+            yield from record.mistakes
+        if record.noise_target:
+            yield _noise(record, record.noise_target)
+        guard = record.plan.guard
+        if guard and guard.state == "disagreed":
+            yield (
+                f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
+                " light, so everything was simulated. Please report this scene."
+            )
+
+
+def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
+    """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
+    shift, ratio = picture.shift, ", ".join(f"{value:.3g}" for value in picture.ratio)
+    place = "not known" if shift is None else f"{shift[0]:+.2f}, {shift[1]:+.2f} pixels"
+    yield f"{record.scene}: {record.heuristic}"
+    yield f"shift {place}; red, green, blue {ratio} times the reference's"
+    yield from picture.odd
+    yield ""
+
+
+def _table(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
+    yield (
+        "scene",
+        f"mean {LEADING.label}",
+        "noise",
+        "shape",
+        "significant",
+        "heuristic",
+        "reference",
+    )
+    for record in records:
+        metric = record.metrics[LEADING.name]
+        means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
+        times = (f"{half.total_s:.2f} s" for half in (record.time.heuristic, record.time.reference))
+        significant = f"{record.significant.fraction:.1%}"
+        yield record.scene, *(f"{mean:.3f}" for mean in means), significant, *times
+
+
+def details(record: ComparisonRecord) -> Iterator[str]:
+    """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
+    plan, pairing = record.plan, record.pairing
+    shadows = "" if plan.shadows else ", no shadow rays"
+    yield (
+        f"{record.scene}: {plan.integrator}{shadows}, {plan.spp} samples per pixel in"
+        f" {plan.passes} passes, {plan.sampler}"
+    )
+    for light in pairing.emitters:
+        note = f" ({light.note})" if light.note else ""
+        yield f"  {light.name}: {light.given} as {light.derived}{note}"
+    for material in pairing.bsdfs:
+        if material.note:
+            yield f"  {material.name}: {material.given} as {material.derived} ({material.note})"
+    for miss in pairing.misses:
+        yield f"  missed: {miss.what}, {miss.wanted:.3g} requested, {miss.reached:.3g} reached"
+    for loss in record.unrepresentable:
+        yield f"  lost: {loss.name} ({loss.plugin}): {loss.lost}; {loss.nearest}"
+    for setting in record.overridden:
+        yield f"  not used: {setting.what} {setting.given}, but {setting.used}"
+    for warning in record.warnings:
+        yield f"  warning: {warning}"
+    stages = record.time.stages
+    yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
+
+
+def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
+    """Return the noise that was reached, and what stopped the run."""
+    asked = f"target {stop.target:g}"
+    if stop.stopped_by == "samples":
+        asked += f" not reached: stopped by the limit of {stop.limit_spp} samples per pixel"
+    return (
+        f"{record.scene}: 95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
+        f" after {record.plan.spp} samples per pixel ({asked})"
+    )
+
+
+def shape_lines(record: ComparisonRecord) -> Iterator[str]:
+    """Yield the table of a scene's shapes; nothing if there is only one."""
+    if len(record.objects) < 2:
+        return
+    rows = [
+        ("shape", "lacks" if record.picture else "mostly", "departure", "pixels", "mean ΔE2000")
+    ]
+    for carrier in record.objects:
+        shares = percent(carrier.share), percent(carrier.pixels / record.pixels.counted)
+        rows.append((carrier.name, _cause(carrier), *shares, number(carrier.mean_dE2000)))
+    yield from ("", *printed(rows, right=2))
+    yield f"  causes took {percent(record.time.share_of_causes)} of the time; --no-why omits them"
+
+
+def _cause(carrier: ObjectShare) -> str:
+    return lacking(carrier.nearest) if carrier.nearest else carrier.effect or ""
+
+
+def _shares(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:
+    yield "scene", "kind", *SHARES
+    for record in records:
+        for kind, carriers in (("shape", record.objects), ("material", record.materials)):
+            for carrier in carriers:
+                values = (getattr(carrier, column) for column in SHARES)
+                yield record.scene, kind, *("" if value is None else value for value in values)
+
+
+# --- Plans -------------------------------------------------------------------------------------
+
+
+class PlannedEffect(Record):
+    """Whether a scene calls for an effect, why, and what simulates it on either side."""
+
+    name: str
+    called_for: bool
+    rule: str
+    evidence: str
+    heuristic: str
+    reference: str
+    cost: str
+
+
+class PlanReport(Plan, kw_only=True):
+    """The output of ``fotismos plan --json``."""
+
+    scene: str
+    variant: str
+    shading: str
+    effects: tuple[PlannedEffect, ...]  # type: ignore[assignment]
+    planning_s: Amount
+    record_version: int = VERSION
+
+
+def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
+    """Return the plan of a prepared comparison."""
+    made = records_of.plan_record(ready, ready.reference.spp * ready.passes, ready.passes)
+    return PlanReport(
+        scene=scene,
+        variant=variant,
+        shading=ready.pair.shading,
+        planning_s=ready.planning_seconds,
+        **asdict(made) | {"effects": tuple(map(_planned, made.effects))},
+    )
+
+
+def _planned(decision: Decision) -> PlannedEffect:
+    effect = labelled(decision.name)
+    rule, _, evidence = decision.rule.partition(": ")
+    return PlannedEffect(
+        name=effect.label,
+        called_for=decision.called_for,
+        rule=rule,
+        evidence=evidence,
+        heuristic=effect.heuristic,
+        reference=effect.reference,
+        cost=effect.cost,
+    )
+
+
+def plan_lines(plan: PlanReport) -> Iterator[str]:
+    """Yield the lines of a plan: the table of effects, then the simulation."""
+    yield from printed(_effects(plan))
+    yield ""
+    if plan.rules:
+        yield from printed(_rules(plan))
+        yield ""
+    depth = "no limit" if plan.max_depth < 0 else plan.max_depth
+    rays = "" if plan.shadows else ", no shadow rays"
+    rays += ", environment from a table" if plan.tabulated_environment else ""
+    reads = ", ".join(plan.heuristic_reads) or "nothing"
+    yield f"heuristic     {plan.shading}, which reads {reads}"
+    yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
+    yield f"variant       {plan.variant}"
+    yield f"integrator    {plan.integrator}{rays}"
+    yield f"depth         {depth}"
+    yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
+    yield f"planning      {plan.planning_s * 1e3:.0f} ms"
+
+
+def verification_lines(results: Sequence[Verification]) -> Iterator[str]:
+    """Yield a table of verifications: differences, noise, and time at equal noise."""
+    yield from printed(_verifications(results))
+    yield "significant: pixels that differ by more than both sides' noise"
+    yield "kernel: largest difference from omitting terms from the kernel"
+    yield "faster: how many times sooner the plan reaches the same noise; 95 % intervals"
+
+
+def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "effect", "called for", "rule", "evidence", "cost"
+    for effect in plan.effects:
+        called = "yes" if effect.called_for else "no"
+        yield effect.name, called, effect.rule, effect.evidence, effect.cost
+
+
+def _rules(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "pruning rule", "applies", "premise not known to hold", "evidence"
+    for rule in plan.rules:
+        yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
+
+
+def _verifications(results: Sequence[Verification]) -> Iterator[Sequence[str]]:
+    yield "scene", "planned", "significant", "of pixels", "kernel", "faster", "planning"
+    for result in results:
+        yield (
+            result.scene,
+            result.planned,
+            f"{result.significant}",
+            f"{result.pixels}",
+            f"{result.heuristic_largest:.1e}",
+            f"{result.gain.value:.3g} x ({result.gain.low:.3g} to {result.gain.high:.3g})",
+            f"{result.planning_s * 1e3:.0f} ms of {result.saved_s:.3g} s saved",
+        )

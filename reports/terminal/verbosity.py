@@ -1,6 +1,8 @@
 """How much a command says: results on standard output, everything else on standard error."""
 
 import os
+import re
+import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,8 @@ LEVEL = "fotismos.verbosity"
 """Key of the level in click's context: -1 quiet, 0 normal, 1 verbose."""
 
 
-def _remember(context: click.Context, parameter: click.Parameter, given: bool) -> None:
-    if given:
+def _remember(context: click.Context, parameter: click.Parameter, is_set: bool) -> None:
+    if is_set:
         context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
 
 
@@ -41,11 +43,28 @@ def is_quiet() -> bool:
     return level() < 0
 
 
+def visible(text: str) -> str:
+    """Return a line that no terminal or CI service takes for a command.
+
+    Control characters, which names from a scene may have, are shown as escapes. GitHub reads lines
+    that begin with ``::``, Azure and TeamCity ``##name[``.
+    """
+    shown = "".join(
+        c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text
+    )
+    return re.sub(r"##(?=\w*\[)", "# #", re.sub(r"^(\s*)::", r"\1\\::", shown))
+
+
+def echo(text: str, err: bool = False) -> None:
+    """Print text, each line as :func:`visible` returns it."""
+    click.echo("\n".join(map(visible, text.split("\n"))), err=err)
+
+
 def tell(lines: Iterable[str]) -> None:
     """Print lines of a result, unless the command is quiet."""
     if not is_quiet():
         for line in lines:
-            click.echo(line)
+            click.echo(visible(line))
 
 
 def tell_where(path: Path) -> None:
@@ -58,4 +77,4 @@ def remark(lines: Iterable[str]) -> None:
     """Print lines on standard error, if the command is verbose."""
     if level() > 0:
         for line in lines:
-            click.echo(line, err=True)
+            click.echo(visible(line), err=True)

@@ -3,10 +3,11 @@
 import os
 from statistics import median
 
-from comparisons.case import Request, open_case
+from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.cost.cost import quick
 from comparisons.gallery.builtin import SCENES
+from comparisons.options import Options
 
 SIZE = 256
 
@@ -21,7 +22,7 @@ def run(rounds):
     """Return CPU seconds of each scene as a whole and of its causes, from one run of each."""
     found = {}
     for name in SCENES:
-        case = open_case(name, Request.of({"resolution": (SIZE, SIZE)}))
+        case = open_case(name, Options.of({"resolution": (SIZE, SIZE)}))
         begin = cpu_seconds()
         compare(case.source, case.options)
         compared = cpu_seconds()

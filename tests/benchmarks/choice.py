@@ -8,11 +8,12 @@ among those that are surely within the error, and is within the error itself.
 from rich.console import Console
 from rich.table import Table
 
-from comparisons.case import Request, open_case  # isort: skip  it finds LLVM first
+from comparisons.case import open_case
 
-from comparisons.cost.climbing import climb
-from comparisons.cost.effort import Effort
-from comparisons.cost.front import SURE, cheapest
+from comparisons.options import Options  # isort: skip  it finds LLVM first
+
+from comparisons.cost.front import cheapest
+from comparisons.cost.measure import Effort, measure_ladder
 
 SCENES = (
     "fig-8-7b",
@@ -43,10 +44,10 @@ def run(rounds):
 def _chosen(name, effort):
     first, second = (_measured(name, effort, seed) for seed in (1, 2))
     for within in TOLERANCES:
-        sure = [p for p in second if p.error + SURE * p.error_stderr <= within]
+        sure = [p for p in second if p.error.high <= within]
         found, best = cheapest(first, within), searched(sure, within)
-        again = found and next(p for p in second if (p.rung, p.spp) == (found.rung, found.spp))
-        ratio = again.seconds.median / best.seconds.median if found and best else 1.0
+        again = found and next(p for p in second if (p.method, p.spp) == (found.method, found.spp))
+        ratio = again.seconds.value / best.seconds.value if found and best else 1.0
         yield {
             "scene": name,
             "within": within,
@@ -59,8 +60,8 @@ def _chosen(name, effort):
 
 def searched(points, within):
     """Return what none of the others beats, by comparing each with each; None where none is."""
-    allowed = [point for point in points if point.error <= within]
-    cost = {id(point): (point.seconds.median, point.error) for point in allowed}
+    allowed = [point for point in points if point.error.mean <= within]
+    cost = {id(point): (point.seconds.value, point.error.mean) for point in allowed}
     for point in allowed:
         if all(cost[id(point)] <= cost[id(other)] for other in allowed):
             return point
@@ -71,14 +72,14 @@ def is_right(again, best, within):
     """Tell whether a choice, measured again, is as good as the best there."""
     if again is None:
         return best is None
-    is_within = again.error <= within + SURE * again.error_stderr
+    is_within = again.error.low <= within
     return is_within and (best is None or again.seconds.low <= SLOWER * best.seconds.high)
 
 
 def _named(point):
-    return f"{point.rung}, {point.spp} spp" if point else "none"
+    return f"{point.method}, {point.spp} spp" if point else "none"
 
 
 def _measured(name, effort, seed):
-    case = open_case(name, Request(resolution=SIZE, seed=seed))
-    return climb(case.source, case.options, effort, lambda *_: None).measured
+    case = open_case(name, Options(resolution=SIZE, seed=seed))
+    return measure_ladder(case.source, case.options, effort, lambda *_: None).points

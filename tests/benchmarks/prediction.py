@@ -11,14 +11,14 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from comparisons.case import Request, open_case  # isort: skip  it finds LLVM first
+from comparisons.case import open_case
 
-from comparisons.compare import guarded
-from comparisons.cost.effort import Effort
-from comparisons.cost.methods import Methods
-from comparisons.cost.prediction.error_law import LEVEL, UNSEEN
-from comparisons.cost.prediction.forecasting import predict
-from comparisons.cost.prediction.target import sizes
+from comparisons.options import Options  # isort: skip  it finds LLVM first
+
+from comparisons.cost.measure import Effort
+from comparisons.cost.methods import Ladder
+from comparisons.cost.predict import LEVEL, UNSEEN, predict, sizes
+from comparisons.prepared import guarded
 
 SCENES = (
     "fig-8-7b",
@@ -74,20 +74,21 @@ def _share(own, key):
 
 def _deviations(name, rounds):
     shape = sizes(TARGET)[-1]
-    case = open_case(name, Request(resolution=shape))
-    methods = Methods(case.source, case.options, guarded(case.source, case.options))
-    made = predict(methods, TARGET, Effort(rounds=rounds), seed=1, is_measured=True)
+    case = open_case(name, Options(resolution=shape))
+    ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
+    effort = Effort(rounds=rounds)
+    made = predict(ladder, TARGET, effort, seed=1, is_measured=True, progress=lambda *_: None)
     found = []
     for forecast in made.forecasts:
         if forecast.measured is None:
             continue
-        seconds, error = forecast.measured.seconds.median, forecast.measured.error
+        seconds, error = forecast.measured.seconds.value, forecast.measured.error.mean
         found.append(
             {
                 "method": forecast.method,
                 "spp": forecast.spp,
                 "time": forecast.seconds.value / seconds - 1,
-                "error": _deviation(forecast.error.value, error),
+                "error": _deviation(forecast.error.mean, error),
                 "measured": error,
                 "time_inside": forecast.seconds.low <= seconds <= forecast.seconds.high,
                 "error_inside": forecast.error.low <= error <= forecast.error.high,

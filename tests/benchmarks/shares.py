@@ -1,10 +1,9 @@
 """The share of a comparison's CPU time that its metrics and its files take, by size.
 
-The medians of at most five rounds, with the usual samples and with few, without causes. Kernels are
+Medians of at most five rounds, with the usual samples and with few, without causes. Kernels are
 compiled before.
 """
 
-import os
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +12,8 @@ from unittest.mock import patch
 
 from rich.console import Console
 from rich.table import Table
+
+from tests.benchmarks.causes import cpu_seconds
 
 SCENES = ("cornell-box", "fig-8-9")
 SIZES = (128, 512, 1024)
@@ -23,18 +24,8 @@ CLOCKS = ("comparisons.compare.perf_counter", "reference.rendering.renderer.perf
 METRICS = ("metrics", "limits of the reference")
 
 
-def cpu_seconds():
-    """Return what this process has used so far, in user and system mode."""
-    used = os.times()
-    return used.user + used.system
-
-
 def run(rounds):
     """Measure, print a table, and return the numbers."""
-    import heuristic  # noqa: F401  first: it finds LLVM
-    from reference.scene.graph import set_variant
-
-    set_variant("llvm_ad_rgb")
     for name in SCENES:
         _once(name, 32, 4)
     rows = [
@@ -58,11 +49,12 @@ def _row(name, size, samples, rounds):
 
 
 def _once(name, size, samples):
-    from comparisons.case import Request, open_case
+    from comparisons.case import open_case
     from comparisons.compare import compare
-    from reports.run import output
+    from comparisons.options import Options
+    from reports.run import scene
 
-    request = Request.of({"resolution": (size, size), "spp": samples})
+    request = Options.of({"resolution": (size, size), "spp": samples})
     with ExitStack() as stack:
         for clock in CLOCKS:
             stack.enter_context(patch(clock, cpu_seconds))
@@ -71,7 +63,7 @@ def _once(name, size, samples):
         case = open_case(name, request)
         made = compare(case.source, case.options)
         compared = cpu_seconds()
-        output.write_scene(folder, name, made, key="shares")
+        scene.write(folder, name, made)
         end = cpu_seconds()
     time = made.record.time
     return {

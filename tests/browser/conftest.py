@@ -10,16 +10,17 @@ import pytest
 from msgspec import structs
 from playwright.sync_api import sync_playwright
 
+from comparisons.comparison import Comparison
 from comparisons.cost.cost import Study
-from comparisons.departure import objects, regions
+from comparisons.departure import regions
 from comparisons.departure.metrics import drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
 from comparisons.departure.statistics import histogram
-from comparisons.record import Comparison
-from comparisons.records import Pixels, plain
-from reference.rendering.gbuffer import Owners
-from reports.run import output, places
-from reports.run.stages import Failure, Run
+from reference.records import Machine, Pixels, plain
+from reference.rendering.gbuffer import ObjectIds
+from reports.page import page
+from reports.run import results, scene
+from reports.run.results import Failure, RunRecord
 from tests import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32
@@ -49,20 +50,17 @@ def report(tmp_path_factory):
     views = []
     study = cost_records.study(NOISY)
     for name, comparison, priced in ((NOISY, noisy(), study), (EXACT, exact(), None)):
-        place = places.folder_name(name)
-        views.append(output.write_scene(folder, place, comparison, priced))
+        place = results.folder_name(name)
+        views.append(scene.write(folder, place, comparison, priced))
         found.records[name] = plain(comparison.record)
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
             found.channels[name] = {key: c.pixels.copy() for key, c in file.channels().items()}
     found.study = study
-    run = Run("fotismos compare")
-    run.begin_page()
-    output.write_page(
-        folder,
-        views,
-        failures=[Failure(scene=FAILED, error="lost.xml: there is no such file")],
-        run=run,
-    )
+    failures = [Failure(scene=FAILED, error="lost.xml: there is no such file")]
+    machine = Machine(processor="any", cores=2, system="Linux")
+    run = RunRecord(command="", stages={"page": 1.0}, failures=(), machine=machine, versions={})
+    text = page.render(views, failures=failures, run=run)
+    (folder / "index.html").write_text(text, encoding="utf-8")
     return found
 
 
@@ -115,8 +113,8 @@ def comparison(name, heuristic, reference, maps, significant):
     counted[0] = False
     first, *others = regions.find(maps["dE2000"], counted) or [None]
     left = np.tile(np.arange(WIDTH) < LEFT, (HEIGHT, 1))
-    owners = Owners(np.where(left, 0, 1), ("left <b>", "right"))
-    carriers, places = objects.find(maps["dE2000"], counted, owners, owners)
+    owners = ObjectIds(np.where(left, 0, 1), ("left <b>", "right"))
+    carriers, places = regions.find_objects(maps["dE2000"], counted, owners, owners)
     first = first and structs.replace(first, effect="interreflection")
     record = records.record(
         scene=name,
@@ -185,12 +183,6 @@ class Visitor:
         closed = self.page.locator(".scene:visible .folded:not([open]) > summary")
         for summary in reversed(closed.all()):
             summary.click()
-
-    def see_charts(self):
-        """Scroll to the charts of the open scene, and wait until Vega has drawn one."""
-        self.unfold()
-        self.page.locator(".scene.open .charts").last.scroll_into_view_if_needed()
-        self.page.wait_for_function("() => document.querySelector('.scene.open .vega-embed svg')")
 
     def settle(self):
         """Wait for two frames: drawing is asked for in one and done in the next."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import mitsuba as mi
 import pytest
 
-from comparisons.audit.audit import audit
+from comparisons.audit.checks import audit
 from heuristic import plugins
 from reports.run import audit_files
 from tests.browser.conftest import Visitor
@@ -44,12 +44,3 @@ def test_axe_finds_no_violation_and_nothing_is_cut_off(opened):
     assert opened.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
     for picture in opened.locator("figure svg").all():
         assert picture.bounding_box()["width"] > 200
-
-
-@pytest.mark.parametrize("opened", SCREENS[:1], indirect=True)
-def test_the_keyboard_leads_from_a_check_to_its_section(opened):
-    opened.keyboard.press("Tab")
-    link = opened.evaluate("document.activeElement.getAttribute('href')")
-    opened.keyboard.press("Enter")
-    assert link == "#white-furnace"
-    assert opened.locator(link).evaluate("e => e.getBoundingClientRect().top") < 200

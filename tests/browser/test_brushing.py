@@ -63,9 +63,9 @@ def figure(text):
 
 
 def values(report, name="dE2000"):
-    """A map to the page's three digits, and which of its pixels count: all but the first row."""
-    rounded = np.vectorize(lambda value: float(f"{value:.2e}"))(report.channels[NOISY][f"{name}.Y"])
-    return rounded, np.arange(HEIGHT)[:, None] > 0
+    """A map as half floats, and which of its pixels count: all but the first row."""
+    rounded = report.channels[NOISY][f"{name}.Y"].astype(np.float16)
+    return rounded.astype(float), np.arange(HEIGHT)[:, None] > 0
 
 
 @pytest.mark.guarantee(
@@ -165,29 +165,6 @@ def check_lights(visitor, report, low, high):
     assert min(seen.values()) > 3
 
 
-def test_the_last_bar_holds_all_that_is_beyond(visitor, report):
-    page = visitor.open(SCENE)
-    box = chart(page)
-    page.mouse.click(box["x"] + box["width"] - 2, box["y"] + 20)
-    assert visitor.state()["band"] == "19.5,Infinity"
-    map_, counted = values(report)
-    beyond = ((map_ >= 19.5) & counted).sum()
-    assert f"{beyond:,} pixels" in page.locator("[data-part=lit]").text_content()
-
-
-def test_values_can_be_typed_and_cleared(visitor, report):
-    page = visitor.open(SCENE)
-    page.get_by_label("Light up from").fill("5")
-    page.get_by_label("Light up from").press("Enter")
-    assert visitor.state()["band"] == "5,Infinity"
-    page.get_by_label("Light up to").fill("15")
-    page.get_by_label("Light up to").press("Tab")
-    assert visitor.state()["band"] == "5,15"
-    check_lights(visitor, report, 5, 15)
-    page.get_by_role("button", name="Clear").press("Enter")
-    assert "band" not in visitor.state()
-
-
 def test_a_band_is_of_the_rectangle_where_there_is_one(visitor, report):
     page = visitor.open(f"{SCENE}&box=20,4,20,16&band=5,15")
     map_, _ = values(report)
@@ -225,16 +202,3 @@ def test_fingers_select_and_brush_on_a_phone(visitor, report):
     assert visitor.state()["band"] == "-Infinity,10"
     page.get_by_role("button", name="Clear").tap()
     assert not {"box", "band"} & set(visitor.state())
-
-
-def test_another_map_has_other_units(visitor):
-    page = visitor.open(f"{SCENE}&band=5,15")
-    page.get_by_label("Map of the error").select_option("log2_luminance")
-    assert not {"band", "top"} & set(visitor.state())
-    assert "stops" in numbers(page)["Mean"]
-
-
-def test_an_exact_scene_has_a_distribution_too(visitor):
-    page = visitor.open(f"#scene={EXACT}&box=2,2,4,4")
-    assert numbers(page)["Mean"] == "0"
-    assert numbers(page)["Of the departure"] == "0 %"

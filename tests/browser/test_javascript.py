@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 COMPILER = ROOT / "tests/javascript/node_modules/.bin/tsc"
 SCRIPTS = ROOT / "reports/page/templates/viewer"
-LOCKS = ["heuristic/three_js", "tests/javascript"]
+LOCKS = ["tests/javascript"]
 
 compiler = pytest.mark.skipif(not COMPILER.exists(), reason="npm ci --prefix tests/javascript")
 
@@ -22,7 +22,7 @@ JSON = re.compile(r'<script type="application/json"[^>]*>(.*?)</script>', re.DOT
 def written(report):
     """The data of the page's scripts, by the name of its type."""
     html = Path(url2pathname(report.url.removeprefix("file://"))).read_text(encoding="utf-8")
-    named = {"scenes": "Page", "corners": "Board", "picture": "Lit"}
+    named = {"scenes": "Page", "hybrids": "Board"}
     found = {}
     for data in map(json.loads, JSON.findall(html)):
         found |= {kind: data for key, kind in named.items() if key in data}
@@ -63,11 +63,9 @@ def test_the_types_of_data_are_those_of_what_python_writes(written, tmp_path):
 def test_data_of_other_types_are_found(written, tmp_path):
     other = json.loads(json.dumps(written))
     other["Page"]["epsilon"] = "1"
-    other["Lit"]["unknown"] = 1
-    del other["Board"]["corners"][0]["time"]
+    del other["Board"]["hybrids"][0]["time"]
     said = checked(other, tmp_path)
     assert "Type 'string' is not assignable to type 'number'" in said
-    assert "does not exist in type 'Lit'" in said
     assert "Property 'time' is missing" in said
 
 

@@ -1,20 +1,19 @@
 """A page of one scene, from disk and in a notebook's frame."""
 
 import pytest
-from msgspec import structs
 
 from reports.notebook import HEIGHT, Shown
 from reports.page import page
-from reports.run import output
+from reports.run import scene
 from tests.browser.conftest import EXACT, exact
 
 SEEN = "document.documentElement.dataset.view"
 
 
 @pytest.fixture
-def alone(tmp_path):
+def alone():
     """The page's text."""
-    return page.render([structs.replace(output.write_scene(tmp_path, EXACT, exact()), files={})])
+    return page.render([scene.view_of(exact())])
 
 
 @pytest.fixture
@@ -36,7 +35,7 @@ def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tm
     assert tab.evaluate(SEEN) == "scene"
     tab.get_by_role("link", name="all scenes").click()
     tab.wait_for_function(f"() => {SEEN} === 'overview'")
-    assert tab.locator(".count").text_content() == "1 scene"
+    assert tab.locator(".card:visible").count() == 1
     tab.get_by_role("link", name=EXACT).first.click()
     tab.wait_for_function(f"() => {SEEN} === 'scene'")
 

@@ -9,7 +9,6 @@ from tests.browser.conftest import NOISY_ID
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 VIEWS = [
     "",
-    "#list=table",
     f"#scene={NOISY_ID}",
     f"#scene={NOISY_ID}&mode=side&tone=false",
     f"#scene={NOISY_ID}&mode=error&map=effects",
@@ -22,7 +21,7 @@ def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
     assert page.url.startswith("file:")
     page.get_by_role("link", name="exact").first.click()
     visitor.wait_for_viewer("exact")
-    visitor.see_charts()
+    visitor.unfold()
     assert [url for url in visitor.requests if not url.startswith(("data:", "about:"))] == [
         visitor.report.url
     ]
@@ -58,7 +57,7 @@ def test_axe_finds_no_violation(visitor):
     for fragment in VIEWS:
         page = visitor.open(fragment)
         if "scene=" in fragment:
-            visitor.see_charts()
+            visitor.unfold()
         assert not violations(page), fragment
 
 
@@ -99,7 +98,6 @@ def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visit
     assert page.locator("canvas:visible").count() == 0
     visitor.unfold()
     assert page.locator(".scene .chart svg:visible").count() == 2 + 2 * len(drawn())
-    assert page.locator(".overview:visible").count() == 1
     assert page.locator(".controls:visible").count() == 0
 
 
@@ -124,7 +122,6 @@ def test_paper_gets_the_pictures_of_the_open_scene(visitor):
     assert min(pictures.evaluate_all(COLOURS)) > 2
     visitor.open()
     assert page.locator(".scene:visible").count() == 0
-    assert page.locator(".overview").is_visible()
     assert page.locator(".card img:visible").count() == 6
 
 
@@ -135,5 +132,3 @@ def test_scenes_are_made_when_they_are_opened(visitor):
         visitor.open(f"#scene={scene}")
         assert page.locator(".scene:visible h2").count() == 1
     assert page.locator(".scene").count() == 2
-    assert page.evaluate("window.vegaEmbed") is None
-    visitor.see_charts()

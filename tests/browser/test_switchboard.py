@@ -1,10 +1,10 @@
-"""The switchboard of effects, and the shapes that light up: by mouse, keyboard and touch."""
+"""The switchboard of effects, by mouse, keyboard and touch."""
 
 import pytest
 
-from tests.browser.conftest import EXACT, HEIGHT, LEFT, NOISY_ID, WIDTH
+from tests.browser.conftest import EXACT, NOISY_ID
 from tests.browser.test_page_at_large import PHONE, violations
-from tests.cost_records import CORNERS, EFFECTS
+from tests.cost_records import EFFECTS, HYBRIDS
 
 SCENE = f"#scene={NOISY_ID}"
 NEVER = "microfacets and Fresnel"
@@ -13,8 +13,7 @@ NEVER = "microfacets and Fresnel"
 
 def opened(visitor):
     page = visitor.open(SCENE)
-    for part in ("switchboard", "objects"):
-        page.wait_for_selector(f".scene.open .{part}[data-ready=yes]")
+    page.wait_for_selector(".scene.open .switchboard[data-ready=yes]")
     return page
 
 
@@ -59,8 +58,8 @@ def grey(value):
 
 
 def preview(report, effects):
-    """What the made-up preview of a corner shows."""
-    level = 0.1 * (1 + list(CORNERS).index(effects))
+    """What the made-up preview of a hybrid shows."""
+    level = 0.1 * (1 + list(HYBRIDS).index(effects))
     return pytest.approx([grey(level * report.study.record.viewing.exposure)] * 3, abs=4)
 
 
@@ -109,46 +108,9 @@ def test_a_combination_that_was_not_rendered_is_refused_in_words(visitor, way):
     assert switch(page, NEVER).get_attribute("aria-disabled") == "false"
 
 
-def test_the_page_says_how_many_combinations_there_are(visitor):
-    page = opened(visitor)
-    said = page.locator(".scene.open .switchboard").text_content()
-    assert "Of the 8 combinations 5 were rendered" in said
-
-
 def test_a_scene_without_causes_has_no_switchboard(visitor):
     page = visitor.open(f"#scene={EXACT}")
     assert page.locator(".scene.open .switchboard").count() == 0
-
-
-@pytest.mark.parametrize("way", ["mouse", "keyboard"])
-def test_a_shape_lights_up_where_its_name_is_pointed_at(visitor, way):
-    page = opened(visitor)
-    left, right = ((LEFT / 2) / WIDTH, 0.8), ((LEFT + 10) / WIDTH, 0.8)
-    before = [colour(page, "data-lit", *at) for at in (left, right)]
-    link = page.locator(".scene.open .objects a").filter(has_text="left")
-    if way == "mouse":
-        link.hover()
-    else:
-        link.focus()
-    after = [colour(page, "data-lit", *at) for at in (left, right)]
-    assert after[0] == before[0]
-    assert after[1] == pytest.approx([0.25 * channel for channel in before[1]], abs=1)
-    if way == "mouse":
-        page.locator(".scene.open h2").hover()
-    else:
-        page.keyboard.press("Shift+Tab")
-    if way == "mouse":
-        assert [colour(page, "data-lit", *at) for at in (left, right)] == before
-
-
-@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
-def test_a_tap_on_a_name_shows_its_box_and_keeps_it_lit(visitor, report):
-    page = opened(visitor)
-    page.locator(".scene.open .objects a").filter(has_text="left").first.tap()
-    state = visitor.state()
-    assert (state["scene"], state["mode"]) == (NOISY_ID, "error")
-    assert (float(state["x"]), float(state["y"])) == (LEFT // 2, 1 + (HEIGHT - 1) // 2)
-    assert page.locator(".scene.open tr.lit th").all_text_contents() == ["left <b>"]
 
 
 @pytest.mark.parametrize("visitor", [{}, {"color_scheme": "dark"}, PHONE], indirect=True)

@@ -71,15 +71,6 @@ def test_what_does_nothing_in_a_mode_is_disabled(visitor):
     assert page.get_by_role("button", name="Best exposure").is_disabled()
 
 
-def test_a_button_that_disables_itself_leaves_the_keyboard_a_place(visitor):
-    page = visitor.open(f"{SCENE}&mode=error&zoom=30&x=20&y=20")
-    page.get_by_role("button", name="Fit").press("Enter")
-    visitor.settle()
-    assert page.evaluate("document.activeElement.textContent") == "Error"
-    page.keyboard.press("1")
-    assert "mode" not in visitor.state()
-
-
 def test_the_range_of_the_map_is_automatic_and_can_be_set(visitor, report):
     page = visitor.open(f"{SCENE}&mode=error")
     map_ = report.channels[NOISY]["dE2000.Y"].astype(np.float64)
@@ -96,20 +87,6 @@ def test_the_range_of_the_map_is_automatic_and_can_be_set(visitor, report):
     assert visitor.state()["top"] == "100"
     selected = page.locator("[data-control=top] option").first.text_content()
     assert selected == f"automatic: {automatic}"
-
-
-@pytest.mark.parametrize(
-    "visitor", [SMALL, {"viewport": {"width": 1280, "height": 560}}], indirect=True
-)
-def test_the_legend_is_in_sight_as_long_as_the_picture_is(visitor):
-    page = visitor.open(f"{SCENE}&mode=side")
-    top = page.evaluate("document.querySelector('#viewer canvas').getBoundingClientRect().top")
-    height = visitor.canvas().bounding_box()["height"]
-    for part in (0, 0.5, 1):
-        page.evaluate("y => window.scrollTo(0, y)", top + part * (height - 100))
-        box = page.locator(".legend:visible").bounding_box()
-        assert box["y"] >= 0
-        assert box["y"] + box["height"] <= page.viewport_size["height"]
 
 
 def test_the_best_exposure_is_one_switch_away(visitor, report):
@@ -181,11 +158,7 @@ def test_the_picture_is_saved_as_it_is_seen(visitor, tmp_path):
     image = np.asarray(Image.open(tmp_path / "saved.png"))
     box = visitor.canvas().bounding_box()
     height, width = round(box["height"]), round(box["width"])
-    assert image.shape[0] > height + 40
-    assert image.shape[1] == width
-    bar, line = image[height + 8 : height + 18, 8:428, :3], image[-24:, :, :3]
-    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 100  # the legend's colours
-    assert (line.min(axis=(0, 2)) < 100).sum() > 100  # the letters of a line
+    assert image.shape[:2] == (height, width)
     for (left, top), seen in zip(places, expected, strict=True):
         np.testing.assert_array_equal(image[int(top), int(left), :3], seen)
 
@@ -206,29 +179,3 @@ def test_a_link_to_a_region_never_shrinks_the_picture(visitor, report):
     box = ",".join(str(region[key]) for key in ("x", "y", "width", "height"))
     assert visitor.state()["box"] == box
     assert page.locator("#distribution h3").text_content() == "ΔE2000 in the selection"
-
-
-@pytest.mark.parametrize(
-    "visitor", [PHONE, SMALL, {"viewport": {"width": 768, "height": 1024}}, {}], indirect=True
-)
-def test_targets_are_large_and_nothing_in_them_is_clipped(visitor):
-    page = visitor.open(f"#scene={NOISY_ID}&mode=side&box=4,4,9,9")
-    small = page.evaluate("""() =>
-      [...document.querySelectorAll("#viewer, #inspector, #distribution")]
-        .flatMap(part => [...part.querySelectorAll("button, select, input, summary, a")])
-        .filter(control => control.checkVisibility())
-        .map(control => [control.textContent, control.getBoundingClientRect()])
-        .filter(([, box]) => box.height < 31.5 || box.width < 31.5
-                || box.right > innerWidth || box.left < 0)
-        .map(([text, box]) => `${text}: ${box.width} by ${box.height}`)""")
-    assert small == []
-    clipped = page.evaluate("""() => [...document.querySelectorAll("#viewer select")]
-      .filter(select => {
-        const free = select.cloneNode(true);
-        free.style = "width: auto; max-width: none; position: absolute";
-        select.after(free);
-        const wanted = free.getBoundingClientRect().width;
-        free.remove();
-        return select.getBoundingClientRect().width < wanted - 0.5;
-      }).map(select => select.dataset.control)""")
-    assert clipped == []

@@ -4,14 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from comparisons.exports.exported import Exported
-from heuristic.scene_data import Triangles
+from comparisons.plain_scene import PlainScene, Triangles
 
 NEAR = 1e-3
 """``fade_distance``: 2 / (1 + (d / NEAR)^2) is the inverse square but for NEAR^2 / d^2."""
 
 
-def translated(scene: Exported) -> str:
+def translated(scene: PlainScene) -> str:
     """Return a scene in POV-Ray's language, without attenuation or with the inverse square."""
     shapes = [_mesh(shape, scene.materials[shape.material], scene) for shape in scene.shapes]
     lights = [_light(light) for light in scene.lights]
@@ -34,7 +33,7 @@ def _camera(camera: dict) -> str:
     )
 
 
-def _mesh(shape: Triangles, material: dict, scene: Exported) -> str:
+def _mesh(shape: Triangles, material: dict, scene: PlainScene) -> str:
     lists = [_vectors("vertex_vectors", shape.positions)]
     if shape.normals is not None:
         lists.append(_vectors("normal_vectors", shape.normals))

@@ -9,7 +9,20 @@ from tests.witnesses.witness import deviation
 WITNESSES = (*lamps.WITNESSES, *corners.WITNESSES, *furnaces.WITNESSES)
 BIAS = 3e-3
 
-cases = pytest.mark.parametrize("witness", WITNESSES, ids=lambda witness: witness.name)
+QUICK = ("below a rectangular lamp", "below a shining ball", "flux", "furnace: diffuse")
+"""Parts of names of cases of the quick tier."""
+
+cases = pytest.mark.parametrize(
+    "witness",
+    [
+        pytest.param(
+            witness,
+            id=witness.name,
+            marks=() if any(part in witness.name for part in QUICK) else pytest.mark.thorough,
+        )
+        for witness in WITNESSES
+    ],
+)
 
 
 def require_agreement(found):
@@ -27,24 +40,15 @@ def test_the_reference_is_the_closed_form(rgb, witness):
     found = deviation(witness)
     assert found.half_width[0] < witness.precision
     require_agreement(found)
-
-
-@cases
-def test_a_bias_of_a_third_of_a_percent_is_found(rgb, witness):
     for factor in (1 - BIAS, 1 + BIAS):
         with pytest.raises(AssertionError):
             require_agreement(deviation(witness, factor=factor))
 
 
 @pytest.mark.slow
-@cases
+@pytest.mark.parametrize("witness", WITNESSES, ids=lambda witness: witness.name)
 def test_so_is_the_reference_that_leaves_nothing_out(rgb, witness):
     require_agreement(deviation(witness, everything=True))
-
-
-def test_every_case_has_a_name_of_its_own():
-    names = [witness.name for witness in WITNESSES]
-    assert len(set(names)) == len(names)
 
 
 # --- The formulas themselves, against each other ------------------------------------------------
@@ -91,6 +95,7 @@ def test_a_disc_and_a_rectangle_far_away_are_one_small_lamp():
     assert (disc, square) == pytest.approx((lamp, lamp), rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_rough_surfaces_become_smooth_ones():
     cosine = np.array([0.3, 0.6, 0.9])
     smooth = fresnel.smooth_plastic(cosine, 0.0, 1.5, nonlinear=False)

@@ -12,8 +12,9 @@ from functools import cache
 import numpy as np
 from scipy import stats
 
-from comparisons.case import Request, open_case
-from comparisons.compare import prepare
+from comparisons.case import open_case
+from comparisons.options import Options
+from comparisons.prepared import prepare
 from reference.rendering.passes import passes
 
 BLOCKS = 4
@@ -83,7 +84,7 @@ class Deviation:
 @cache
 def rendered(witness: Witness, everything: bool = False) -> tuple[np.ndarray, int]:
     """Return the passes (P, H, W) of the reference in grey, and samples per pixel in all."""
-    request = Request(resolution=(witness.size, witness.size), everything=everything)
+    request = Options(resolution=(witness.size, witness.size), everything=everything)
     case = open_case(witness.scene, request, witness.name)
     ready = prepare(case.source, case.options)
     images = [np.mean(one.images[0], axis=2) for one in passes((ready.reference,), 0, ready.passes)]

@@ -1,56 +1,43 @@
 """Lights: one declaration per kind, paired both ways (table in :mod:`reference.pairing.factors`).
 
-The kinds are the :class:`LightKind` at the top of this package's modules; nothing else lists them.
-Lights without a row in the table get the nearest light:
-
-==================================  ===============================================================
-Physical                            Nearest
-==================================  ===============================================================
-``envmap`` and other environments   ``I_a``, its mean radiance over the sphere
-``sunsky``, ``timed_sunsky``        the same for the sky; the sun is a directional light of its
-                                    irradiance and mean direction
-``projector``, textured ``spot``    a spot: the even cone of the same solid angle and flux
-textured ``area``                   as ``area``, of its mean radiance
-any other                           none: it is left out
-==================================  ===============================================================
+Lights without a row in the table get the nearest light: an environment or a sky becomes ``I_a``,
+its mean radiance over the sphere, and the sun a directional light of its irradiance and mean
+direction; a ``projector`` or textured ``spot`` becomes the even cone of the same solid angle and
+flux; a textured ``area`` light has its mean radiance. Any other light is left out.
 
 **Level.** A light without an exact pair differs from its form in the other half by shape. Its level
-follows one rule, so only the shape differs:
-
-*Equal flux if the light's parameters determine it; otherwise equal mean irradiance over the surface
-that the camera sees.*
-
-A light that falls off as the inverse square sends the same flux through any sphere about it. Its
-pair then depends neither on the scene nor on the view. A light with another ``f_att`` has no single
-flux: it depends on the distance, which only the scene determines.
-
-===============================  ==================================================================
-Equal flux                       ``spot`` both ways, textured ``spot``, ``projector``; ``area``, in
-                                 its far field; of environments the mean radiance, which is equal
-                                 flux through a small sphere, and the sun's irradiance
-Equal mean irradiance            ``heuristic_point``, ``heuristic_spot`` of another ``f_att`` than
-                                 ``1 / d^2``
-===============================  ==================================================================
+follows one rule, so only the shape differs: *equal flux if the light's parameters determine it;
+otherwise equal mean irradiance over the surface that the camera sees.* A light that falls off as
+the inverse square sends the same flux through any sphere about it, so its pair depends neither on
+the scene nor on the view. A heuristic point or spot with another ``f_att`` has no single flux: it
+depends on the distance, which only the scene determines.
 """
 
 from collections.abc import Callable, Iterator
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 import mitsuba as mi
 
-from heuristic.light import PLUGINS
-from reference.pairing.lights import environments
-from reference.pairing.lights.kind import Given, LightKind, PairedEmitter
+from heuristic.lights import PLUGINS
+from reference.pairing.factors import Replacements
+from reference.pairing.lights.areas import AREA
+from reference.pairing.lights.environments import CONSTANT, DAYLIGHT, ENVIRONMENT
+from reference.pairing.lights.kind import LightKind, LightNode
+from reference.pairing.lights.points import DIRECTIONAL, POINT, PROJECTOR, SPOT
 from reference.scene import values
 from reference.scene.graph import Graph
 
 EMITTER, SHAPE = mi.ObjectType.Emitter, mi.ObjectType.Shape
 
-_modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
-KINDS: tuple[LightKind, ...] = tuple(
-    kind for module in _modules for kind in vars(module).values() if isinstance(kind, LightKind)
+KINDS: tuple[LightKind, ...] = (
+    AREA,
+    ENVIRONMENT,
+    CONSTANT,
+    DAYLIGHT,
+    POINT,
+    DIRECTIONAL,
+    SPOT,
+    PROJECTOR,
 )
 
 _by_plugin = {plugin: kind for kind in KINDS for plugin in kind.plugins}
@@ -62,7 +49,7 @@ def of(plugin: str) -> LightKind:
 
     An unknown one counts as an environment, about which premises may assume the least.
     """
-    return _by_plugin.get(plugin, environments.ENVIRONMENT)
+    return _by_plugin.get(plugin, ENVIRONMENT)
 
 
 def is_heuristic(plugin: str) -> bool:
@@ -71,13 +58,7 @@ def is_heuristic(plugin: str) -> bool:
 
 
 def check(graph: Graph) -> None:
-    """Reject intensities that are negative or not finite.
-
-    Raises
-    ------
-    InputError
-        Naming the parameter, its value and its place.
-    """
+    """Reject intensities that are negative or not finite."""
     for index in graph.nodes(EMITTER):
         plugin = graph.plugin(index)
         colour = "intensity" if is_heuristic(plugin) else of(plugin).colour
@@ -86,42 +67,42 @@ def check(graph: Graph) -> None:
 
 
 def to_heuristic(
-    graph: Graph, geometry: Callable[[], mi.Scene], hide_emitters: bool
-) -> tuple[list[PairedEmitter], Any]:
-    """Replace physical lights by heuristic ones.
+    graph: Graph,
+    geometry: Callable[[], mi.Scene],
+    hide_emitters: bool,
+    replaced: Replacements,
+) -> Any:
+    """Replace physical lights by heuristic ones, and return the radiance that becomes ``I_a``.
 
     ``geometry()`` returns the Mitsuba scene, for the size and place of area lights. The environment
     stays as a background. With ``hide_emitters`` the shapes of area lights are taken out.
-
-    Returns
-    -------
-    records : list of PairedEmitter
-    ambient : Any or None
-        The radiance of the environment, as the parser keeps it, to become ``I_a``.
     """
-    records, ambient = [], None
+    ambient = None
     for shape, key, index in list(_lights(graph)):
         if shape is not None:
             graph.detach(shape, key)
-        light = Given(graph, index, shape, geometry, hide_emitters=hide_emitters)
+        light = LightNode(
+            graph, index, shape, geometry, hide_emitters=hide_emitters, replaced=replaced
+        )
         kind = of(light.plugin)
         if kind.on_shapes != (shape is not None):
-            kind = environments.ENVIRONMENT
+            kind = ENVIRONMENT
         found = kind.ambient(light) if kind.ambient is not None else None
         ambient = ambient if found is None else found
-        records.append(kind.to_heuristic(light))
-    return records, ambient
+        kind.to_heuristic(light)
+    return ambient
 
 
-def to_physical(graph: Graph, surface: Callable[[], Any]) -> list[PairedEmitter]:
+def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements) -> None:
     """Replace heuristic lights by physical ones.
 
     ``surface()`` returns the `GBuffer` for the mean irradiance, which is used if the attenuation is
     not the inverse square.
     """
     own = [index for index in graph.nodes(EMITTER) if is_heuristic(graph.plugin(index))]
-    ways = [(index, of(graph.plugin(index)).to_physical) for index in own]
-    return [way(Given(graph, index, surface=surface)) for index, way in ways if way]
+    for index in own:
+        if way := of(graph.plugin(index)).to_physical:
+            way(LightNode(graph, index, surface=surface, replaced=replaced))
 
 
 def _lights(graph: Graph) -> Iterator[tuple[int | None, str, int]]:

@@ -5,9 +5,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
-from reference.pairing.lights import measured
-from reference.pairing.lights.kind import Given, LightKind, PairedEmitter, heuristic
+from reference.pairing import probe
+from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR, Replacements
+from reference.pairing.lights.kind import LightKind, LightNode, heuristic
 from reference.scene import values
 from reference.scene.graph import Graph, Reference, properties
 
@@ -20,7 +20,7 @@ FLAT = 1 - 1e-4
 """A light with a mean normal longer than this is flat."""
 
 
-def _to_heuristic(light: Given) -> PairedEmitter:
+def _to_heuristic(light: LightNode) -> None:
     """Replace the light by emission of its shape and a spot or point at its centroid."""
     graph, shape, radiance = light.graph, light.shape, light.value("radiance", 1.0)
     if light.hide_emitters:
@@ -30,18 +30,9 @@ def _to_heuristic(light: Given) -> PairedEmitter:
         _glow(graph, shape, radiance)
     identifier = graph.props(shape).id()
     made = next(found for found in light.geometry().shapes() if found.id() == identifier)
-    derived, record = _far_light(graph, shape, radiance, made)
-    derived.set_id(f"light of {graph.label(shape)}")
-    graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
-    return record
-
-
-def _far_light(
-    graph: Graph, shape: int, radiance: Any, made: mi.Shape
-) -> tuple[mi.Properties, PairedEmitter]:
     centroid, area, normal, radius = _extent(made)
     if _varies(graph, radiance):
-        radiance = measured.surface_mean(graph, made)
+        radiance = probe.surface_mean(graph, made)
     flatness = float(np.linalg.norm(normal))
     if flatness > FLATNESS:
         # On its axis L times the projected area, and pi L A in all: I_0 2 pi / (m + 1) of 6.4.
@@ -55,8 +46,10 @@ def _far_light(
         cone["shell"] = radius
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
+    derived.set_id(f"light of {graph.label(shape)}")
+    graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
     note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
-    return derived, PairedEmitter(graph.label(shape), "area", plugin, factor, False, note)
+    light.replaced.emitter(graph.label(shape), "area", plugin, factor, False, note)
 
 
 def _varies(graph: Graph, value: Any) -> bool:
@@ -92,20 +85,18 @@ def _glow(graph: Graph, shape: int, radiance: Any) -> None:
     graph.attach(shape, key, graph.add(BSDF, props))
 
 
-def add_glowing_shapes(graph: Graph) -> list[PairedEmitter]:
+def add_glowing_shapes(graph: Graph, replaced: Replacements) -> None:
     """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
 
     Call it while the shapes still have their ``phong``.
     """
-    records = []
     for shape in graph.nodes(SHAPE):
         for _, bsdf in graph.children(shape, BSDF):
             radiance = graph.props(bsdf).get("k_i", 0.0)
             if graph.plugin(bsdf) == "phong" and values.may_be_nonzero(radiance):
                 light = graph.add(EMITTER, properties("area", radiance=radiance))
                 graph.attach(shape, "emitter", light)
-                records.append(PairedEmitter(graph.label(shape), "k_i", "area", 1.0, True))
-    return records
+                replaced.emitter(graph.label(shape), "k_i", "area", 1.0)
 
 
 AREA = LightKind(
@@ -113,5 +104,4 @@ AREA = LightKind(
     to_heuristic=_to_heuristic,
     colour="radiance",
     on_shapes=True,
-    edits={"area": {"radiance": "radiance.value"}},
 )

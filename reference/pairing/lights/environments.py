@@ -8,24 +8,26 @@ environment nor of another kind is left out: it has no nearest form. The sky of 
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
-from reference.pairing.factors import Convention
-from reference.pairing.lights import measured
-from reference.pairing.lights.kind import Given, LightKind, PairedEmitter
+from reference.pairing import probe
+from reference.pairing.factors import Convention, Replacements
+from reference.pairing.lights.kind import LightKind, LightNode
 from reference.scene import values
 from reference.scene.graph import Graph, properties
 
 
-def _ambient(light: Given) -> Any:
+def _ambient(light: LightNode) -> Any:
     if light.shape is None and light.emitter.is_environment():
-        return measured.mean_radiance(light.graph, light.emitter)
+        return probe.mean_radiance(light.graph, light.emitter)
     return None
 
 
-def _to_heuristic(light: Given) -> PairedEmitter:
+def _to_heuristic(light: LightNode) -> None:
     if light.shape is None and light.emitter.is_environment():
-        return light.becomes_ambient(measured.MEAN, "directions of the environment's light")
-    return light.leave_out()
+        light.becomes_ambient(probe.MEAN, "directions of the environment's light")
+    else:
+        light.leave_out()
 
 
 ENVIRONMENT = LightKind(
@@ -35,7 +37,7 @@ ENVIRONMENT = LightKind(
 
 CONSTANT = LightKind(
     plugins=("constant",),
-    to_heuristic=Given.becomes_ambient,
+    to_heuristic=LightNode.becomes_ambient,
     ambient=lambda light: light.value("radiance", 1.0),
     colour="radiance",
     surrounds=True,
@@ -44,58 +46,49 @@ CONSTANT = LightKind(
 
 
 def add_environment(
-    physical: Graph, graph: Graph, ambient: Any, convention: Convention
-) -> PairedEmitter:
+    physical: Graph, graph: Graph, ambient: Any, convention: Convention, replaced: Replacements
+) -> None:
     """Add the constant environment that corresponds to ``I_a`` to the physical half of a graph.
 
     A physical surface has one diffuse reflectance, whereas the model has ``k_a`` and ``k_d``. The
     ``matched`` radiance is ``I_a k_a / k_d``, by least squares if materials differ; the ``literal``
     one is ``I_a``.
     """
-    ratio: tuple[float, ...] = (1.0,) * 3
-    exact = True
+    ratio, exact = np.ones(3), True
     if convention is Convention.MATCHED:
         ratio, exact = _ambient_ratio(graph)
-    plain = isinstance(ambient, (float, int, *values.COLOURS))
-    if plain and ratio != (1.0,) * 3:
-        components = (float(ambient),) * 3 if isinstance(ambient, (float, int)) else tuple(ambient)
-        ambient = values.scaled(components, ratio)
+    known = values.plain(ambient)
+    if known is not None and (ratio != 1).any():
+        ambient = values.scaled(known, ratio)
     light = physical.add(mi.ObjectType.Emitter, properties("constant", radiance=ambient))
     physical.attach(0, "environment", light)
     note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"
-    mean = sum(ratio) / len(ratio)
-    return PairedEmitter("ambient", "ambient", "constant", mean, exact, note)
+    replaced.emitter("ambient", "ambient", "constant", float(ratio.mean()), exact, note)
 
 
-def _ambient_ratio(graph: Graph) -> tuple[tuple[float, ...], bool]:
+def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
     """Return ``k_a / k_d`` per channel by least squares, and whether it fits all materials."""
-    pairs, has_lobe = [], False
-    for index in graph.nodes(mi.ObjectType.BSDF):
-        if graph.plugin(index) == "phong":
-            k_a, k_d, k_s = (values.colour(graph, index, k, 0.0) for k in ("k_a", "k_d", "k_s"))
-            has_lobe = has_lobe or any(k_s)
-            # Without a diffuse part the reflectance is k_a itself.
-            pairs.append((k_a, k_d if any(k_d) or any(k_s) else k_a))
-    ratio = []
-    for channel in range(3):
-        weight = sum(k_d[channel] ** 2 for _, k_d in pairs)
-        product = sum(k_a[channel] * k_d[channel] for k_a, k_d in pairs)
-        ratio.append(product / weight if weight > 0 else 1.0)
-    exact = not has_lobe and all(
-        abs(k_a[channel] - ratio[channel] * k_d[channel]) <= 1e-6 * max(k_a[channel], 1e-6)
-        for k_a, k_d in pairs
-        for channel in range(3)
+    phongs = [i for i in graph.nodes(mi.ObjectType.BSDF) if graph.plugin(i) == "phong"]
+    k_a, k_d, k_s = (
+        np.array([values.colour(graph, i, key, 0.0) for i in phongs]).reshape(-1, 3)
+        for key in ("k_a", "k_d", "k_s")
     )
-    return tuple(ratio), exact
+    # Without a diffuse part the reflectance is k_a itself.
+    has_part = np.logical_or(k_d.any(axis=1, keepdims=True), k_s.any(axis=1, keepdims=True))
+    k_d = np.where(has_part, k_d, k_a)
+    weight = np.sum(k_d**2, axis=0)
+    ratio = np.where(weight > 0, np.sum(k_a * k_d, axis=0) / np.where(weight > 0, weight, 1), 1.0)
+    fits = np.abs(k_a - ratio * k_d) <= 1e-6 * np.maximum(k_a, 1e-6)
+    return ratio, bool(fits.all() and not k_s.any())
 
 
-def _sky(light: Given) -> Any:
-    return measured.mean_radiance(light.graph, _only(light, "sun_scale"))
+def _sky(light: LightNode) -> Any:
+    return probe.mean_radiance(light.graph, _only(light, "sun_scale"))
 
 
-def _daylight(light: Given) -> PairedEmitter:
-    sun = measured.irradiance(light.graph, _only(light, "sky_scale"))
-    note = measured.MEAN
+def _daylight(light: LightNode) -> None:
+    sun = probe.irradiance(light.graph, _only(light, "sky_scale"))
+    note = probe.MEAN
     if sun is not None:
         intensity, direction = sun
         props = properties(
@@ -105,10 +98,10 @@ def _daylight(light: Given) -> PairedEmitter:
         node = light.graph.add(mi.ObjectType.Emitter, props)
         light.graph.attach(0, f"sun_of_{light.index}", node)
         note += "; the sun a directional light of its irradiance"
-    return light.becomes_ambient(note, "directions of the sky's light, and the sun's extent")
+    light.becomes_ambient(note, "directions of the sky's light, and the sun's extent")
 
 
-def _only(light: Given, off: str) -> mi.Emitter:
+def _only(light: LightNode, off: str) -> mi.Emitter:
     """Return the light with one of its two parts switched off."""
     copy = light.graph.copy()
     copy.props(light.index)[off] = 0.0

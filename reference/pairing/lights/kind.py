@@ -1,9 +1,6 @@
-"""The declaration of a kind of light, and the light that its rules read.
+"""The declaration of a kind of light, and the light that its rules read."""
 
-A kind is one :class:`LightKind` at the top of a module of :mod:`reference.pairing.lights`.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -11,43 +8,21 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.light import PLUGINS, Light
-from heuristic.lights import INVERSE_SQUARE
-from reference.pairing.factors import INTENSITY_FACTOR
+from heuristic.lights import INVERSE_SQUARE, PLUGINS, Light
+from reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from reference.scene import values
 from reference.scene.graph import Graph, properties
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
 
-@dataclass(frozen=True)
-class PairedEmitter:
-    """The replacement of a light, the factor between the intensities, and what has no form."""
+@dataclass
+class LightNode:
+    """A light of a graph that becomes one of the halves; rules read, replace and record it.
 
-    name: str
-    given: str
-    derived: str
-    factor: float
-    exact: bool
-    note: str = ""
-    lost: str = ""
-
-
-@dataclass(frozen=True)
-class Given:
-    """A light of a graph that becomes one of the halves; rules read and replace it.
-
-    Attributes
-    ----------
-    graph, index
-        The graph and the light's node.
-    shape
-        Node of the shape that shines, None for lights without a shape.
-    geometry, surface
-        Return the Mitsuba scene without materials, for the size and place of shapes, and the
-        `GBuffer` for mean irradiances.
-    hide_emitters
-        Whether camera rays look through lights.
+    ``shape`` is the node of the shape that shines, None for lights without one. ``geometry()``
+    returns the Mitsuba scene without materials, for the size and place of shapes, ``surface()`` the
+    `GBuffer` for mean irradiances. With ``hide_emitters`` camera rays look through lights.
     """
 
     graph: Graph
@@ -56,6 +31,7 @@ class Given:
     geometry: Any = None
     surface: Any = None
     hide_emitters: bool = False
+    replaced: Replacements = field(default_factory=Replacements)
 
     @property
     def plugin(self) -> str:
@@ -101,64 +77,58 @@ class Given:
         return values.scaled(colour, factor * self.number("scale", 1.0))
 
     def replace(
-        self, props: mi.Properties, factor: float, exact: bool = True, note: str = ""
-    ) -> PairedEmitter:
-        """Replace it by a light of another plugin, and return the record."""
-        given = self.plugin
+        self,
+        props: mi.Properties,
+        factor: float,
+        exact: bool = True,
+        note: str = "",
+        lost: str = "",
+    ) -> None:
+        """Replace it by a light of another plugin."""
+        self._record(props.plugin_name(), factor, exact, note, lost)
         self.graph.replace(self.index, props)
-        return PairedEmitter(self.label, given, props.plugin_name(), factor, exact, note)
 
-    def becomes_ambient(self, note: str = "", lost: str = "") -> PairedEmitter:
-        """Return the record of an environment that becomes ``I_a``; the node stays."""
-        return PairedEmitter(self.label, self.plugin, "ambient", 1.0, not lost, note, lost)
+    def becomes_ambient(self, note: str = "", lost: str = "") -> None:
+        """Record an environment that becomes ``I_a``; the node stays."""
+        self._record("ambient", 1.0, not lost, note, lost)
 
-    def leave_out(self) -> PairedEmitter:
-        """Remove the light from the scene, and return the record."""
+    def leave_out(self) -> None:
+        """Remove the light from the scene."""
+        note = "left out: it has no nearest form"
+        self._record("none", 0.0, False, note, "this kind of light")
         self.graph.remove(self.index)
-        note, lost = "left out: it has no nearest form", "this kind of light"
-        return PairedEmitter(self.label, self.plugin, "none", 0.0, False, note, lost)
+
+    def _record(self, derived, factor, exact, note, lost):
+        self.replaced.emitter(self.label, self.plugin, derived, factor, exact, note)
+        if lost:
+            self.replaced.lose(self.label, self.plugin, lost, note)
 
 
 @dataclass(frozen=True)
 class LightKind:
     """A kind of light: one declaration.
 
-    Attributes
-    ----------
-    plugins
-        Mitsuba's emitters of this kind.
-    to_heuristic, to_physical
-        Replace the light by the nearest form, and return the record. The second is None if the
-        heuristic has no light of this kind.
-    model
-        Its class in :mod:`heuristic.lights`, or None.
-    ambient
-        Returns the radiance that becomes ``I_a``, as the parser keeps it, or None.
-    colour
-        The parameter that holds the intensity, if the kind is paired by its parameters.
-    place
-        Returns ``position`` or ``toward``, the direction to the light, (3,) each; nothing for
-        lights with neither.
-    exact, surrounds, uniform, on_shapes
-        Whether it needs no random numbers, shines from everywhere, shines evenly from everywhere,
-        belongs to a shape.
-    edits
-        Properties that a study can edit in place: for each plugin and property, its name in
-        ``mitsuba.traverse``.
+    ``plugins`` are Mitsuba's emitters of this kind. ``to_heuristic`` and ``to_physical`` replace
+    the light by the nearest form; the second is None if the heuristic has no light of this kind,
+    otherwise ``model`` is its class in :mod:`heuristic.lights`. ``ambient`` returns the radiance
+    that becomes ``I_a``, as the parser keeps it, or None. ``colour`` is the parameter that holds
+    the intensity, if the kind is paired by its parameters. ``place`` returns ``position`` or
+    ``toward``, the direction to the light, (3,) each, if it has one. It may be ``exact`` (it needs
+    no random numbers), shine from everywhere (``surrounds``), evenly so (``uniform``), or belong to
+    a shape.
     """
 
     plugins: tuple[str, ...]
-    to_heuristic: Callable[[Given], PairedEmitter]
-    to_physical: Callable[[Given], PairedEmitter] | None = None
+    to_heuristic: Callable[[LightNode], None]
+    to_physical: Callable[[LightNode], None] | None = None
     model: type[Light] | None = None
-    ambient: Callable[[Given], Any] | None = None
+    ambient: Callable[[LightNode], Any] | None = None
     colour: str = ""
-    place: Callable[[Given], dict[str, np.ndarray]] = lambda light: {}
+    place: Callable[[LightNode], dict[str, Any]] = lambda light: {}
     exact: bool = False
     surrounds: bool = False
     uniform: bool = False
     on_shapes: bool = False
-    edits: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
         """Return whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""

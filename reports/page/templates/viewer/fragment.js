@@ -17,24 +17,18 @@
  * @property {boolean} best       whether the textbook has its best exposure
  * @property {number[] | null} box  the selected rectangle: left, top, width and height in pixels of the image
  * @property {number[] | null} band the values that are lit up: from, and up to
- * @property {string} sort        the overview's order
- * @property {string} only        the overview's filter: "", significant or failed
- * @property {string} q           the overview's search
- * @property {string} list        cards or table
  */
 
 /** @type {View} */
 const DEFAULT_VIEW = Object.freeze({
   scene: "", mode: "split", map: page.maps[0].name, tone: "clip", ev: 0, zoom: null, x: null, y: null, split: 0.5,
-  pixel: null, boxes: true, top: null, best: false, box: null, band: null, sort: "run", only: "", q: "", list: "cards",
+  pixel: null, boxes: true, top: null, best: false, box: null, band: null,
 });
 
 /** The allowed values of properties that have few. @type {Record<string, string[]>} */
 const ALLOWED = {
   mode: ["split", "flicker", "side", "error"],
   tone: ["clip", "reinhard", "filmic", "false"],
-  only: ["", "significant", "failed"],
-  list: ["cards", "table"],
 };
 
 /** Functions that read properties; null if the text makes no sense. @type {Record<string, (text: string) => any>} */

@@ -1,4 +1,4 @@
-// The pixel inspector: the images' values at one pixel, with all digits stored.
+// The pixel inspector: the images' values at one pixel, with the digits stored.
 
 /**
  * Texts for a pixel, by the names of their places in the page.
@@ -46,7 +46,7 @@ function markText(flags) {
 /** @param {Images} images @param {string} name @param {number} place */
 function valueText(images, name, place) {
   const plane = /** @type {Plane} */ (images.planes.find((one) => one.name === name));
-  return significant(decimal(images.codes[name][place], plane.digits), plane.digits);
+  return significant(VALUES[images.codes[name][place]], plane.digits);
 }
 
 /** The effect that dominates at a pixel, or else in its region; empty if unknown. @param {Scene} scene @param {number} x @param {number} y */

@@ -1,7 +1,6 @@
 // The page: the address's fragment says which scene is seen, and how.
 
 const address = makeAddress();
-const overview = makeOverview(byId("overview-section"), page.scenes, change);
 const verdict = document.getElementById("verdict-section");
 if (verdict) makeVerdict(verdict);
 const viewer = new Viewer(byId("viewer"), byId("inspector"), byId("distribution"), page, change);
@@ -37,7 +36,6 @@ function show() {
   document.documentElement.dataset.view = scene ? "scene" : "overview";
   const open = scene && sectionOf(scene.id);
   for (const section of document.querySelectorAll(".scene")) section.classList.toggle("open", section === open);
-  if (!scene) overview.show(view);
   if (!scene?.images) return;
   if (viewer.scene !== scene) openScene(scene);
   viewer.show(view);
@@ -48,9 +46,7 @@ function openScene(scene) {
   const section = byId(`scene=${scene.id}`);
   void terms.open(scene, section);
   void viewer.open(scene, section);
-  watchCharts(section);
   void makeSwitchboard(section);
-  void makeObjects(section);
   explainTerms(section);
 }
 

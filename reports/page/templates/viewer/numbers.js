@@ -1,35 +1,11 @@
-// Numbers as the page prints them, and the 16-bit codes that embedded images are made of.
+// Numbers as the page prints them, and the half floats that embedded images are made of.
 
-const LOWEST_EXPONENT = -18;
-const NEGATIVE = 0x8000;
-
-/**
- * The value of a decimal code: 0 for 0, else ± m · 10^(e − digits + 1) with m of `digits` digits.
- * @param {number} code
- * @param {number} digits
- */
-function decimal(code, digits) {
-  const magnitude = code & (NEGATIVE - 1);
-  if (!magnitude) return 0;
-  const unit = 10 ** (digits - 1);
-  const place = magnitude - 1;
-  const exponent = Math.floor(place / (9 * unit)) + LOWEST_EXPONENT - digits + 1;
-  const mantissa = (place % (9 * unit)) + unit;
-  return Number(`${code & NEGATIVE ? "-" : ""}${mantissa}e${exponent}`);
-}
-
-/** Tables of values by digits, made when first needed. @type {Map<number, Float64Array>} */
-const TABLES = new Map();
-
-/** The values of all codes of some digits, looked up in painting images. @param {number} digits */
-function valuesOf(digits) {
-  const table = TABLES.get(digits) ?? Float64Array.from({ length: 65536 }, (_, code) => decimal(code, digits));
-  TABLES.set(digits, table);
-  return table;
-}
-
-/** The values of an image's codes. */
-const VALUES = valuesOf(3);
+/** The values of all half floats, by their 16 bits (IEEE 754). */
+const VALUES = Float64Array.from({ length: 65536 }, (_, code) => {
+  const [exponent, fraction] = [(code >> 10) & 31, (code & 1023) / 1024];
+  const size = exponent ? (1 + fraction) * 2 ** (exponent - 15) : fraction * 2 ** -14;
+  return code & 0x8000 ? -size : size;
+});
 
 /**
  * A value with `digits` significant digits, in human form.

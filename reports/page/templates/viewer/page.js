@@ -11,14 +11,10 @@
 /**
  * @typedef {object} Terms
  * @property {Manifest | null} grid
- * @property {Manifest | null} lobes
  * @property {Record<string, number>} tops of the named planes of values ≥ 0
  * @property {Material[]} materials
  * @property {Lamp[]} lights
  * @property {string} missing        why there is no grid
- * @property {number[]} incidences   of the lobes
- * @property {number[]} views
- * @property {number} grazing
  */
 
 /**
@@ -34,15 +30,12 @@
  * @property {Manifest} images
  * @property {Effects | null} effects
  * @property {Terms | null} terms
- * @property {Manifest | null} between   the share of the reference's light from between surfaces
- * @property {Record<string, number>} keys   by column of the overview
- * @property {boolean} significant
  * @property {undefined} [failed]
  */
 
 /**
  * @typedef {Omit<Scene, "images"> & {images: null}} Unpictured
- * @typedef {{id: string, name: string, failed: true, images?: undefined, keys?: undefined, significant?: undefined}} Failed
+ * @typedef {{id: string, name: string, failed: true, images?: undefined}} Failed
  * @typedef {Scene | Unpictured | Failed} Listed
  */
 

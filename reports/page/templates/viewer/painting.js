@@ -59,9 +59,8 @@ class Painter {
   values(name) {
     let values = this.numbers.get(name);
     if (!values) {
-      const plane = this.images.planes.find((one) => one.name === name);
-      const table = valuesOf(plane?.digits ?? 3);
-      values = plane ? Float64Array.from(this.images.codes[name], (code) => table[code]) : Float64Array.from(this.images.codes.flags, (_, place) => this.ratio(place));
+      const codes = this.images.codes[name];
+      values = codes ? Float64Array.from(codes, (code) => VALUES[code]) : Float64Array.from(this.images.codes.flags, (_, place) => this.ratio(place));
       this.numbers.set(name, values);
     }
     return values;

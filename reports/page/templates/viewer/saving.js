@@ -1,9 +1,9 @@
-// The picture as shown, with its legend, as a PNG file named after its content.
+// The picture as shown, as a PNG file named after its content.
 
 /** @param {Viewer} viewer */
 function savePicture(viewer) {
   const { view, viewport, scene } = viewer;
-  captioned(viewer).toBlob((blob) => {
+  viewer.canvas.toBlob((blob) => {
     if (!blob) return;
     const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: `${pictureName(view, viewport, scene)}.png` });
     link.click();

@@ -1,8 +1,8 @@
-// The effect switchboard: which effects are on, and the preview of that corner of their lattice.
+// The effect switchboard: which effects are on, and the preview of that hybrid.
 
 /**
- * @typedef {{on: number[], error: string, time: string}} Corner
- * @typedef {{sheet: string, width: number, height: number, columns: number, corners: Corner[]}} Board
+ * @typedef {{on: number[], error: string, time: string}} Hybrid
+ * @typedef {{sheet: string, width: number, height: number, columns: number, hybrids: Hybrid[]}} Board
  */
 
 /** Make the switchboard of a scene live when the scene is first opened. @param {HTMLElement} section */
@@ -16,7 +16,7 @@ async function makeSwitchboard(section) {
   await sheet.decode();
   const buttons = [.../** @type {NodeListOf<HTMLElement>} */ (element.querySelectorAll("[data-effect]"))];
   const names = buttons.map((button) => button.textContent?.trim() ?? "");
-  const places = new Map(board.corners.map((corner, place) => [corner.on.join(), place]));
+  const places = new Map(board.hybrids.map((hybrid, place) => [hybrid.on.join(), place]));
   const refused = /** @type {HTMLElement} */ (element.querySelector("[data-board=refused]"));
   /** @type {Set<number>} */
   const on = new Set();
@@ -40,7 +40,7 @@ async function makeSwitchboard(section) {
   function show() {
     const effects = [...on].sort((a, b) => a - b);
     const place = places.get(effects.join()) ?? 0;
-    const [none, seen] = [board.corners[0], board.corners[place]];
+    const [none, seen] = [board.hybrids[0], board.hybrids[place]];
     draw("seen", place);
     part("name").textContent = inWords(effects);
     part("seen").setAttribute("aria-label", `Preview: ${inWords(effects)}`);
@@ -73,7 +73,7 @@ async function makeSwitchboard(section) {
   }
 
   buttons.forEach((button, effect) => button.addEventListener("click", () => press(effect)));
-  draw("whole", board.corners.length - 1);
+  draw("whole", board.hybrids.length - 1);
   show();
   element.dataset.ready = "yes";
 }

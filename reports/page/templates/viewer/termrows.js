@@ -1,4 +1,4 @@
-// The rows of the table of terms, and the words below its figure.
+// The rows of the table of terms.
 
 /** @param {string} name @param {string} words @param {string[]} values @param {string} kind */
 function termRow(name, words, values, kind = "") {
@@ -71,52 +71,4 @@ function sumRows(point, images) {
   const rows = point.material ? [termRow("textbook", "the sum of the terms", point.total.map(amount), "total")] : [];
   rows.push(termRow("physical", `± ${shown("standard_error")} in its noisiest channel`, ["R", "G", "B"].map((colour) => shown(`reference.${colour}`)), "reference"));
   return rows;
-}
-
-/** The reference, in the light straight from lights and that from between surfaces, by the study's shares. @param {AnyPoint} point @param {Images} images @param {Scene} scene @param {Images | null} between */
-function splitRows(point, images, scene, between) {
-  if (!between || !point.material) return [];
-  const [x, y] = point.pixel;
-  const place = Math.floor(y / images.block) * images.width + Math.floor(x / images.block);
-  const cell = Math.floor((y * between.height) / scene.height) * between.width + Math.floor((x * between.width) / scene.width);
-  const colours = ["R", "G", "B"];
-  const whole = colours.map((colour) => VALUES[images.codes[`reference.${colour}`][place]]);
-  const shares = colours.map((colour) => decimal(between.codes[colour][cell], between.planes[0].digits));
-  const size = `${between.width} × ${between.height}`;
-  return [
-    termRow("from lights", "straight from lights or emitted: the rest", whole.map((value, channel) => amount(value * (1 - shares[channel]))), "split"),
-    termRow("between surfaces", `in the share that a study at ${size} pixels found`, whole.map((value, channel) => amount(value * shares[channel])), "split"),
-  ];
-}
-
-/** @param {LightTerms | null} light @param {number} cosView */
-function vectorsInWords(light, cosView) {
-  const angle = (/** @type {number} */ cosine) => `${degreesOf(cosine).toFixed(0)}°`;
-  if (!light) return `The viewer is ${angle(cosView)} from the normal; there is no light.`;
-  const between = light.cosIncidence > 0 ? `, and V ${angle(light.cosReflection)} from R` : "";
-  return `L is ${angle(light.cosIncidence)} from N, V ${angle(cosView)}${between}.`;
-}
-
-/** @param {LightTerms | null} light @param {TermsPoint} point @param {number} top of the lobes, 0 without them @param {boolean} cut */
-function captionOf(light, point, top, cut) {
-  const words = document.createElement("p");
-  words.textContent = vectorsInWords(light, point.cosView);
-  if (light && point.lights.length > 1) words.textContent += ` Of ${point.lights.length} lights, ${light.name} contributes most.`;
-  if (light) words.textContent += " View of the plane of N and L, onto which V is projected.";
-  if (!top) return [words];
-  const keys = document.createElement("p");
-  keys.append(key("textbook", "textbook lobe"), key("partner", "physical lobe"));
-  const scale = document.createElement("p");
-  scale.textContent = "Lobes: the luminance in each direction of this plane, for a light of intensity 1, "
-    + `both on one scale. The longest radius is ${significant(top, 3)}${cut ? ", where the longer lobe is cut off" : ""}.`;
-  return [keys, words, scale];
-}
-
-/** @param {string} kind @param {string} words */
-function key(kind, words) {
-  const svg = drawn("svg", { viewBox: "0 0 26 12", "aria-hidden": "true" });
-  svg.append(drawn("rect", { class: kind, x: 1, y: 1, width: 24, height: 10 }));
-  const found = Object.assign(document.createElement("span"), { className: "key" });
-  found.append(svg, words);
-  return found;
 }

@@ -14,13 +14,10 @@ class TermsPanel {
   /** @param {HTMLElement} panel @param {Page} page */
   constructor(panel, page) {
     this.panel = panel;
-    this.weights = page.xyz[1];
     /** @type {Scene | null} */
     this.scene = null;
     /** @type {TermsData | null} */
     this.data = null;
-    /** @type {Images | null} */
-    this.between = null;
     /** @type {number[] | null} */
     this.asked = null;
     document.addEventListener("pick", (event) => {
@@ -33,7 +30,7 @@ class TermsPanel {
   async open(scene, section) {
     const { terms } = scene;
     this.scene = scene;
-    this.data = this.between = this.asked = null;
+    this.data = this.asked = null;
     this.panel.hidden = !terms;
     if (!terms) return;
     section.querySelector(".pictures")?.after(this.panel); // first on paper, hidden on screens
@@ -42,13 +39,9 @@ class TermsPanel {
     this.part("whole").hidden = !terms.grid;
     this.part("place").textContent = "";
     if (!terms.grid) return;
-    const [data, between] = await Promise.all([
-      termsOf(scene, terms, terms.grid),
-      scene.between && decode(scene.between, scene.between.data),
-    ]);
+    const data = await termsOf(scene, terms, terms.grid);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.data = data;
-    this.between = between;
     this.show(this.asked ?? firstPixel(scene, data));
   }
 
@@ -58,31 +51,8 @@ class TermsPanel {
     if (!this.scene || !this.data) return;
     const point = termsAt(this.scene, this.data, pixel);
     const [x, y] = point.pixel;
-    this.part("place").textContent = `at ${x}, ${y}${point.material ? `: ${point.material.name}` : ""}`;
-    this.drawFigure(point, this.data);
+    this.part("place").textContent = `at ${x}, ${y}${point.material ? `: ${point.material.name}` : ", where no surface is seen"}`;
     this.listTerms(point, this.scene);
-  }
-
-  /** @param {AnyPoint} point @param {TermsData} data */
-  drawFigure(point, data) {
-    const svg = /** @type {SVGElement} */ (this.panel.querySelector("svg"));
-    const caption = /** @type {HTMLElement} */ (this.panel.querySelector("figcaption"));
-    if (!point.material) {
-      svg.replaceChildren();
-      caption.textContent = "No surface is seen there.";
-      return;
-    }
-    const light = strongest(point.lights, this.weights);
-    const isLit = light && light.cosIncidence > 0;
-    const incidence = light ? degreesOf(light.cosIncidence) : 0;
-    const table = data.lobes[point.number];
-    const lobes = isLit && table && {
-      textbook: textbookLobe(point.material, incidence, this.weights),
-      physical: physicalLobe(data.terms, table, incidence),
-    };
-    const { top, cut } = drawVectors(svg, light, point.cosView, lobes || null);
-    svg.setAttribute("aria-label", vectorsInWords(light, point.cosView));
-    caption.replaceChildren(...captionOf(light, point, lobes ? top : 0, cut));
   }
 
   /** @param {AnyPoint} point @param {Scene} scene */
@@ -90,7 +60,7 @@ class TermsPanel {
     const [list, sums] = this.panel.querySelectorAll("tbody");
     list.replaceChildren(...(point.material ? termRows(point) : []));
     void imagesOf(scene.id, scene.images).then((images) => {
-      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images), ...splitRows(point, images, scene, this.between));
+      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
     });
   }
 
@@ -100,11 +70,10 @@ class TermsPanel {
   }
 }
 
-/** Planes of a scene's grid as numbers, and the lobes of its materials. @param {Scene} scene @param {Terms} terms @param {Manifest} grid */
+/** Planes of a scene's grid as numbers. @param {Scene} scene @param {Terms} terms @param {Manifest} grid */
 async function termsOf(scene, terms, grid) {
-  const { lobes, tops } = terms;
+  const { tops } = terms;
   const { codes } = await imagesOf(`terms-${scene.id}`, grid);
-  const table = lobes ? (await decode(lobes, lobes.data)).codes : {};
   const values = (/** @type {string} */ name, /** @type {Uint16Array} */ plane) =>
     Float64Array.from(plane, (code) =>
       name in tops ? tops[name] * (code / LARGEST_CODE) ** 2 : (2 * code) / LARGEST_CODE - 1);
@@ -115,8 +84,6 @@ async function termsOf(scene, terms, grid) {
     grid,
     material: codes.material,
     planes,
-    lobes: terms.materials.map((_, number) =>
-      values(`physical.${number}`, table[`physical.${number}`] ?? new Uint16Array())),
   };
 }
 
@@ -172,11 +139,4 @@ function lightTerms(light, material, normalView, at) {
 /** @param {number[]} a @param {number[]} b */
 function product(a, b) {
   return a.map((value, channel) => value * b[channel]);
-}
-
-/** The light that contributes most, or else faces the point most; null without lights. @param {LightTerms[]} lights @param {number[]} weights */
-function strongest(lights, weights) {
-  const worth = (/** @type {LightTerms} */ light) =>
-    luminanceOf(light.diffuse, weights) + luminanceOf(light.specular, weights) + 1e-9 * light.cosIncidence;
-  return lights.reduce((/** @type {LightTerms | null} */ best, light) => (best && worth(best) >= worth(light) ? best : light), null);
 }

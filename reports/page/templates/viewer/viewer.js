@@ -56,7 +56,7 @@ class Viewer {
     this.redraw();
   }
 
-  /** Offer the map of effects for scenes whose effects were priced. */
+  /** Offer the map of effects for scenes with an attribution. */
   offerEffects() {
     const option = /** @type {HTMLOptionElement} */ (this.element.querySelector("option[value=effects]"));
     option.hidden = option.disabled = !this.scene.effects;

@@ -1,0 +1,265 @@
+"""The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, Literal
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons import record
+from comparisons.audit import diagnosis, furnace
+from comparisons.audit.audit_record import Audit, Checked, MaterialCurves
+from comparisons.audit.subjects import (
+    INCIDENT,
+    LEVEL,
+    ScatteringSubject,
+    ShadingSubject,
+    Subject,
+    describe,
+)
+from heuristic import heuristics
+
+ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
+"""Degrees from the normal."""
+
+LIGHTS, VIEWS = (0.0, 30.0, 60.0), tuple(np.arange(-88.0, 89.0, 2.0).tolist())
+"""Of lobes: degrees from the normal, in the plane of incidence; the light's side is negative."""
+
+PICTURED = 0.3
+"""Roughness of the lobes."""
+
+TOLERANCE = 0.01
+"""Of albedos."""
+
+RECIPROCAL = 1e-3
+"""Largest relative difference of ``f(i, o)`` and ``f(o, i)`` in single precision."""
+
+PAIRS = 20_000
+
+GRAZING = 1e-6
+"""Sine of the light's elevation, so small that anything continuous has reached 0 there."""
+
+JUMP = 0.01
+"""In units of display white."""
+
+Kind = Literal["heuristic", "bsdf"]
+
+
+def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
+    """Make every check of a heuristic, as ``compare --heuristic`` accepts it, or of a type of BSDF.
+
+    In the current variant. ``command`` is the one that was run, for the record.
+    """
+    subject: Subject
+    if kind == "bsdf":
+        subject = ScatteringSubject(name, parameters)
+    else:
+        subject = ShadingSubject(heuristics.named(name), parameters)
+    curves = tuple(curve(subject, material) for material in subject.materials)
+    derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
+    return Audit(
+        subject=name,
+        kind=kind,
+        parameters=dict(parameters),
+        variant=mi.variant(),
+        angles=ANGLES,
+        curves=curves,
+        lights=LIGHTS,
+        views=VIEWS,
+        derivatives=derivatives,
+        checks=all_checks(subject, curves, derivatives),
+        faults=tuple(subject.faults),
+        mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
+        command=command,
+        versions=record.versions(),
+    )
+
+
+def all_checks(
+    subject: Subject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
+) -> tuple[Checked, ...]:
+    """Make every check."""
+    return (
+        white_furnace(curves),
+        energy(curves),
+        reciprocity(subject),
+        horizon(subject),
+        light_from_below(subject),
+        gradient(subject, derivatives),
+        sampling(subject),
+        values(subject),  # last: it reports what the others met
+    )
+
+
+def curve(subject: Subject, material: str) -> MaterialCurves:
+    """Return the two albedos of a white material over :data:`ANGLES`, and its lobes."""
+    response, alpha = partial(subject.response, material), subject.materials[material]
+    lights = LIGHTS if alpha in (None, PICTURED) else ()
+    return MaterialCurves(
+        material=material,
+        alpha=alpha,
+        seen=tuple(furnace.seen(response, angle, subject.grid) for angle in ANGLES),
+        returned=tuple(furnace.returned(response, angle, subject.grid) for angle in ANGLES),
+        lobes=tuple(lobe(subject, material, angle) for angle in lights),
+    )
+
+
+def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
+    """Return ``pi f`` at :data:`VIEWS`."""
+    light = furnace.direction(np.deg2rad(-degrees), 0.0)
+    view = furnace.direction(np.deg2rad(VIEWS), 0.0)
+    return tuple((subject.response(material, light, view) / light[2]).max(axis=0).tolist())
+
+
+def white_furnace(curves: tuple[MaterialCurves, ...]) -> Checked:
+    """Check that a white surface is as bright as its surroundings at every angle."""
+    value, worst = max(
+        ((value, f"{each.material}, viewer at {angle:g}°")
+         for each in curves for angle, value in zip(ANGLES, each.seen, strict=True)),
+        key=lambda pair: abs(pair[0] - 1),
+    )  # fmt: skip
+    return _checked("white furnace", abs(value - 1) <= TOLERANCE, value, f"1 ± {TOLERANCE}", worst)
+
+
+def energy(curves: tuple[MaterialCurves, ...]) -> Checked:
+    """Check that no more light is returned than arrives, at the worst angle."""
+    value, worst = max(
+        (value, f"{each.material}, light at {angle:g}°")
+        for each in curves for angle, value in zip(ANGLES, each.returned, strict=True)
+    )  # fmt: skip
+    return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
+
+
+def reciprocity(subject: Subject) -> Checked:
+    """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
+    a, b = furnace.random_pairs(PAIRS)
+    differences = {
+        material: furnace.asymmetries(partial(subject.response, material), a, b)
+        for material in subject.materials
+    }
+    value, worst = _largest(differences, a, b)
+    expected = f"at most {RECIPROCAL} of the mean"
+    return _checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
+
+
+def horizon(subject: Subject) -> Checked:
+    """Check that no value jumps as a light along x sets."""
+    polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
+    view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
+    above, below = (np.tile([[1.0], [0.0], [z]], view.shape[1]) for z in (GRAZING, -GRAZING))
+    jumps = {
+        material: np.abs(
+            subject.response(material, above, view) - subject.response(material, below, view)
+        )
+        for material in subject.materials
+    }
+    value, worst = _largest(jumps, above, view)
+    return _checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
+
+
+def light_from_below(subject: Subject) -> Checked:
+    """Check that light from behind the surface is not seen."""
+    degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
+    polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
+    light, view = furnace.direction(polar, azimuth), furnace.direction(viewer, 0 * viewer)
+    shown = {material: subject.response(material, light, view) for material in subject.materials}
+    value, worst = _largest(shown, light, view)
+    return _checked("light from below", value <= 1e-5, value, "0", worst)
+
+
+def sampling(subject: Subject) -> Checked:
+    """Check the density of samples against ``pdf``, of BSDFs."""
+    bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
+    expected = f"p of χ² at least {bound:.2g}"
+    if not isinstance(subject, ScatteringSubject):
+        return _not_asked("sampling", expected, "a heuristic is not sampled")
+    if (least := subject.sampling()) is None:
+        return _not_asked("sampling", expected, "it reflects nothing")
+    return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
+
+
+def values(subject: Subject) -> Checked:
+    """Check that hard cases, and all values met so far, are finite and not negative."""
+    for case in subject.hard_cases():
+        subject.note(*case)
+    worst = subject.faults[0] if subject.faults else "none"
+    expected = "0 cases of NaN, infinity or a negative value"
+    return _checked("values", not subject.faults, len(subject.faults), expected, worst)
+
+
+def _checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
+    verdict: Literal["holds", "does not hold"] = "holds" if holds else "does not hold"
+    return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
+
+
+def _not_asked(name: str, expected: str, why: str) -> Checked:
+    return Checked(name=name, verdict="not asked", value=None, expected=expected, worst=why)
+
+
+def _largest(
+    values: dict[str, np.ndarray], light: np.ndarray, view: np.ndarray
+) -> tuple[float, str]:
+    """Return the largest value (C, N) of any material, and describe its case."""
+    material = max(values, key=lambda name: values[name].max())
+    largest = values[material].max(axis=0)
+    place = int(largest.argmax())
+    return float(largest[place]), f"{material}, {describe(light, view, place)}"
+
+
+# --- Derivatives against finite differences, which share no code with them ---------------------
+
+STEP = 0.02
+"""Step of a finite difference, relative to the number."""
+
+QUANTILE = 0.9
+"""Quantile over the points: the rest may lie at kinks, where the two rightly differ."""
+
+AGREES = 0.05
+"""Largest relative difference at that quantile."""
+
+FAINT = 1e-3
+"""Derivatives below this share of the largest are judged by their absolute difference."""
+
+NOTHING = 1e-5
+"""A derivative that is below this everywhere is rounding error."""
+
+OPPOSITE = 2.0
+"""The largest possible relative difference; it also stands for derivatives that are not finite."""
+
+
+def gradient(subject: Subject, derivatives: Mapping[str, float]) -> Checked:
+    """Check that Dr.Jit's derivatives by all numbers are right."""
+    expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
+    if not derivatives:
+        return _not_asked("gradient", expected, subject.untuned)
+    worst = max(derivatives, key=derivatives.__getitem__)
+    value = derivatives[worst]
+    return _checked("gradient", value <= AGREES, value, expected, f"by {worst}")
+
+
+def disagreement(centre: float, shade: Any) -> float:
+    """Return how far Dr.Jit's derivative is from finite differences, at :data:`QUANTILE`."""
+    number = mi.Float(centre)
+    dr.enable_grad(number)
+    value = shade(number)
+    automatic = np.zeros(dr.width(value))
+    if dr.grad_enabled(value):
+        dr.set_grad(number, 1.0)
+        automatic = np.array(dr.forward_to(value), float)
+    # Richardson's extrapolation of two central differences.
+    wide, narrow = (_central(shade, centre, step * centre) for step in (STEP, STEP / 2))
+    finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
+    size = np.maximum(np.abs(automatic), np.abs(finite))
+    if not np.isfinite(size).all():
+        return OPPOSITE
+    if size.max() < NOTHING:
+        return 0.0
+    relative = np.abs(automatic - finite) / np.maximum(size, FAINT * size.max())
+    return float(np.quantile(relative, QUANTILE))
+
+
+def _central(shade: Any, centre: float, step: float) -> np.ndarray:
+    above, below = (np.array(dr.detach(shade(mi.Float(centre + h))), float) for h in (step, -step))
+    return (above - below) / (2 * step)

@@ -1,0 +1,430 @@
+"""What can be audited: a heuristic, or a Mitsuba BSDF, by its response to a light.
+
+A heuristic has one white material, one light and one viewer at a time; a BSDF is known by its
+``eval``, ``sample`` and ``pdf``.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.audit import furnace
+from heuristic import heuristics, terms
+from heuristic.errors import InputError, unknown
+from heuristic.heuristics import Heuristic
+from heuristic.lights import DirectionalLight, PointLight
+from heuristic.materials import PairedMaterial
+from heuristic.points import ShadingArguments
+from reference.pairing import albedo, factors
+
+ALPHAS = (0.1, 0.3, 0.6, 1.0)
+"""Roughness of the materials; the quadrature resolves their lobes at every angle."""
+
+ROUNDING = 1e-5
+"""A value below 0 by less than this, in units of display white, is a rounding error."""
+
+UP = np.array([[0.0], [0.0], [1.0]])
+
+CaseValues = tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray] | None]
+"""Words, the values (C, N), and directions to light and viewer if they identify a value."""
+
+Number = tuple[str, float, Callable[[Any], Any]]
+"""Name and value of a number to differentiate by, and the function of it, one value per point."""
+
+
+class Subject(ABC):
+    """A heuristic or a BSDF.
+
+    ``materials`` are the white materials that it is evaluated with, which absorb nothing, and the
+    roughness of those that have several; ``untuned`` is why no derivative can be checked, if so.
+    ``faults`` are values that light cannot have, in words, found during any check.
+    """
+
+    materials: dict[str, float | None]
+    grid = furnace.GRID
+    untuned = "it depends on no number"
+
+    def __init__(self) -> None:
+        self.faults: list[str] = []
+
+    @abstractmethod
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return what ``response`` returns, before it is checked."""
+
+    @abstractmethod
+    def hard_cases(self) -> Iterator[CaseValues]:
+        """Evaluate the hard cases."""
+
+    @abstractmethod
+    def numbers(self) -> Iterator[Number]:
+        """Yield the numbers that it depends on."""
+
+    def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return ``pi f cos(theta_l)``, (C, N): see :mod:`comparisons.audit.furnace`.
+
+        Values that are not finite, or negative, are noted and count as 0.
+        """
+        count = max(light.shape[1], view.shape[1])
+        light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
+        values = np.broadcast_to(self.evaluate(material, light, view), (3, count))
+        self.note(material, values, (light, view))
+        return np.where(np.isfinite(values) & (values > 0), values, 0.0)
+
+    def note(
+        self, words: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
+    ) -> None:
+        """Note the first value (C, N) that is not finite, or negative."""
+        is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
+        if is_wrong.any():
+            channel, place = np.argwhere(is_wrong)[0]
+            where = f"{words}, {describe(*pairs, place)}" if pairs else words
+            self.faults.append(f"{values[channel, place]:.3g} ({where})")
+
+
+def describe(light: np.ndarray, view: np.ndarray, place: int) -> str:
+    """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
+    light, view = (each[:, place % each.shape[1]] for each in (light, view))
+    polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
+    about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
+    return (
+        f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"
+    )
+
+
+def random_and_mirrored() -> tuple[np.ndarray, np.ndarray]:
+    """Return random directions (3, 512) to lights and viewers; half face each other's mirror."""
+    light, view = furnace.random_pairs(256)
+    mirrored = light * [[-1], [-1], [1]]
+    return np.hstack([light, light]), np.hstack([view, mirrored])
+
+
+def grazing() -> tuple[np.ndarray, np.ndarray]:
+    """Return lights and viewers (3, N) at the horizon and the normal, and lights below them."""
+    azimuth = np.deg2rad([0.0, 90.0, 180.0])
+    rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
+    views = np.concatenate([UP, *rows], axis=1)
+    lights = np.concatenate([views, -views], axis=1)
+    return np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
+
+
+# --- Heuristics --------------------------------------------------------------------------------
+
+COLOURS = ("k_i", "k_a", "k_d", "k_s", "base_color")
+
+MIDDLE = {"k_i": 0, "k_a": 0.5, "k_d": 0.5, "k_s": 0.5, "n": 10, "base_color": 0.5, "alpha": 0.3,
+          "ior": 1.5, "metallic": 0.5}  # fmt: skip
+"""Where derivatives are taken, except with respect to values of 0."""
+
+EXTREMES = (
+    ("n = 0", {"n": 0.0}), ("n = 1e-3", {"n": 1e-3}), ("n = 1e7", {"n": 1e7}),
+    ("alpha = 1e-4", {"alpha": 1e-4}), ("alpha = 1", {"alpha": 1.0}),
+    ("ior = 1", {"ior": 1.0}), ("ior = 1000", {"ior": 1e3}),
+    ("a black surface", dict.fromkeys(COLOURS, 0)), ("metallic = 1", {"metallic": 1.0}),
+)  # fmt: skip
+
+LENGTHS = (0.0, 1e-30, 1e30)
+"""Of normals."""
+
+DISTANCES = (0.0, 1e-30, 1e-6, 1e6, 1e15, 1e30)
+
+
+def white(form: str) -> dict[str, dict[str, float]]:
+    """Return the white materials matte, glossy and metal by their names, as pairing makes them.
+
+    Glossy ones are the counterparts of white rough plastic. A metal's lobe returns all light at
+    normal incidence.
+    """
+    materials = {"matte": {"k_a": 1.0, "k_d": 1.0, "base_color": 1.0}}
+    for alpha in ALPHAS:
+        n = factors.exponent_of(alpha, form)
+        lobe = float(terms.normalisation(form, n))
+        plastic = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), alpha, 1.5))
+        diffuse, specular = float(plastic.diffuse[0]), float(plastic.specular[0])
+        rough = {"base_color": 1.0, "n": n, "alpha": alpha, "ior": 1.5}
+        glossy = {"k_a": diffuse, "k_d": diffuse, "k_s": specular * lobe, **rough}
+        materials[f"glossy, alpha {alpha:g}"] = glossy
+        materials[f"metal, alpha {alpha:g}"] = {"k_s": lobe, "metallic": 1.0, **rough}
+    return materials
+
+
+class ShadingSubject(Subject):
+    """A heuristic, with values for some of its parameters."""
+
+    def __init__(self, heuristic: Heuristic, parameters: Mapping[str, float]) -> None:
+        super().__init__()
+        self.heuristic = heuristic
+        if heuristic.needs == {"position"}:
+            raise InputError(
+                f"heuristic {heuristic.name} reads only positions, as a picture does, and cannot be"
+                " audited over directions. Compare it on a scene."
+            )
+        known = {each.name: each for each in heuristic.parameters}
+        for name in parameters:
+            if name not in known:
+                raise unknown(f"heuristic {heuristic.name}: parameter", name, known)
+        self.values = {
+            name: each.checked(parameters.get(name, each.default)) for name, each in known.items()
+        }
+        self.white = white(heuristic.form or "phong")
+        self.materials = {name: each.get("alpha") for name, each in self.white.items()}
+        prepared = {each.name: self.values[each.name] for each in known.values() if each.prepared}
+        self.prepared = heuristic.prepared(_square(), prepared)
+        if not heuristic.traced:
+            self.untuned = "Dr.Jit cannot differentiate it"
+
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        return self._array(self.white[material], _sun(light), view)
+
+    def hard_cases(self) -> Iterator[CaseValues]:
+        light, view = pairs = random_and_mirrored()
+        for words, change in EXTREMES:
+            yield words, self._array(MIDDLE | change, _sun(light), view), pairs
+        for length in LENGTHS:
+            values = self._array(MIDDLE, _sun(light), view, length * UP)
+            yield f"a normal of length {length:g}", values, pairs
+        low = grazing()
+        values = self._array(MIDDLE, _sun(low[0]), low[1])
+        yield "grazing, head on and from behind", values, low
+        lights: dict[str, Any] = {
+            f"a light at a distance of {far:g}": PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
+            for far in DISTANCES
+        }
+        lights["a light of intensity 0"] = DirectionalLight((0.0, 0.0, -1.0), 0.0)
+        if self.heuristic.prepare is None:  # it may prepare one item per light
+            lights["no light at all"] = None
+        for words, lamp in lights.items():
+            yield words, self._array(MIDDLE, lamp, view), None
+        nothing = np.zeros((3, 1))
+        yield "a viewer at the point itself", self._array(MIDDLE, _sun(UP), nothing), None
+
+    def numbers(self) -> Iterator[Number]:
+        if not self.heuristic.traced:
+            return
+        light, view = furnace.random_pairs(512)
+
+        def shade(name: str, is_parameter: bool, number: Any) -> Any:
+            change = {name: number}
+            material = MIDDLE if is_parameter else MIDDLE | change
+            values = change if is_parameter else None
+            return dr.mean(self._colour(material, _sun(light), view, UP, values))
+
+        for name, value in MIDDLE.items():
+            if value:
+                yield name, value, partial(shade, name, False)
+        for each in self.heuristic.parameters:
+            if not each.prepared and (centre := _within(each, self.values[each.name])):
+                yield each.name, centre, partial(shade, each.name, True)
+
+    def _array(self, *words: Any) -> np.ndarray:
+        return np.array(self._colour(*words), float).reshape(3, -1)
+
+    def _colour(
+        self,
+        material: Mapping[str, Any],
+        light: Any,
+        view: np.ndarray,
+        normal: np.ndarray = UP,
+        values: Mapping[str, Any] | None = None,
+    ) -> Any:
+        count = max(view.shape[1], dr.width(getattr(light, "direction", 0.0)))
+        arguments = ShadingArguments(
+            dr.zeros(mi.Vector3f, count),
+            mi.Vector3f(np.broadcast_to(normal, (3, count))),
+            mi.Vector3f(np.broadcast_to(view, (3, count))),
+            _material(material, self.heuristic.form or "phong"),
+            [] if light is None else [light],
+            mi.Spectrum(0.0),
+            lambda toward, distance: dr.full(mi.Bool, True, count),
+        )
+        parameters = {
+            name: mi.Float(value) for name, value in (self.values | dict(values or {})).items()
+        }
+        uv = mi.Point2f(0.5, 0.5)
+        return mi.Spectrum(self.heuristic.evaluate(arguments, uv, parameters, self.prepared))
+
+
+def _sun(toward: np.ndarray) -> DirectionalLight:
+    return DirectionalLight(mi.Vector3f(-toward), 1.0)
+
+
+def _material(values: Mapping[str, Any], form: str) -> PairedMaterial:
+    known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
+    # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
+    opaque = {
+        name: value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
+        for name, value in (known | dict(values)).items()
+    }
+    return PairedMaterial(
+        **opaque | {name: mi.Spectrum(opaque[name]) for name in COLOURS}, form=form
+    )
+
+
+def _within(parameter: heuristics.Parameter, value: float) -> float | None:
+    """Return a value with room for differences on both sides; None if there is none."""
+    low, high = max(parameter.low, -1e6), min(parameter.high, 1e6)
+    inner = min(max(value, low + 0.1 * (high - low)), high - 0.1 * (high - low))
+    centre = value if low < 0.9 * value and 1.1 * value < high else inner
+    return centre or None
+
+
+def _square() -> Any:
+    """Return the scene that a heuristic may prepare: a white square under one light, at night."""
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": {
+                "type": "perspective",
+                "to_world": mi.ScalarTransform4f().look_at((0, -2, 2), (0, 0, 0), (0, 0, 1)),
+                "film": {"type": "hdrfilm", "width": 16, "height": 16},
+            },
+            "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
+            "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
+            "night": {"type": "constant", "radiance": 0.0},
+        },
+        optimize=False,
+    )  # fmt: skip
+
+
+# --- BSDFs -------------------------------------------------------------------------------------
+
+WHITE: dict[str, dict[str, Any]] = {
+    "diffuse": {"reflectance": 1.0},
+    "roughplastic": {"diffuse_reflectance": 1.0},
+    "principled": {"base_color": {"type": "rgb", "value": 1.0}},
+    "roughconductor": {"material": "none"},
+    "phong": {"k_d": 1.0},
+}
+"""Parameters that make BSDFs white; other types keep Mitsuba's defaults."""
+
+NARROWEST = {"alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1, "roughness": 0.32}
+"""Roughness below which neither quadrature nor the cells of χ² resolve the lobe."""
+
+SHARPEST = 50.0
+"""Phong's exponent above which they do not."""
+
+LEVEL = 0.001
+"""Chance that correct densities fail, over all angles together."""
+
+INCIDENT = (0.0, 45.0, 75.0)
+"""Degrees at which samples are compared with the density."""
+
+
+class ScatteringSubject(Subject):
+    """A BSDF of some type; parameters that are omitted are of :data:`WHITE`.
+
+    If no roughness is given, and it has one, it is evaluated at each of :data:`ALPHAS`. BSDFs that
+    transmit light or reflect it as a mirror are refused: no quadrature covers them.
+    """
+
+    def __init__(self, plugin: str, parameters: Mapping[str, Any]) -> None:
+        super().__init__()
+        self.plugin, self.parameters = plugin, dict(parameters)
+        self._require_resolved()
+        self.bsdf = self._made()
+        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission) or mi.has_flag(
+            self.bsdf.flags(), mi.BSDFFlags.Delta
+        ):
+            raise InputError(
+                f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
+                " reflection with a density: give roughplastic, roughconductor or the like."
+            )
+        self.bsdfs = {plugin: self.bsdf}
+        self.materials: dict[str, float | None] = {plugin: None}
+        self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
+        keys = set() if NARROWEST.keys() & self.parameters.keys() else self.keys
+        if keys & NARROWEST.keys():
+            self.bsdfs, self.materials = {}, {}
+            for alpha in ALPHAS:
+                name = f"{plugin}, alpha {alpha:g}"
+                rough = {"roughness": alpha**0.5} if "roughness" in keys else {"alpha": alpha}
+                self.bsdfs[name], self.materials[name] = self._made(**rough), alpha
+
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        return furnace.of_bsdf(self.bsdfs[material])(light, view)
+
+    def hard_cases(self) -> Iterator[CaseValues]:
+        light, view = grazing()
+        pairs = np.hstack([light, light]), np.hstack([view, -view])
+        yield "grazing, head on and from behind", furnace.of_bsdf(self.bsdf)(*pairs), pairs
+        yield "a direction of length 0", furnace.of_bsdf(self.bsdf)(np.zeros((3, 1)), UP), None
+        light, view = pairs = random_and_mirrored()
+        for alpha in (1e-4, 1.0) if "alpha" in self.keys else ():
+            yield f"alpha = {alpha:g}", furnace.of_bsdf(self._made(alpha=alpha))(light, view), pairs
+
+    def numbers(self) -> Iterator[Number]:
+        light, view = furnace.random_pairs(512)
+        parameters = mi.traverse(self.bsdf)
+        for key in parameters.keys():  # noqa: SIM118 not a mapping
+            value = parameters[key]
+            is_smooth = not (parameters.flags(key) & mi.ParamFlags.NonDifferentiable)
+            is_one = isinstance(value, (mi.Float, mi.Color3f)) and dr.width(value) == 1
+            if is_smooth and is_one and (centre := float(np.array(value, float).ravel()[0])):
+                # Leave room for differences: reflectances must not exceed 1.
+                centre = min(max(centre, 0.1), 0.9) if "reflectance" in key else centre
+                yield key, centre, partial(self._changed, key, type(value), light, view)
+
+    def sampling(self) -> tuple[float, str] | None:
+        """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle.
+
+        It is None for a BSDF that reflects nothing.
+        """
+        if not furnace.of_bsdf(self.bsdf)(*furnace.random_pairs(256)).any():
+            return None
+        return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in INCIDENT)
+
+    def _p_value(self, degrees: float) -> float:
+        wi = mi.Vector3f(furnace.direction(np.deg2rad(degrees), 0.3))
+        parameters = {"type": self.plugin} | WHITE.get(self.plugin, {}) | self.parameters
+        sample, density = mi.chi2.BSDFAdapter(self.plugin, parameters, wi=wi)
+
+        def above(wo: Any) -> Any:
+            # Samples below the horizon weigh nothing: roughplastic's density there is irrelevant.
+            return dr.select(wo.z > 0, density(wo), 0)
+
+        test = mi.chi2.ChiSquareTest(
+            mi.chi2.SphericalDomain(), sample, above, sample_dim=3,
+            sample_count=200_000, ires=32, res=100,
+        )  # fmt: skip
+        test.run(LEVEL, len(INCIDENT), quiet=True)
+        p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
+        return p if np.isfinite(p) else 0.0
+
+    def _made(self, **instead: Any) -> Any:
+        parameters = WHITE.get(self.plugin, {}) | self.parameters | instead
+        try:
+            return mi.load_dict({"type": self.plugin} | parameters)
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            raise InputError(
+                f"BSDF {self.plugin!r} with {self.parameters} cannot be made: give a Mitsuba BSDF"
+                f" type, and its parameters as -p name=value. Mitsuba reports: {reason}"
+            ) from error
+
+    def _changed(
+        self, key: str, kind: type, light: np.ndarray, view: np.ndarray, number: Any
+    ) -> Any:
+        bsdf = self._made()
+        parameters = mi.traverse(bsdf)
+        parameters[key] = kind(number)
+        parameters.update()
+        return dr.mean(furnace.evaluate(bsdf, light, view))
+
+    def _require_resolved(self) -> None:
+        """Reject lobes that the quadrature would miss."""
+        narrow = [
+            (name, f"{least:g} or more")
+            for name, least in NARROWEST.items()
+            if isinstance(value := self.parameters.get(name), float) and not value >= least
+        ]
+        if isinstance(n := self.parameters.get("n"), float) and not n <= SHARPEST:
+            narrow.append(("n", f"{SHARPEST:g} or less"))
+        for name, needed in narrow:
+            raise InputError(
+                f"BSDF {self.plugin!r}: {name} = {self.parameters[name]:g} makes a lobe too narrow"
+                f" for the audit: give {needed}."
+            )

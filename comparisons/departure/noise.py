@@ -1,0 +1,240 @@
+"""Take noise out of a metric: its mean and its visible shares, each with an interval.
+
+A distance is never negative, so noise raises it: near zero in proportion to the root of the noise's
+variance, far from zero to the variance itself. One rule covers both: add the noise once more. Over
+a block of pixels, let ``f0`` be the mean distance as measured, and ``f1`` the mean after noise of
+the same distribution is added to the reference. Then (:func:`without_noise`) ::
+
+    f² (without noise) = f0² − (f1² − f0²)
+
+If the distance is noise alone, ``f1 = √2 f0`` and nothing remains; if it is far larger, the squares
+grow in proportion to the variance. This is the simulation and extrapolation of Cook and Stefanski
+(J. Am. Stat. Assoc. 89, 1994) with the extrapolant of a distance. A block's square may be negative,
+and its root then counts as negative, which leaves little bias in the mean of many.
+
+Where noise moves colours along one line, back and forth through the truth, the rule subtracts too
+much. The same formula with means of squared distances is right there if the pixels of a block
+depart alike; otherwise it subtracts too little. The estimate is the middle of the two. Half of
+their difference is added to its interval, and so is a part of the noise, `CURVATURE`, since colour
+spaces are curved. Where the standard error is more than a third of the values, skewed noise shifts
+even the mean of the colours, and the interval does not hold.
+
+The added noise is a contrast of the groups of passes (:func:`contrasts`). The intervals are
+Student's, by the jackknife over the groups. With too few groups, or for a metric of neighbourhoods,
+the triangle inequality gives a wider one: the error of a mean distance is at most the distance of
+the reference from the truth, the noise floor.
+
+All of it is computed on sampled blocks (`reference.rendering.sums.sample`), at most 16,384
+pixels; the bias found there is applied to the whole image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from comparisons.departure.blocks import ratio
+from comparisons.departure.colour import Viewing
+from comparisons.departure.metrics import Metric, Pixelwise
+from comparisons.intervals import jackknife_error, student
+from reference.records import Record, Share
+from reference.rendering.sums import Grouped
+
+Array = NDArray[np.float64]
+
+CONTRASTS = 3
+"""Noise is added in this many independent ways, and the results are averaged."""
+
+CURVATURE = 0.06
+"""Uncertainty, as a share of the squared noise, from the curvature of colour spaces."""
+
+MARGIN = 1.25
+"""Factor by which a noise floor, itself an estimate, may be too small."""
+
+FEWEST = 3
+"""Fewest groups of passes for a jackknife: without one of them, two remain to make noise from."""
+
+
+def without_noise(measured: ArrayLike, noisier: ArrayLike) -> Array:
+    """Return distances without noise, from those measured and those with the noise added again.
+
+    ``√(2 f0² − f1²)``; the root of a negative number is negative.
+    """
+    squares = 2.0 * np.square(measured) - np.square(noisier)
+    return np.sign(squares) * np.sqrt(np.abs(squares))
+
+
+class ShareInterval(Record):
+    """A 95 % interval of a share."""
+
+    low: Share
+    high: Share
+
+
+def exactly(mean: float, visible: Mapping[str, float]) -> dict[str, Any]:
+    """Return the fields of a summary without noise."""
+    shares = [(share, share) for share in visible.values()]
+    return _fields(mean, mean, mean, visible, shares)
+
+
+def roughly(metric: Metric, values: NDArray, noise: NDArray) -> dict[str, Any]:
+    """Debias distances (N,), given those from noise alone, by the triangle inequality."""
+    mean, floor = metric.mean(values), metric.mean(noise)
+    shares = [
+        (float((values - noise > limit).mean()), float((values + noise > limit).mean()))
+        for limit in metric.visible
+    ]
+    clean = max(float(without_noise(mean, np.hypot(mean, floor))), 0.0)
+    half = MARGIN * floor
+    return _fields(clean, max(mean - half, 0.0), mean + half, metric.thresholds, shares)
+
+
+def _fields(
+    value: float,
+    low: float,
+    high: float,
+    thresholds: Iterable[str],
+    shares: Iterable[tuple[float, float]],
+) -> dict[str, Any]:
+    """Return the mean without noise, and 95 % intervals of it and of shares above thresholds."""
+    between = {
+        name: ShareInterval(low=low, high=high)
+        for name, (low, high) in zip(thresholds, shares, strict=True)
+    }
+    return {"debiased": value, "low": low, "high": high, "visible_between": between}
+
+
+def debiased(
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: NDArray
+) -> dict[str, Any] | None:
+    """Return a metric without noise, as fields of a summary; None with too few groups of passes.
+
+    ``test`` (H, W, 3) is linear, ``grouped`` holds groups of passes of its difference from the
+    reference at a sample of pixels, and ``raw`` (N,) the distances of all counted pixels.
+    """
+    count = len(grouped.sizes)
+    if count < FEWEST:
+        return None
+    shown = test.reshape(-1, 3)[grouped.places].astype(np.float64)
+    coordinates = metric.coordinates(shown, viewing)
+
+    def distances(differences: Array) -> Array:
+        references = metric.coordinates(shown - differences, viewing)
+        return metric.difference(references, np.broadcast_to(coordinates, references.shape))
+
+    whole = _Extrapolated.of(metric, distances, grouped, range(count))
+    left_out = [
+        _Extrapolated.of(metric, distances, grouped, [k for k in range(count) if k != out]).clean
+        for out in range(count)
+    ]
+    error = np.hypot(jackknife_error(left_out), whole.sampling_error(grouped))
+    # The bias comes from the sample, the value that it is subtracted from is over all pixels.
+    measured, added = _numbers(metric, raw), whole.raw - whole.clean
+    half = np.array([student(0.0, float(each), count).high for each in error])
+    middle = max(measured[0] - added[0], 0.0)
+    half[0] += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
+    value, low, high = np.maximum(measured[0] - added[0] + half[0] * np.array([0, -1, 1]), 0.0)
+    if metric.linear:
+        value, low, high = np.sqrt([value, low, high])
+    shares = _shares(measured[1:] - added[1:], half[1:], np.abs(added[1:]))
+    return _fields(float(value), float(low), float(high), metric.thresholds, shares)
+
+
+def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]]:
+    """Join the intervals of two estimates of shares (2 n,), since neither is always right.
+
+    Half of the noise's part in the first is added, as uncertainty of the extrapolation.
+    """
+    count = len(found) // 2
+    half = half + np.concatenate([added[:count] / 2.0, np.zeros(count)])
+    low = (found - half).reshape(2, count).min(axis=0)
+    high = (found + half).reshape(2, count).max(axis=0)
+    return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
+
+
+def _numbers(metric: Metric, distances: NDArray) -> Array:
+    """Return the mean (of a linear metric the mean square), and shares above thresholds, twice."""
+    first = np.mean(distances**2) if metric.linear else distances.mean()
+    shares = [(distances > limit).mean() for limit in metric.visible]
+    return np.array([first, *shares, *shares])
+
+
+@dataclass(frozen=True)
+class _Extrapolated:
+    """`_numbers` as measured and without noise, and what noise adds to the sum of each block.
+
+    ``gap`` is the difference of the two estimates of the mean, ``noise`` the root of what noise
+    adds to the mean square of blocks.
+
+    The share above a threshold is extrapolated in two ways: linearly, from the change when noise is
+    added once more, and from a block's distances, scaled to its mean without noise.
+    """
+
+    raw: Array
+    clean: Array
+    added: Array
+    gap: float
+    noise: float
+
+    @classmethod
+    def of(
+        cls,
+        metric: Metric,
+        distances: Callable[[Array], Array],
+        grouped: Grouped,
+        chosen: Sequence[int],
+    ) -> _Extrapolated:
+        means, sizes = grouped.means[chosen], grouped.sizes[chosen]
+        mean = np.average(means, axis=0, weights=sizes)
+        added_noise = np.tensordot(contrasts(sizes), means, 1)
+        plain, *noisy = distances(np.concatenate([mean[None], mean + added_noise]))
+        pixels = grouped.by_block(np.ones(len(plain)))
+        before, after = grouped.by_block(plain), grouped.by_block(np.mean(noisy, axis=0))
+        if metric.linear:
+            added, gap = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2), 0.0
+            noise = 0.0
+        else:
+            pair = plain**2, np.mean(np.square(noisy), axis=0)
+            squares = np.array([grouped.by_block(each) for each in pair])
+            lower = without_noise(before, after)
+            upper = np.minimum(without_noise(*np.sqrt(squares * pixels)), before)
+            added = before - (lower + upper) / 2.0
+            gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
+            noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
+        shares = [
+            grouped.by_block((np.array(noisy) > limit).mean(axis=0) - (plain > limit))
+            for limit in metric.visible
+        ]
+        kept = ratio(np.maximum(before - added, 0.0), before)[grouped.blocks]
+        shares += [
+            grouped.by_block((plain > limit) - 1.0 * (plain * kept > limit))
+            for limit in metric.visible
+        ]
+        added = np.column_stack([added, *shares])
+        raw = _numbers(metric, plain)
+        return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
+
+    def sampling_error(self, grouped: Grouped) -> Array:
+        """Return the standard error of what noise adds, due to sampling blocks."""
+        pixels = grouped.by_block(np.ones(len(grouped.places)))
+        left = self.added - np.outer(pixels, self.added.sum(axis=0) / pixels.sum())
+        share = 1.0 - grouped.sampled / grouped.total
+        spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
+        return np.sqrt(share * len(left)) * spread / pixels.sum()
+
+
+def contrasts(sizes: Array) -> Array:
+    """Return weights (m, K) of groups that make noise from their means, as large as the mean's.
+
+    They are orthogonal to each other and add up to 0; their squares over the sizes add up to one
+    over the number of passes.
+    """
+    count = len(sizes)
+    waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
+    waves[:, 0] = np.sqrt(sizes)
+    basis, _ = np.linalg.qr(waves)
+    return (basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]).T

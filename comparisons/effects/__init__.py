@@ -1,1 +1,0 @@
-"""The departure, attributed to effects."""

@@ -1,1 +1,0 @@
-"""A scene for another program to render."""

@@ -1,0 +1,344 @@
+"""The search for the best parameters, and which of them the image determines.
+
+The losses of a fit are means over pixels of a distance between two images:
+
+=================  =====================================================================  =========
+Loss               Distance of two pixels                                                 Unit
+=================  =====================================================================  =========
+``perceptual``     Euclidean in CAM16-UCS                                                 ΔE
+``linear``         its square, in linear RGB; 1 is display white                          white
+``log-luminance``  square of the ratio of luminances, each with                           stops
+                   :data:`comparisons.departure.metrics.LOG2_EPSILON` added, in stops
+=================  =====================================================================  =========
+
+``perceptual`` is the default: departures are reported as mean colour differences, and of the
+metrics only CAM16-UCS is a plain Euclidean distance that is also close to ΔE2000. Unlike the
+metric, it is not clipped at display white: a clipped highlight would not show how high and narrow
+it is. The distance is averaged, not its square: otherwise a shadow, which no parameter makes, would
+pull all of them towards itself. Below ``Loss.rounding``, a tenth of a just noticeable difference,
+it turns into its square, ``sqrt(d^2 + c^2) - c``, to have derivatives everywhere.
+
+*The search* is a bounded Newton method. The loss is a sum of a convex function of the coordinates'
+differences, which are nearly linear in the parameters: its second derivative is that function's,
+carried over by the Jacobian. Each step minimises the quadratic that has these derivatives, damped
+as by Levenberg and Marquardt, within the bounds. SciPy's bounded-variable least squares finds that
+minimum exactly, so a parameter reaches its bound. (SciPy's own searches see a curvature where a
+distance has none, or only its gradient, and take ten times the steps.) A highlight's width can trap
+the search, so it has several starts; so can the kink of a distance at 0, so each search first
+minimises a loss that is rounded more, :data:`SMOOTH`.
+
+*A parameter that the image does not show*, or that others can make up for, has no fitted value. The
+Jacobian's columns answer both: the root mean square change of the loss's coordinates, over the
+pixels that the parameter can reach, for one natural change of it; and the change that remains when
+all others undo as much of it as they can, ``1 / sqrt((J^T J)^-1)`` on the diagonal. If either is
+below the loss's threshold, the parameter is not identifiable. This is to first order, at the fitted
+values, and as if a parameter at its bound were free to leave it.
+
+*Intervals* are those of an M-estimator: the reference's noise moves the gradient of the loss, and
+the inverse of its second derivative moves the minimum.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from comparisons.departure.colour import Viewing, cam16ucs_unclipped, luminance
+from comparisons.departure.metrics import LOG2_EPSILON
+from comparisons.fit.model import bounds
+from reference.records import Amount, Count, Record
+
+STEP, SMALLEST_STEP = 1e-4, 1e-8
+"""Relative step of the finite differences of colour spaces; their own error is its square."""
+
+FOLLOWED = 2
+"""The starts of least loss that are followed to their minimum, besides the paired one."""
+
+SMOOTH = 1.0
+"""Rounding, in the loss's unit, of the loss that a search goes through first."""
+
+LARGEST_COUNT = 60
+"""Evaluations of one search."""
+
+TOLERANCE = 1e-7
+"""A search has converged when a step is expected to lower the loss by less than this part of it."""
+
+SMALLEST_GAIN = 1e-14
+"""The same in the loss's own unit, for images that the model can make exactly."""
+
+LARGEST_DAMPING = 1e12
+
+AT_BOUND = 1e-5
+"""Share of the distance between two bounds; anything nearer to a bound is at it."""
+
+PARTNER = 0.1
+"""Share of a change that another parameter must take up to be named."""
+
+COVERAGE = 1.96
+"""Standard errors to either side, of an interval that covers 95 % of normal errors."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A loss: coordinates of pixels, and their derivatives.
+
+    Attributes
+    ----------
+    name, unit
+        See the table above.
+    coordinates
+        ``(rgb (N, 3), viewing) -> (N, K)``.
+    derivative
+        ``(rgb (N, 3), viewing) -> (N, K, 3)``, of the coordinates by R, G and B.
+    threshold
+        Root mean square change of the coordinates below which nothing shows.
+    sees_colour
+        Whether it distinguishes colours of equal luminance.
+    rounding
+        ``c`` above; infinite for squares.
+    """
+
+    name: str
+    unit: str
+    coordinates: Callable[[NDArray, Viewing], NDArray]
+    derivative: Callable[[NDArray, Viewing], NDArray]
+    threshold: float
+    sees_colour: bool = True
+    rounding: float = inf
+
+
+def _log(rgb, viewing):
+    return np.log2(np.maximum(luminance(rgb), 0) + LOG2_EPSILON)[:, None]
+
+
+def _log_derivative(rgb, viewing):
+    weights = luminance(np.eye(3))
+    lifted = np.maximum(luminance(rgb), 0) + LOG2_EPSILON
+    return (weights / (lifted[:, None] * np.log(2)))[:, None, :]
+
+
+def _perceptual_derivative(rgb, viewing):
+    """Return central differences; all six images are converted at once."""
+    step = STEP * np.abs(rgb) + SMALLEST_STEP
+    shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])
+    values = cam16ucs_unclipped(rgb + shifts[:, None, :] * step, viewing)
+    return np.moveaxis((values[:3] - values[3:]) / (2 * step.T[..., None]), 0, -1)
+
+
+LOSSES = {
+    loss.name: loss
+    for loss in (
+        Loss("perceptual", "ΔE (CAM16-UCS)", cam16ucs_unclipped, _perceptual_derivative, 0.05,
+             rounding=0.1),
+        Loss("linear", "white", lambda rgb, _: rgb,
+             lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)), 5e-4),
+        Loss("log-luminance", "stops", _log, _log_derivative, 5e-3, sees_colour=False),
+    )
+}  # fmt: skip
+
+
+class SearchStart(Record):
+    """One search: where it began, where it ended, and its cost.
+
+    Attributes
+    ----------
+    n
+        Exponent of the start; null for the paired parameters.
+    loss, final_loss
+        Where it began and ended; null if it was not followed, since others began better.
+    """
+
+    n: float | None
+    loss: Amount
+    final_loss: Amount | None = None
+    evaluations: Count = 0
+    converged: bool = False
+
+
+class Objective:
+    """The loss of a model against a reference (N, 3): the mean over pixels of ``r(d)``.
+
+    ``r(d) = sqrt(d^2 + c^2) - c`` of distances ``d`` in the loss's coordinates, or ``d^2 / 2`` if
+    ``c`` is infinite. A model has ``parameters``, ``image(x)`` (N, 3) of a vector of them, and
+    ``columns(x)`` (P, N, 3), its derivatives.
+    """
+
+    def __init__(self, model: Any, reference: NDArray, loss: Loss, viewing: Viewing) -> None:
+        self.model, self.reference, self.loss, self.viewing = model, reference, loss, viewing
+        self._target = loss.coordinates(reference, viewing)
+
+    def smoothed(self) -> "Objective":
+        """Return the same with a loss that is rounded by :data:`SMOOTH` or more."""
+        loss = replace(self.loss, rounding=max(self.loss.rounding, SMOOTH))
+        return Objective(self.model, self.reference, loss, self.viewing)
+
+    def value(self, x: NDArray) -> float:
+        """Return the loss of a vector of parameters."""
+        return self.value_of(self.model.image(x))
+
+    def value_of(self, image: NDArray) -> float:
+        """Return the loss of an image (N, 3)."""
+        differences = self.loss.coordinates(image, self.viewing) - self._target
+        square, c = np.sum(differences**2, axis=1), self.loss.rounding
+        # The same as sqrt(d^2 + c^2) - c, without the difference of like numbers.
+        values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
+        return float(values.mean())
+
+    def changes(self, x: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Return the slopes of the loss by a pixel's coordinates, its curvatures, and a Jacobian.
+
+        ``d / s`` (N, K) and ``I / s - d d^T / s^3`` (N, K, K), with ``s = sqrt(d^2 + c^2)``, and
+        the derivatives of the coordinates by the parameters (N, K, P).
+        """
+        image, c = self.model.image(x), self.loss.rounding
+        d = self.loss.coordinates(image, self.viewing) - self._target
+        jacobian = self.loss.derivative(image, self.viewing) @ self.model.columns(x).transpose(
+            1, 2, 0
+        )
+        identity = np.eye(d.shape[1])
+        if not isfinite(c):
+            return d, np.broadcast_to(identity, (len(d), *identity.shape)), jacobian
+        s = np.sqrt(np.sum(d**2, axis=1, keepdims=True) + c * c)
+        curvature = identity / s[..., None] - d[:, :, None] * d[:, None, :] / s[..., None] ** 3
+        return d / s, curvature, jacobian
+
+    def quadratic(self, x: NDArray) -> tuple[NDArray, NDArray]:
+        """Return gradient (P,) and second derivative (P, P) of the loss by the parameters."""
+        slopes, curvature, jacobian = self.changes(x)
+        gradient = np.einsum("nkp,nk->p", jacobian, slopes)
+        flat = jacobian.reshape(-1, len(x))
+        second = flat.T @ (curvature @ jacobian).reshape(-1, len(x))
+        return gradient / len(slopes), second / len(slopes)
+
+
+def search(
+    objective: Objective, starts: Sequence[tuple[float | None, NDArray]]
+) -> tuple[NDArray, float, tuple[SearchStart, ...]]:
+    """Return the parameters of least loss, the loss there, and all searches.
+
+    Each start has its exponent; the paired one, which is the first, and the best others are
+    followed to their minimum.
+    """
+    losses = [objective.value(x) for _, x in starts]
+    followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
+    searches, best = [], (inf, starts[0][1])
+    for place, (n, x) in enumerate(starts):
+        if place not in followed:
+            searches.append(SearchStart(n=n, loss=losses[place]))
+            continue
+        x, _, before, _ = descend(objective.smoothed(), x)
+        x, loss, evaluations, converged = descend(objective, x)
+        best = min(best, (loss, x), key=lambda pair: pair[0])
+        searches.append(
+            SearchStart(n=n, loss=losses[place], final_loss=loss, converged=converged,
+                        evaluations=before + evaluations)
+        )  # fmt: skip
+    return best[1], best[0], tuple(searches)
+
+
+def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, int, bool]:
+    """Return the minimum that a search from ``x`` finds, its loss, evaluations and convergence."""
+    low, high = bounds(objective.model.parameters)
+    loss, damping = objective.value(x), 1e-3
+    gradient, second = objective.quadratic(x)
+    for evaluations in range(1, LARGEST_COUNT):
+        damped = second + damping * np.diag(np.diag(second))
+        step = bounded_minimum(damped, gradient, low - x, high - x)
+        expected = -(gradient @ step + step @ damped @ step / 2)
+        if expected <= max(TOLERANCE * loss, SMALLEST_GAIN) or damping > LARGEST_DAMPING:
+            return x, loss, evaluations, True
+        trial = np.clip(x + step, low, high)
+        gained = loss - objective.value(trial)
+        if gained > 0:
+            x, loss = trial, loss - gained
+            gradient, second = objective.quadratic(x)
+            damping *= 0.1 if gained > 0.5 * expected else 1
+        if gained <= 0.1 * expected:
+            damping *= 8
+    return x, loss, LARGEST_COUNT, False
+
+
+def bounded_minimum(second: NDArray, gradient: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Return the minimum of ``g x + x H x / 2`` within bounds, by bounded least squares.
+
+    Directions without curvature get as much of it as rounding would leave, and stay in place.
+    """
+    values, vectors = np.linalg.eigh(second)
+    roots = np.sqrt(np.maximum(values, max(1e-13 * values[-1], 1e-300)))
+    solved = lsq_linear(
+        roots[:, None] * vectors.T, -(vectors.T @ gradient) / roots, (low, high), method="bvls"
+    )
+    return np.clip(solved.x, low, high)
+
+
+@dataclass(frozen=True)
+class Certainty:
+    """Whether the image determines a parameter.
+
+    ``reason`` says why it does not, else it is empty; ``partners`` are the indices of parameters
+    that undo a change of it; ``at_bound``, whether it is at one of its bounds.
+    """
+
+    reason: str
+    partners: tuple[int, ...]
+    at_bound: bool
+
+
+def identify(
+    objective: Objective, x: NDArray, pixels: NDArray[np.int64], standard_error: NDArray
+) -> tuple[list[Certainty], NDArray[np.float64]]:
+    """Judge each parameter at the best fit ``x``, and return the covariance (P, P) of them.
+
+    ``pixels`` (P,) is the number that each parameter can reach; ``standard_error`` (counted pixels,
+    3) is that of the reference, or of its difference from the heuristic. The covariance is 0 for
+    parameters not identifiable or at a bound.
+    """
+    low, high = bounds(objective.model.parameters)
+    near, threshold = AT_BOUND * (high - low), objective.loss.threshold
+    at_bound = (x - low < near) | (high - x < near)
+    root = np.sqrt(np.maximum(pixels, 1))
+    _, curvature, jacobian = objective.changes(x)
+    flat = jacobian.reshape(-1, len(x))
+    shows = np.linalg.norm(flat, axis=0) / root
+    free = shows >= threshold
+    inverse = _inverse_normal(flat[:, free])
+    own = shows.copy()
+    own[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
+    determined = free & (own >= threshold)
+    covariance = np.zeros((len(x),) * 2)
+    if (inside := determined & ~at_bound).any():
+        second = objective.quadratic(x)[1][np.ix_(inside, inside)]
+        slopes = objective.loss.derivative(objective.reference, objective.viewing)
+        noise = curvature @ (slopes * standard_error[:, None, :])
+        spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
+        moved = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+        covariance[np.ix_(inside, inside)] = moved @ moved.T
+    lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
+    certainties = []
+    for number in range(len(x)):
+        reason = ""
+        partners: tuple[int, ...] = ()
+        if shows[number] < threshold:
+            reason = "does not show in the image"
+        elif not determined[number]:
+            reason, place = "others make up for it", int(free[:number].sum())
+            shares = np.abs(inverse[place] / inverse[place, place])
+            others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
+            partners = tuple(i for i, share in others if i != number and share > PARTNER)
+        elif lost[number]:
+            reason = "lost in the reference's noise"
+        certainties.append(Certainty(reason, partners, bool(at_bound[number])))
+    return certainties, covariance
+
+
+def _inverse_normal(jacobian: NDArray) -> NDArray:
+    """Return ``(J^T J)^-1``; singular values below rounding are raised to it."""
+    if not jacobian.shape[1]:
+        return np.zeros((0, 0))
+    _, singular, rows = np.linalg.svd(jacobian, full_matrices=False)
+    scaled = rows.T / np.maximum(singular, 1e-12 * singular[0])
+    return scaled @ scaled.T

@@ -1,0 +1,1 @@
+"""Images in which some effects are simulated, and what they say about the departure."""

@@ -1,0 +1,325 @@
+"""Equation 8.10 at a grid of pixels, term by term, as the kernel has it.
+
+The terms are at the centres of pixels, one in the middle of each cell of a regular grid.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.options import Options
+from heuristic import colours, kernel, lobes, terms, vectors
+from heuristic.convention import Scene
+from heuristic.errors import InputError
+from heuristic.interpolation import Interpolation
+from heuristic.materials import COEFFICIENTS, FORMS, Material
+from reference.records import Record
+from reference.rendering.gbuffer import image_size, pixel_rays
+from reference.rendering.renderer import Renderer, variant
+
+SIDE = 64
+"""Points along the longer side of the grid, at most."""
+
+VALUES = 8192
+"""Points times lights, at most: more lights leave a coarser grid."""
+
+LIGHTS = 4
+"""Lights with separate terms: the strongest ones. The others are summed."""
+
+MOST_LIGHTS = 64
+"""With more lights no terms are read: each light is evaluated separately."""
+
+MATERIALS = 256
+"""Different sets of coefficients, at most: textures have more."""
+
+Colour = tuple[float, float, float]
+
+
+class TermMaterial(Record):
+    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
+
+    name: str
+    k_i: Colour
+    k_a: Colour
+    k_d: Colour
+    k_s: Colour
+    n: float
+    form: str
+    ambient: Colour
+
+
+@dataclass(frozen=True)
+class GridLight:
+    """A light at all points, arrays (H, W).
+
+    ``intensity`` is ``I_p0``, RGB, display-linear; ``attenuation`` is ``f_att``, the cone of a spot
+    light included; ``cos_incidence`` is ``N·L``, below 0 if the light is behind the surface;
+    ``cos_view`` is ``L·V``, which gives ``R·V = 2 (N·L) (N·V) − L·V``; ``lobe`` is the kernel's
+    ``(R·V)^n`` or ``(N·H)^n``, 0 below the horizon.
+    """
+
+    name: str
+    intensity: Colour
+    attenuation: NDArray[np.float64]
+    cos_incidence: NDArray[np.float64]
+    cos_view: NDArray[np.float64]
+    lobe: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LightTerms:
+    """The terms of one light at a point; ``diffuse`` and ``specular`` are RGB, display-linear."""
+
+    name: str
+    intensity: Colour
+    attenuation: float
+    cos_incidence: float
+    cos_view: float
+    cos_reflection: float
+    lobe: float
+    diffuse: Colour
+    specular: Colour
+
+
+@dataclass(frozen=True)
+class PixelTerms:
+    """Equation 8.10 at the centre of a pixel; colours are RGB, display-linear.
+
+    ``pixel`` is column and row of the nearest point of the grid, ``cos_view`` is ``N·V``, and
+    ``others`` the sum of the lights that are not listed.
+    """
+
+    pixel: tuple[int, int]
+    material: TermMaterial
+    cos_view: float
+    emission: Colour
+    ambient: Colour
+    lights: tuple[LightTerms, ...]
+    others: Colour
+
+    @property
+    def total(self) -> Colour:
+        """The sum, which equals the kernel's value here."""
+        lit = [part for light in self.lights for part in (light.diffuse, light.specular)]
+        return _colour(sum(map(np.array, (self.emission, self.ambient, self.others, *lit))))
+
+
+@dataclass(frozen=True)
+class TermGrid:
+    """The terms at a grid of pixels, whose ``columns`` and ``rows`` are given.
+
+    ``material`` (H, W) is the index in ``materials``, -1 where no shaded surface is seen;
+    ``cos_view`` (H, W) is ``N·V``. ``others`` (H, W, 3) is the sum of the lights that are not in
+    ``lights``.
+    """
+
+    resolution: tuple[int, int]
+    columns: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    materials: tuple[TermMaterial, ...]
+    material: NDArray[np.int64]
+    cos_view: NDArray[np.float64]
+    lights: tuple[GridLight, ...]
+    others: NDArray[np.float64] | None = None
+
+    def at(self, x: int, y: int) -> PixelTerms | None:
+        """Return the terms at the grid's point nearest to a pixel; None for the background."""
+        width, height = self.resolution
+        if not (0 <= x < width and 0 <= y < height):
+            raise InputError(
+                f"pixel {x}, {y} is outside the image: give 0, 0 to {width - 1}, {height - 1}."
+            )
+        place = y * len(self.rows) // height, x * len(self.columns) // width
+        number = self.material[place]
+        if number < 0:
+            return None
+        material = self.materials[number]
+        return PixelTerms(
+            pixel=(int(self.columns[place[1]]), int(self.rows[place[0]])),
+            material=material,
+            cos_view=float(self.cos_view[place]),
+            emission=material.k_i,
+            ambient=_colour(np.multiply(material.ambient, material.k_a)),
+            lights=tuple(self._light(light, material, place) for light in self.lights),
+            others=_colour((0, 0, 0) if self.others is None else self.others[place]),
+        )
+
+    def light_image(self, light: GridLight) -> NDArray[np.float64]:
+        """Return one light's terms, (H, W, 3); 0 where no shaded surface is seen."""
+        k_d, k_s = (
+            np.array([getattr(material, name) for material in self.materials] + [(0.0, 0.0, 0.0)])
+            for name in ("k_d", "k_s")
+        )
+        diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
+        specular = k_s[self.material] * light.lobe[..., None]
+        return np.multiply(light.intensity, light.attenuation[..., None]) * (diffuse + specular)
+
+    def total(self) -> NDArray[np.float64]:
+        """Return the sum of all terms, (H, W, 3), which equals the kernel's image."""
+        even = [np.add(m.k_i, np.multiply(m.ambient, m.k_a)) for m in self.materials]
+        image = np.array([*even, np.zeros(3)])[self.material]
+        image = image + sum(map(self.light_image, self.lights))
+        return image if self.others is None else image + self.others
+
+    def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
+        arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
+        f_att, n_l, l_v, lobe = (float(getattr(light, name)[place]) for name in arrays)
+        arriving = np.multiply(light.intensity, f_att)
+        return LightTerms(
+            name=light.name,
+            intensity=light.intensity,
+            attenuation=f_att,
+            cos_incidence=n_l,
+            cos_view=l_v,
+            cos_reflection=2 * n_l * float(self.cos_view[place]) - l_v,
+            lobe=lobe,
+            diffuse=_colour(arriving * material.k_d * max(n_l, 0)),
+            specular=_colour(arriving * material.k_s * lobe),
+        )
+
+
+def _colour(values: object) -> Colour:
+    red, green, blue = np.asarray(values, float).tolist()
+    return red, green, blue
+
+
+# --- Reading the kernel ------------------------------------------------------------------------
+
+
+def trace(half: Renderer, options: Options) -> tuple[TermGrid | None, str]:
+    """Return the terms of a heuristic half, or why there are none."""
+    if options.image:
+        return None, "The heuristic half is a picture, which has no terms."
+    with variant(half.variant):
+        if reason := _without(half, options):
+            return None, reason
+        grid = _traced(half.scene, half.integrator)
+    if grid is None:
+        return None, f"Its textures make more than {MATERIALS} different materials."
+    return grid, ""
+
+
+def _without(half: Renderer, options: Options) -> str:
+    """Return why equation 8.10 does not describe a half's shading; empty if it does."""
+    if options.heuristic not in ("phong", "blinn"):
+        return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
+    if options.polygon_shading is not Interpolation.PHONG:
+        shading = options.polygon_shading.value.capitalize()
+        return f"{shading} shading does not evaluate 8.10 at pixels."
+    if mi.is_spectral:
+        return "The heuristic half is rendered by wavelength, so its terms are not RGB."
+    if len(half.scene.emitters()) > MOST_LIGHTS:
+        return f"There are more than {MOST_LIGHTS} lights."
+    if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
+        return "Some surfaces are transparent, so a pixel shows several of them at once."
+    return ""
+
+
+def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
+    emitters = [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+    resolution = image_size(scene)
+    columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
+    points = _Points(scene, integrator, pixel_rays(scene, resolution, *np.meshgrid(columns, rows)))
+    materials, places = points.materials()
+    if len(materials) > MATERIALS:
+        return None
+    shape = len(rows), len(columns)
+    lights = [points.light(emitter, shape) for emitter in emitters]
+    cos_view = points.floats(dr.dot(points.normal, points.view)).reshape(shape)
+    places = places.reshape(shape)
+    grid = TermGrid(resolution, columns, rows, materials, places, cos_view, tuple(lights))
+    if len(lights) <= LIGHTS:
+        return grid
+    images = [grid.light_image(light) for light in lights]
+    order = np.argsort([-image.sum() for image in images], kind="stable")
+    kept, others = sorted(order[:LIGHTS]), sum(images[number] for number in order[LIGHTS:])
+    return replace(grid, lights=tuple(lights[number] for number in kept), others=others)
+
+
+def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]:
+    """Return the columns and rows of the pixels in the middles of the cells."""
+    longest = min(SIDE, int((VALUES / 2 / lights) ** 0.5) if lights > 2 else SIDE)
+    scale = min(1.0, longest / max(resolution))
+    counts = (max(1, round(scale * side)) for side in resolution)
+    columns, rows = (
+        (2 * np.arange(count) + 1) * side // (2 * count)
+        for count, side in zip(counts, resolution, strict=True)
+    )
+    return columns, rows
+
+
+class _Points:
+    """The kernel's arguments at the points that rays see."""
+
+    def __init__(self, scene: Scene, integrator: Any, ray: Any) -> None:
+        self.si = scene.ray_intersect(ray)
+        normal, is_shaded = integrator.seen_side(scene, self.si, self.si.is_valid())
+        self.hit = np.array(self.si.is_valid() & is_shaded)
+        self.position, normal, view = kernel.checked_vectors(self.si.p, normal, mi.Vector3f(-ray.d))
+        self.normal, self.view = vectors.normalise(normal), vectors.normalise(view)
+        self.known = integrator.known(scene).materials
+        self.present = self.known.at(self.si, self.si.is_valid())
+        self.ambient = integrator.ambient_at(self.si, self.si.is_valid())
+
+    def floats(self, value: Any) -> NDArray[np.float64]:
+        """Return a value of each point, (N,)."""
+        return np.array(mi.Float(value) + dr.zeros(mi.Float, len(self.hit)), np.float64)
+
+    def colours(self, value: Any) -> NDArray[np.float64]:
+        """Return a colour of each point, (N, 3)."""
+        value = colours.as_array(value, mi.Vector3f)
+        value = value[0] if dr.depth_v(value) > 1 and len(value) == 1 else value
+        return np.array(mi.Color3f(value) + dr.zeros(mi.Color3f, len(self.hit)), np.float64).T
+
+    def select(self, read: Callable[[Material], NDArray]) -> NDArray[np.float64]:
+        """Return numbers read from the material at each point, (N, C)."""
+        total = np.zeros(())
+        for material, mask in self.present:
+            here = np.array(mi.Bool(mask) & dr.full(mi.Bool, True, len(self.hit)))[:, None]
+            total = total + np.where(here, read(material), 0.0)
+        return total
+
+    def materials(self) -> tuple[tuple[TermMaterial, ...], NDArray[np.int64]]:
+        """Return the different materials, and the index of each point's."""
+        number = self.floats(self.known.index(self.si, self.si.is_valid()))
+        rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
+        different, places = np.unique(rows[self.hit], axis=0, return_inverse=True)
+        numbers = np.full(len(self.hit), -1)
+        numbers[self.hit] = places.ravel()
+        return tuple(map(self._material, different.tolist())), numbers
+
+    def _row(self, material: Material) -> NDArray[np.float64]:
+        k_i, k_a, k_d, k_s = (self.colours(getattr(material, name)) for name in COEFFICIENTS)
+        if material.normalised:
+            k_s *= self.floats(terms.normalisation(material.form, material.n))[:, None]
+        form = np.full(len(self.hit), FORMS.index(material.form))
+        return np.column_stack((k_i, k_a, k_d, k_s, self.floats(material.n), form))
+
+    def _material(self, row: list[float]) -> TermMaterial:
+        number, *values = row
+        k_i, k_a, k_d, k_s, ambient = (_colour(values[i : i + 3]) for i in (0, 3, 6, 9, 14))
+        name, form = self.known.bsdfs[int(number)].id(), FORMS[int(values[13])]
+        return TermMaterial(name, k_i, k_a, k_d, k_s, values[12], form, ambient)
+
+    def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
+        """Return a light at all points."""
+        light = emitter.light(self.si, self.si.is_valid())
+        toward, arriving, _ = light.illuminate(self.position)
+        cos_incidence = dr.dot(self.normal, toward)
+
+        def lobe(material: Material) -> NDArray:
+            cosine = lobes.lobe(material, self.normal, self.view)
+            cosine = cosine(light, self.position, toward, cos_incidence)
+            return self.floats(terms.specular(1, 1, cosine, material.n))[:, None]
+
+        intensity, arriving = self.colours(light.intensity)[0], self.colours(arriving)
+        brightest = int(np.argmax(intensity))
+        scale = arriving[:, brightest] / (intensity[brightest] or 1.0)
+        each = (scale, self.floats(cos_incidence), self.floats(dr.dot(toward, self.view)))
+        arrays = (*each, self.select(lobe))
+        return GridLight(emitter.id(), _colour(intensity), *(a.reshape(shape) for a in arrays))

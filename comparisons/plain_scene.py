@@ -1,0 +1,201 @@
+"""A scene as plain data: camera, triangles, paired materials and lights, and what pixels see.
+
+Everything is in world space and in the heuristic half's display-linear units.
+"""
+
+from dataclasses import dataclass, fields
+from math import radians, tan
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.options import Options
+from heuristic import meshes
+from heuristic.convention import Scene
+from heuristic.errors import InputError
+from heuristic.lights import PLUGINS
+from heuristic.materials import COEFFICIENTS, PHYSICAL
+from reference.pairing.halves import pair
+from reference.rendering.gbuffer import image_size, pixel_rays
+from reference.scene.source import Source
+
+KINDS = {kind: plugin.removeprefix("heuristic_") for plugin, kind in PLUGINS.items()}
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A shape: positions and normals (V, 3), texture coordinates (V, 2), faces (F, 3).
+
+    ``normals`` is None where faces are flat; ``material`` is a number in ``PlainScene``.
+    """
+
+    name: str
+    positions: np.ndarray
+    normals: np.ndarray | None
+    texcoords: np.ndarray | None
+    faces: np.ndarray
+    material: int
+
+
+@dataclass(frozen=True)
+class PlainScene:
+    """A scene as plain data; the camera, materials and lights are JSON objects.
+
+    ``layers`` are of the surfaces at the pixel centres: ``P`` and ``N`` (H, W, 3), and ``shape``
+    (H, W), the shape's number from 1; 0 is the background.
+    """
+
+    name: str
+    camera: dict
+    shapes: tuple[Triangles, ...]
+    materials: tuple[dict, ...]
+    lights: tuple[dict, ...]
+    ambient: tuple[float, ...]
+    layers: dict[str, np.ndarray]
+
+
+def plain_scene(source: Source, options: Options) -> PlainScene:
+    """Return a scene as plain data, in the current variant, which must be RGB."""
+    if not mi.is_rgb:
+        raise InputError(f"variant {mi.variant()}: scenes are exported in RGB. Give llvm_ad_rgb.")
+    halves = pair(
+        source,
+        options.convention,
+        options.resolution,
+        prune=False,
+        sensor=options.sensor,
+        with_partners=True,
+    )
+    scene = halves.heuristic.instantiate()
+    bsdfs = list(dict.fromkeys(shape.bsdf() for shape in scene.shapes()))
+    point = dr.zeros(mi.SurfaceInteraction3f)
+    return PlainScene(
+        source.name,
+        camera(scene),
+        tuple(
+            triangles_of(shape, bsdfs.index(shape.bsdf()), options.tessellation)
+            for shape in scene.shapes()
+        ),
+        tuple(material_of(bsdf, number, scene) for number, bsdf in enumerate(bsdfs)),
+        tuple(light_of(each, point) for each in scene.emitters() if hasattr(each, "light")),
+        tuple(numbers(mi.Color3f(scene.integrator().ambient.eval(point)))),
+        _layers(scene),
+    )
+
+
+def _layers(scene: Scene) -> dict[str, np.ndarray]:
+    """Trace the rays through the pixel centres."""
+    width, height = image_size(scene)
+    pixels = np.meshgrid(np.arange(width), np.arange(height))
+    si = scene.ray_intersect(pixel_rays(scene, (width, height), *pixels))
+    hit = np.array(si.is_valid()).reshape(height, width)
+    pointers = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
+    numbers_seen = np.zeros((height, width), np.float32)
+    for number, shape in enumerate(scene.shapes(), start=1):
+        own = int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+        numbers_seen[hit & (pointers == own)] = number
+    normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
+    vectors = {
+        name: np.where(hit[..., None], np.array(value).T.reshape(height, width, 3), 0)
+        for name, value in (("P", mi.Vector3f(si.p)), ("N", normal))
+    }
+    return vectors | {"shape": numbers_seen}
+
+
+def camera(scene: mi.Scene) -> dict:
+    """Return the camera as matrices, rows of numbers.
+
+    ``to_world`` is Mitsuba's: the camera looks along +z, +y is up, +x to the left. ``view`` and
+    ``projection`` are OpenGL's: the camera looks along -z, +y is up, +x to the right, and visible
+    points have -1 to 1 in each coordinate of ``projection view p / w``.
+    """
+    sensor = scene.sensors()[0]
+    values = mi.traverse(sensor)
+    if "Perspective" not in sensor.class_name():
+        raise InputError(
+            f"sensor {sensor.id()!r} is a {sensor.class_name()}, but only perspective cameras can"
+            " be exported."
+        )
+    offsets = [numbers(values[f"principal_point_offset_{axis}"])[0] for axis in ("x", "y")]
+    if any(offsets):
+        raise InputError(f"sensor {sensor.id()!r}: its principal point must be in the middle.")
+    width, height = (int(side) for side in sensor.film().crop_size())
+    to_world = np.array(values["to_world"].matrix, float).reshape(4, 4, -1)[..., 0]
+    x_fov = numbers(values["x_fov"])[0]
+    near, far = float(sensor.near_clip()), float(sensor.far_clip())
+    scale = 1 / tan(radians(x_fov) / 2)
+    depth = far - near
+    projection = [
+        [scale, 0.0, 0.0, 0.0],
+        [0.0, scale * width / height, 0.0, 0.0],
+        [0.0, 0.0, -(far + near) / depth, -2 * far * near / depth],
+        [0.0, 0.0, -1.0, 0.0],
+    ]
+    view = np.diag([-1.0, 1.0, -1.0, 1.0]) @ np.linalg.inv(to_world)
+    return {
+        "width": width,
+        "height": height,
+        "x_fov_degrees": x_fov,
+        "near": near,
+        "far": far,
+        "to_world": to_world.tolist(),
+        "view": view.tolist(),
+        "projection": projection,
+    }
+
+
+def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Triangles:
+    """Return a shape as the triangles of :func:`heuristic.meshes.to_mesh`."""
+    mesh = meshes.to_mesh(shape, tessellation or meshes.RESOLUTION)
+    parts = (meshes.POSITIONS, meshes.NORMALS, meshes.TEXCOORDS, meshes.FACES)
+    positions, normals, texcoords, faces = (meshes.rows(mesh, part) for part in parts)
+    assert positions is not None
+    assert faces is not None
+    normals = None if mesh.has_face_normals() else normals
+    return Triangles(shape.id(), positions, normals, texcoords, faces, material)
+
+
+def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
+    """Return a material; a texture gives the value in its middle."""
+    point = dr.zeros(mi.SurfaceInteraction3f)
+    point.uv = mi.Point2f(0.5)
+    material = bsdf.material(point, True, False, None, True)
+    textures = {name: getattr(bsdf, name) for name in (*COEFFICIENTS, "n", "base_color")}
+    colours = {name: getattr(material, name) for name in (*COEFFICIENTS, "base_color")}
+    return {
+        "name": bsdf.id() or f"material {number + 1}",
+        **{name: numbers(mi.Color3f(colour)) for name, colour in colours.items()},
+        **{name: numbers(getattr(material, name))[0] for name in ("n", *PHYSICAL[1:])},
+        "form": material.form,
+        "normalised": material.normalised,
+        "twosided": bool(bsdf.twosided),
+        "varies": [
+            name
+            for name, value in (textures | bsdf.partner).items()
+            if isinstance(value, mi.Texture) and value.is_spatially_varying()
+        ],
+        "shapes": [shape.id() for shape in scene.shapes() if shape.bsdf() == bsdf],
+    }
+
+
+def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
+    """Return a light as paired; ``intensity`` is I_p, and ``attenuation`` k0, k1, k2 of 6.1."""
+    light = emitter.light(point, True)
+    numbered: dict[str, Any] = {"name": emitter.id(), "type": KINDS[type(light)]}
+    for field in fields(light):
+        value = getattr(light, field.name)
+        if isinstance(value, tuple):
+            numbered[field.name] = [numbers(each)[0] for each in value]
+        elif field.name == "clamped":
+            numbered[field.name] = bool(value)
+        else:
+            several = numbers(mi.Color3f(value) if field.name == "intensity" else value)
+            numbered[field.name] = several if len(several) > 1 else several[0]
+    return numbered
+
+
+def numbers(value: object) -> list[float]:
+    """Return a Dr.Jit value of one entry as numbers, in the decimals of single precision."""
+    return [float(str(np.float32(each))) for each in np.ravel(np.array(value))]

@@ -1,0 +1,193 @@
+"""A scene made ready to be rendered: paired, planned, probed, with a renderer for each half."""
+
+from __future__ import annotations
+
+import gc
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from comparisons.options import Options
+from heuristic.convention import Scene
+from heuristic.errors import InputError
+from reference.pairing.halves import Pair
+from reference.planning.guard import examine_plan
+from reference.planning.plan import Guard, Plan, physical_integrator, plan, sampler
+from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
+from reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
+from reference.rendering.sampler import with_sampler
+from reference.scene.source import Source
+
+WAVEFRONT = 2**24
+"""Most samples of one pass, unless the image has more pixels: then one sample per pixel."""
+
+LIMIT_SPP = 4096
+"""Samples per pixel at which a run with a noise target stops, unless another limit is given."""
+
+BLACK = 1e-5
+"""Display-linear: an image with no brighter pixel is black, and no difference can be seen in it."""
+
+UNIFORM = 1e-6
+"""Relative differences within a picture that are rounding."""
+
+
+def schedule(
+    plan: Plan, pixels: int, spp: int | None = None, noise: float | None = None
+) -> tuple[int, int]:
+    """Return samples per pixel and pass, and the number of passes, which is even and at least 2.
+
+    The plan's are the defaults. ``spp`` are the samples per pixel over all passes; with a noise
+    target, their limit.
+    """
+    largest = max(1, WAVEFRONT // pixels)
+    if noise is not None:
+        each = min(max(1, plan.spp // plan.passes), largest)
+        each = max(1, min(each, (spp or LIMIT_SPP) // 2))
+        return each, max(2, (spp or LIMIT_SPP) // each // 2 * 2)
+    spp = spp or plan.spp
+    passes = max(2, min(plan.passes, spp // 4 // 2 * 2))
+    each = max(1, spp // passes)
+    if each > largest:
+        each, passes = largest, max(2, -(-spp // largest // 2) * 2)
+    return each, passes
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half."""
+
+    pair: Pair
+    plan: Plan
+    scene: Scene
+    heuristic: Renderer
+    reference: Renderer
+    passes: int
+    planning_seconds: float
+    guard: Guard | None = None
+
+    @property
+    def surface(self) -> GBuffer:
+        """What each pixel sees. It is traced each time: cached, it would take much memory."""
+        found = gbuffer(self.scene, *image_size(self.scene))
+        dr.flush_malloc_cache()
+        return found
+
+    @cached_property
+    def counted(self) -> np.ndarray:
+        """The pixels (H, W) that count: those that see a surface."""
+        return self.surface.hit
+
+
+def prepare(source: Source, options: Options | None = None) -> Prepared:
+    """Pair and plan a scene in the current variant, and make both halves ready to render."""
+    options = options or Options()
+    if options.image:
+        from comparisons.pictures import picture_files
+
+        options = picture_files.at_size_of_pictures(source, options)
+    pair = options.pair(source)
+    physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
+    width, height = image_size(physical)
+    if width * height > LARGEST_PASS:
+        raise InputError(
+            f"{source.name}: an image of {width}x{height} pixels is too large: at most"
+            f" {LARGEST_PASS} pixels are allowed. Give a smaller --resolution."
+        )
+    require_memory(source.name, width, height)
+    begin = perf_counter()
+    chosen = plan(pair, physical, options.polygon_shading, options.everything)
+    integrator = physical_integrator(chosen, physical, pair.hide_emitters)
+    planning = perf_counter() - begin
+    # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
+    gc.collect()
+    spp, passes = schedule(chosen, width * height, options.spp, options.noise)
+    if len(options.image) > 1:  # a pass for each repeat
+        spp, passes = max(1, spp * passes // len(options.image)), len(options.image)
+    return Prepared(
+        pair=pair,
+        plan=chosen,
+        scene=physical,
+        heuristic=_heuristic_renderer(source, pair, chosen, spp, options),
+        reference=Renderer(physical, integrator, spp, "reference image"),
+        passes=passes,
+        planning_seconds=planning,
+    )
+
+
+def guarded(source: Source, options: Options | None = None) -> Prepared:
+    """Prepare a scene with :func:`prepare`, and probe it before anything relies on its plan.
+
+    If the probe disagrees with the plan, everything is simulated.
+
+    Raises
+    ------
+    InputError
+        See :func:`prepare`; also when no pixel sees a surface, unless the options allow it.
+    """
+    options = options or Options()
+    ready = _probed(source, options)
+    if not options.allow_empty:
+        require_surface(ready.counted, source.name)
+    return ready
+
+
+def _probed(source: Source, options: Options) -> Prepared:
+    ready = prepare(source, options)
+    width, height = image_size(ready.scene)
+    samples = ready.reference.spp * ready.passes * width * height
+    hidden = ready.pair.hide_emitters
+    found = examine_plan(ready.plan, ready.scene, hidden, samples, options.seed)
+    if found.state != "disagreed":
+        return replace(ready, guard=found)
+    whole = prepare(source, options.changed(everything=True))
+    return replace(whole, plan=whole.plan.unpruned("guard", found.words), guard=found)
+
+
+def require_light(
+    test: np.ndarray, reference: np.ndarray, counted: np.ndarray, name: str, options: Options
+) -> str:
+    """Return what makes linear images (H, W, 3) of both halves meaningless, in words; often "".
+
+    Raises
+    ------
+    InputError
+        If both are black, unless the options allow it: they would agree, whatever is wrong.
+    """
+    if not counted.any():
+        return ""
+    seen = [np.abs(image[counted]) for image in (test, reference)]
+    is_black = [float(values.max()) < BLACK for values in seen]
+    if all(is_black) and not options.allow_empty:
+        raise InputError(
+            f"{name}: both halves are black: no pixel that sees a surface is brighter than {BLACK}"
+            " of display white. Check the lights, their intensity, and whether the camera is inside"
+            " a shape. To allow a black picture, give --allow-empty."
+        )
+    if all(is_black):
+        return "Both halves are black, so their difference means nothing."
+    if is_black[1]:
+        return "The reference is black: check whether its lights reach what the camera sees."
+    if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in seen):
+        return "Each half is one colour: the view shows nothing but a uniform surface."
+    return ""
+
+
+def _heuristic_renderer(
+    source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
+) -> Any:
+    """Make the heuristic half ready to render, in its own variant if it has one."""
+    with variant(options.heuristic_variant or mi.variant()):
+        if options.heuristic_variant:
+            pair = options.pair(source)
+        scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
+        made = Renderer(scene, None, spp, "heuristic image")
+        if not options.image:
+            return made
+        from comparisons.pictures import picture_files
+
+        return picture_files.PictureHalf(picture_files.read_all(options), made)

@@ -1,0 +1,163 @@
+"""Indirect light at the points that the camera sees, and colours made of it.
+
+It is reflected by other surfaces, or comes from the unhidden environment. It is gathered in the
+heuristic half, by Mitsuba's ``path`` over the ``phong`` materials and the heuristic's lights, from
+a coarse grid of the points that the camera sees::
+
+    I = E / pi = 1 / N sum_j L(w_j) + 1 / (pi N) sum_j L_env(w'_j) V (n.w'_j) / p(w'_j)
+
+where the directions ``w`` follow the cosine and ``w'`` the environment's light. ``L`` is the light
+reflected towards the point. The seed is fixed, so runs repeat.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic.convention import RADIANCE_PER_IRRADIANCE
+from heuristic.plugins.phong import SceneMaterials
+
+GRID = 32
+"""Points along each side of the image."""
+
+STRATA = 4
+"""Directions along each side of the square that maps to a point's hemisphere."""
+
+RAYS = GRID**2 * STRATA**2
+
+REFLECTIONS = 16
+"""Longest path. Mitsuba ends most paths sooner, by Russian roulette after five."""
+
+KNOTS = 16
+"""Wavelengths of a tabulated spectrum, in steps of 31 nm: a multiple of a ray's number."""
+
+
+@dataclass(frozen=True)
+class GatheredLight:
+    """Light at points that the camera sees, for each of K channels or wavelengths.
+
+    ``normal`` (N, 3), ``arriving`` (N, K): ``E / pi``, the value of a white surface, and ``k_d``
+    (N, K): the weight of each in the image.
+    """
+
+    normal: np.ndarray
+    arriving: np.ndarray
+    k_d: np.ndarray
+
+    def mean(self) -> np.ndarray:
+        """Return the mean (K,) of the arriving light over the image.
+
+        The weight of a point is its ``k_d``: ``k_d`` times the mean then has the same mean over the
+        image as ``k_d`` times the arriving light.
+        """
+        weight = self.k_d.sum(axis=0)
+        total = (self.arriving * self.k_d).sum(axis=0)
+        return np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
+
+
+def gather(scene: Any) -> GatheredLight:
+    """Gather light at the points of the grid, in the current variant."""
+    arriving, weights = [], []
+    for wavelengths in _batches():
+        si, normal, k_d = _seen(scene, wavelengths)
+        light = _arriving(scene, si, normal)
+        dr.eval(light, k_d, normal)
+        arriving.append(_by_point(light))
+        weights.append(_by_point(k_d))
+    normals = np.array(normal, float).T[:: STRATA**2]
+    return GatheredLight(normals, np.hstack(arriving), np.hstack(weights))
+
+
+class Table:
+    """A colour at all wavelengths: RGB, or one value at each of :data:`KNOTS` wavelengths."""
+
+    DRJIT_STRUCT: ClassVar = {"values": object}  # what dr.freeze must know of
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values = mi.Float(np.asarray(values, float))
+        dr.eval(self.values)  # as a literal it would compile a kernel for every scene
+
+    def at(self, wavelengths: Any) -> Any:
+        """Return the colour at the wavelengths of rays, linear between those tabulated."""
+        if not mi.is_spectral:
+            numbers = range(dr.size_v(mi.Spectrum))
+            return mi.Spectrum([dr.gather(mi.Float, self.values, n) for n in numbers])
+        step = (mi.MI_CIE_MAX - mi.MI_CIE_MIN) / (KNOTS - 1)
+        place = dr.clip((wavelengths - mi.MI_CIE_MIN) / step, 0, KNOTS - 1)
+        below = dr.minimum(mi.UInt32(0) + dr.uint32_array_t(type(place))(place), KNOTS - 2)
+        share = place - type(place)(below)
+        low, high = (
+            mi.Spectrum([dr.gather(mi.Float, self.values, n + more) for n in below])
+            for more in (0, 1)
+        )
+        return dr.lerp(low, high, share)
+
+
+def _batches() -> list[Any]:
+    """Return the wavelengths (nm) to gather light at, a batch per ray; [[]] for RGB and mono."""
+    if not mi.is_spectral:
+        return [[]]
+    size = dr.size_v(mi.Spectrum)
+    knots = np.linspace(mi.MI_CIE_MIN, mi.MI_CIE_MAX, KNOTS).reshape(-1, size)
+    return [mi.Spectrum(*map(float, batch)) for batch in knots]
+
+
+def _by_point(value: Any) -> np.ndarray:
+    """Return the means of the directions of each point, (N, channels)."""
+    value = mi.Spectrum(value) + dr.zeros(mi.Spectrum, RAYS)
+    rows = np.array(value, float).reshape(-1, RAYS).T
+    return rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1)
+
+
+def _seen(scene: Any, wavelengths: Any) -> tuple[Any, Any, Any]:
+    """Return the interactions of the grid's rays, the normals of the sides seen, and their k_d.
+
+    Each point is repeated for its directions; where nothing is seen ``k_d`` is 0.
+    """
+    cells = (np.arange(GRID) + 0.5) / GRID
+    x, y = (np.repeat(side.ravel(), STRATA**2) for side in np.meshgrid(cells, cells))
+    place = mi.Point2f(mi.Float(x), mi.Float(y))
+    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
+    if mi.is_spectral:
+        ray.wavelengths = mi.Spectrum(wavelengths)
+    si = scene.ray_intersect(ray)
+    active = si.is_valid()
+    materials = SceneMaterials(scene)
+    active &= materials.twosided(si, active) | (si.wi.z > 0)
+    normal = materials.normal(si, active)
+    normal = dr.select(si.wi.z < 0, -normal, normal)
+    k_d = mi.Spectrum(0)
+    for material, is_here in materials.at(si, active):
+        k_d += dr.select(active & is_here, mi.Spectrum(material.k_d), 0)
+    return si, normal, k_d
+
+
+def _arriving(scene: Any, si: Any, normal: Any) -> Any:
+    """Return one sample of ``E / pi`` for each direction of each point."""
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, RAYS)
+    active = si.is_valid()
+    cell = dr.arange(mi.UInt32, RAYS) % STRATA**2
+    corner = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
+    toward = mi.warp.square_to_cosine_hemisphere((corner + sampler.next_2d()) / STRATA)
+    ray = si.spawn_ray(mi.Frame3f(normal).to_world(toward))
+    # The visible environment is added below: rays would hit a sun too seldom.
+    paths = mi.load_dict({"type": "path", "max_depth": REFLECTIONS + 1, "hide_emitters": True})
+    reflected, _, _ = paths.sample(scene, sampler, ray, active=active)
+    around = _from_environment(scene, si, normal, (corner + sampler.next_2d()) / STRATA)
+    return dr.select(active, reflected, 0) + around
+
+
+def _from_environment(scene: Any, si: Any, normal: Any, place: Any) -> Any:
+    environment = scene.environment()
+    if environment is None:
+        return mi.Spectrum(0)
+    active = si.is_valid()
+    sample, light = environment.sample_direction(si, place, active)
+    cosine = dr.maximum(dr.dot(normal, sample.d), 0)
+    active &= (sample.pdf > 0) & (cosine > 0)
+    active &= ~scene.ray_test(si.spawn_ray_to(sample.p), active)
+    return dr.select(active, light * cosine * RADIANCE_PER_IRRADIANCE, 0)

@@ -1,0 +1,206 @@
+"""Find LLVM, with which Dr.Jit compiles every kernel, and check it before use.
+
+Dr.Jit reads ``DRJIT_LIBLLVM_PATH`` once, when first imported, and searches the system if the
+variable is not set. So `configure` runs before that import and points the variable at the installed
+LLVM wheel. `check` examines the library before anything is compiled: with LLVM 15 and 16 the first
+kernel aborts the whole process.
+"""
+
+import ctypes
+import importlib.metadata
+import os
+import sys
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+from heuristic.errors import InstallationError
+
+VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
+"""The supported variants of Mitsuba."""
+
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+WHEEL = "karellen-llvm-core"
+ATOMIC = "libatomic.so.1"
+OLDEST_USABLE = 17
+
+FEWEST_THREADS = 2
+"""Threads of Dr.Jit in a process: with only one, Mitsuba waits forever when it reads or writes
+images, for another thread to do its task."""
+
+_HOW_TO_GET_IT = f"""\
+Needed: LLVM {OLDEST_USABLE} or newer (15 and 16 abort at the first kernel; Dr.Jit rejects \
+older ones).
+How to get it:
+  On Linux x86-64:  pip install {WHEEL}
+  On Debian 13, Ubuntu 24.04 or newer:  apt-get install libllvm19
+  On macOS:  brew install llvm
+  Any other:  {VARIABLE}=/path/to/libLLVM.so (.dylib on macOS, .dll on Windows)
+  ./run installs the first of these by itself."""
+
+_TOO_EARLY = (
+    f"Dr.Jit was imported before fotismos, so the LLVM of the {WHEEL} wheel is not used: "
+    f"import heuristic first, or set {VARIABLE} before Python starts."
+)
+
+_imported_too_early = False
+
+
+@dataclass(frozen=True)
+class LLVM:
+    """The LLVM that Dr.Jit uses.
+
+    ``version`` is such as ``(22, 1, 8)``, None if Dr.Jit found none; ``path`` is None if unknown.
+    ``source`` is its origin: the user's variable, ``wheel``, or ``system``, Dr.Jit's own search.
+    ``note`` is what a person should know about it; it may be empty.
+    """
+
+    version: tuple[int, int, int] | None
+    path: Path | None
+    source: str
+    note: str = ""
+
+
+def configure() -> None:
+    """Point Dr.Jit at the LLVM wheel, unless the user chose another or none is installed.
+
+    Call it before anything imports Dr.Jit or Mitsuba. If Dr.Jit is already imported it is too late;
+    it warns if that leaves no usable LLVM.
+    """
+    global _imported_too_early
+    library = None if os.environ.get(VARIABLE) else find_wheel()
+    if library is None:
+        return
+    if "drjit" not in sys.modules:
+        os.environ[VARIABLE] = str(library)
+        return
+    # Setting the variable now would change nothing, and the report would be wrong.
+    _imported_too_early = True
+    if not _is_usable(_version()):
+        warnings.warn(f"The first kernel will fail. {_TOO_EARLY}", RuntimeWarning, stacklevel=2)
+
+
+def find_wheel() -> Path | None:
+    """Find the libLLVM of the installed LLVM wheel; None if there is none.
+
+    It is the library with the shortest name: libLLVM.so before libLLVM.so.22.1. The link without a
+    version is made after the installation, and may not be there.
+    """
+    try:
+        wheel = importlib.metadata.distribution(WHEEL)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    listed = wheel.files
+    if listed is None:  # an installer may keep no list
+        paths = list(Path(sys.prefix, "lib").glob("*"))
+    else:
+        paths = [Path(str(file.locate())) for file in listed]
+    libraries = [
+        path
+        for path in paths
+        if path.name.startswith("libLLVM")
+        and any(suffix in path.name for suffix in (".so", ".dylib", ".dll"))
+        and path.is_file()
+    ]
+    best = min(libraries, key=lambda path: (len(path.name), path.name), default=None)
+    return best and best.parent.resolve() / best.name
+
+
+def require_libraries() -> None:
+    """Raise `InstallationError` if Dr.Jit cannot be loaded for want of a system library.
+
+    Its own handler of that error fails with a NameError, wherever it is imported first.
+    """
+    if sys.platform == "linux":
+        try:
+            ctypes.CDLL(ATOMIC)
+        except OSError as error:
+            raise _not_imported(error) from error
+
+
+def check() -> LLVM:
+    """Return the LLVM that Dr.Jit uses; raise `InstallationError` unless it works."""
+    llvm = inspect()
+    if _is_usable(llvm.version):
+        return llvm
+    lines = [
+        "Dr.Jit cannot find an LLVM to compile kernels with.",
+        f"Found: {_description(llvm)}.",
+        _HOW_TO_GET_IT,
+    ]
+    if llvm.source == VARIABLE:
+        lines.append(f"Or unset {VARIABLE}, and fotismos searches by itself.")
+    raise InstallationError("\n".join([*lines, llvm.note]).rstrip())
+
+
+def inspect() -> LLVM:
+    """Return the LLVM that Dr.Jit uses, usable or not."""
+    value = os.environ.get(VARIABLE)
+    path = Path(value) if value else None
+    # A child process inherits what `configure` set.
+    source = "system" if path is None else "wheel" if path == find_wheel() else VARIABLE
+    # Dr.Jit would print its own lines about a path that does not exist.
+    version = None if _is_missing(path) else _version()
+    note = _TOO_EARLY if _imported_too_early else ""
+    return LLVM(version, path or (_loaded_library() if version else None), source, note)
+
+
+def use_threads(count: int | None = None) -> None:
+    """Set the number of Dr.Jit's threads, at least :data:`FEWEST_THREADS`.
+
+    If omitted, Dr.Jit keeps its own number, which is too few on a machine with one core.
+    """
+    import drjit as dr  # after `configure`
+
+    enough = max(count or dr.thread_count(), FEWEST_THREADS)
+    if dr.thread_count() != enough:
+        dr.set_thread_count(enough)
+
+
+def _is_missing(path: Path | None) -> bool:
+    """Return whether a path is no file; a bare name is searched for by the system."""
+    return path is not None and len(path.parts) > 1 and not path.is_file()
+
+
+def _is_usable(version: tuple[int, int, int] | None) -> bool:
+    return version is not None and version[0] >= OLDEST_USABLE
+
+
+def _version() -> tuple[int, int, int] | None:
+    try:
+        import drjit  # after `configure`
+    except ImportError as error:
+        raise _not_imported(error) from error
+    major, minor, patch = drjit.detail.llvm_version()
+    # Dr.Jit returns -1 for no library, one that it cannot load, and one older than 15.
+    return None if major < 0 else (major, minor, patch)
+
+
+def _not_imported(error: Exception) -> InstallationError:
+    return InstallationError(
+        f"Dr.Jit cannot be imported: {error}.\n"
+        f"Needed: the packages of requirements.txt and, on Linux, {ATOMIC}.\n"
+        "How to get them: ./run installs the packages; "
+        "apt-get install libatomic1 (Debian, Ubuntu) or dnf install libatomic (Fedora)."
+    )
+
+
+def _loaded_library() -> Path | None:
+    """Find the libLLVM in this process's memory map (Linux only)."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return None
+    paths = (Path(line.split(maxsplit=5)[-1]) for line in lines if "libLLVM" in line)
+    return next(paths, None)
+
+
+def _description(llvm: LLVM) -> str:
+    path = f"{VARIABLE}={llvm.path}" if llvm.source == VARIABLE else llvm.path
+    if llvm.version is not None:
+        return f"LLVM {'.'.join(map(str, llvm.version))}" + (f" ({path})" if llvm.path else "")
+    if llvm.path is None:
+        return "none that Dr.Jit accepts"
+    if _is_missing(llvm.path):
+        return f"{path}, which is not a file"
+    return f"{path}, which is not an LLVM library, or one older than 15"

@@ -1,0 +1,250 @@
+"""Textures that compute a coefficient from other textures, point by point.
+
+=======================  ==================================  =======================================
+Plugin                   Operands                            Value
+=======================  ==================================  =======================================
+``heuristic_product``    ``a``, ``b``                        ``a b``
+``heuristic_share``      ``a``, scalar ``weight``            ``a weight``
+``heuristic_rest``       ``a``, scalar ``weight``            ``a (1 - weight)``
+``heuristic_sum``        ``a``, ``b``                        ``a + b``
+``heuristic_blend``      ``a``, ``b``, scalar ``weight``     ``a (1 - weight) + b weight``
+``heuristic_sides``      ``front``, ``back``                 the value of the side that is seen
+``heuristic_exponent``   scalar ``alpha``                    ``(1 / alpha^2 - 1) / 2``, 0 or more
+``heuristic_interior``   ``rho``; numbers ``scale``,         ``scale rho / (1 - rho return)``
+                         ``return``
+=======================  ==================================  =======================================
+
+Operands are numbers, colours or textures. Scalars are read as Mitsuba reads an ``alpha`` or an
+opacity (``eval_1``), weights clipped to [0, 1], the others in the requested form.
+
+Also here is ``heuristic_tilt``: the shading normal from a bump or normal map.
+
+==================  ==================  ============================================================
+Parameter           Type                Meaning
+==================  ==================  ============================================================
+``normals``         texture             a normal map: the local normal, 0..1 for -1..1
+``heights``         texture             a bump map: displacement along the normal
+``scale``           float (1)           factor on the heights
+``flip``            boolean (true)      turn a normal that a map turns away from the viewer to the
+                                        viewer's side
+==================  ==================  ============================================================
+
+One of ``normals`` and ``heights`` is given. ``eval_3`` is the unit normal in the shading frame, as
+Mitsuba's ``normalmap`` and ``bumpmap`` define it (Blinn 1978): for heights ``h`` the normal of the
+displaced surface is ``(dp/du + dh/du n) x (dp/dv + dh/dv n)``.
+"""
+
+from numbers import Real
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic import colours
+from heuristic.errors import InputError
+
+SMALLEST_ALPHA = 1e-4
+"""Mitsuba replaces every smaller roughness by this one."""
+
+SCALARS = ("weight", "alpha")
+NUMBERS = ("scale", "return")
+LARGEST = 1e9
+
+
+def _exponent(si, alpha):
+    alpha = dr.maximum(alpha, SMALLEST_ALPHA)
+    return dr.maximum((1 / dr.square(alpha) - 1) / 2, 0)
+
+
+OPERATIONS = {
+    "heuristic_product": (("a", "b"), lambda si, a, b: a * b),
+    "heuristic_share": (("a", "weight"), lambda si, a, weight: a * dr.clip(weight, 0, 1)),
+    "heuristic_rest": (("a", "weight"), lambda si, a, weight: a * (1 - dr.clip(weight, 0, 1))),
+    "heuristic_sum": (("a", "b"), lambda si, a, b: a + b),
+    "heuristic_blend": (
+        ("a", "b", "weight"),
+        lambda si, a, b, weight: dr.lerp(a, b, dr.clip(weight, 0, 1)),
+    ),
+    "heuristic_sides": (
+        ("front", "back"),
+        lambda si, front, back: dr.select(si.wi.z > 0, front, back),
+    ),
+    "heuristic_exponent": (("alpha",), _exponent),
+    "heuristic_interior": (
+        ("rho", "scale", "return"),
+        lambda si, rho, scale, returned: scale * rho / (1 - returned * rho),
+    ),
+}
+"""The operands of each plugin, and its value of theirs."""
+
+KINDS = tuple(OPERATIONS)
+
+
+def define() -> None:
+    """Create the classes for the current variant and register them."""
+    _define_tilt()
+
+    class Computed(mi.Texture):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            names, self.operation = OPERATIONS[props.plugin_name()]
+            self.operands = {name: _operand(props, name) for name in names}
+
+        def eval(self, si, active=True):
+            return mi.Spectrum(self._value("eval", si, active))
+
+        def eval_1(self, si, active=True):
+            return mi.Float(self._value("eval_1", si, active))
+
+        def eval_3(self, si, active=True):
+            return mi.Color3f(self._value("eval_3", si, active))
+
+        def is_spatially_varying(self):
+            return True
+
+        def mean(self):
+            return mi.Float(0.5)
+
+        def max(self):
+            return LARGEST
+
+        def traverse(self, callback):
+            for name, operand in self.operands.items():
+                if isinstance(operand, mi.Texture):
+                    callback.put(name, operand, mi.ParamFlags.Differentiable)
+
+        def to_string(self):
+            return f"{type(self).__name__}[{', '.join(map(str, self.operands))}]"
+
+        def _value(self, method, si, active):
+            values = [
+                getattr(operand, "eval_1" if name in SCALARS else method)(si, active)
+                if isinstance(operand, mi.Texture)
+                else operand
+                for name, operand in self.operands.items()
+            ]
+            return self.operation(si, *values)
+
+    for name in OPERATIONS:
+        mi.register_texture(name, Computed)
+
+
+def _operand(props, name):
+    """Read an operand; plain numbers and colours may be larger than a reflectance."""
+    value = props[name]
+    if name in NUMBERS:
+        return value
+    is_colour = isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d)
+    components = tuple(value) if is_colour else (value,)
+    if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
+        return props.get_unbounded_texture(name)
+    return props.get_texture(name)
+
+
+def _define_tilt():
+    """Create the class of ``heuristic_tilt`` for the current variant and register it."""
+
+    class Tilt(mi.Texture):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.normals = props.get_texture("normals") if "normals" in props else None
+            self.heights = props.get_texture("heights") if "heights" in props else None
+            self.scale = props.get("scale", 1.0)
+            self.flip = props.get("flip", True)
+
+        def eval_3(self, si, active=True):
+            normal = self._mapped(si, active) if self.normals else self._displaced(si, active)
+            if self.flip:
+                normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, _mirrored(normal))
+            return mi.Color3f(normal)
+
+        def is_spatially_varying(self):
+            return True
+
+        def traverse(self, callback):
+            for name in ("normals", "heights"):
+                if getattr(self, name):
+                    callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+        def to_string(self):
+            return f"Tilt[normals = {self.normals}, heights = {self.heights}]"
+
+        def _mapped(self, si, active):
+            return dr.normalize(mi.Vector3f(self.normals.eval_3(si, active)) * 2 - 1)
+
+        def _displaced(self, si, active):
+            slope = self.scale * self.heights.eval_1_grad(si, active)
+            n = mi.Vector3f(si.sh_frame.n)
+            across = [
+                dp + n * (rise - dr.dot(n, dp))
+                for dp, rise in ((si.dp_du, slope.x), (si.dp_dv, slope.y))
+            ]
+            normal = dr.normalize(dr.cross(*across))
+            normal = dr.mulsign(normal, dr.dot(si.n, normal))
+            return si.to_local(normal)
+
+    mi.register_texture("heuristic_tilt", Tilt)
+
+
+def _mirrored(normal):
+    return mi.Vector3f(-normal.x, -normal.y, normal.z)
+
+
+def coefficient(props: Any, name: str) -> Any:
+    """Read a reflection coefficient, 0 if omitted.
+
+    Up to 1 it is an ordinary reflectance of Mitsuba, with the same spectrum for the same RGB; above
+    1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
+    """
+    value = _plain(props, name, 0.0)
+    if value is not None and max(value) > 1:
+        return props.get_unbounded_texture(name)
+    return props.get_texture(name, 0.0)
+
+
+def emitted(props: Any, name: str, default: Any) -> Any:
+    """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
+
+    Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum of zero.
+    """
+    value = _plain(props, name, default)
+    if value is not None and max(value) == 0:
+        return props.get_unbounded_texture(name, 0.0)
+    return props.get_emissive_texture(name, default)
+
+
+def _plain(props, name, default):
+    """Return a number's or colour's components, None for textures and tabulated spectra."""
+    value = props.get(name, default)
+    if not isinstance(value, Real | mi.ScalarColor3f | mi.ScalarColor3d):
+        return None
+    components = (float(value),) if isinstance(value, Real) else tuple(map(float, value))
+    colours.checked(f"{props.plugin_name()}: {name}", components)
+    return components
+
+
+def may_be_nonzero(texture: Any) -> bool:
+    """Return whether a texture can be non-zero anywhere; True if unknown."""
+    if texture.is_spatially_varying():
+        return True
+    try:
+        return dr.max(texture.max()) > 0
+    except RuntimeError:
+        return True
+
+
+def require_positive(name: str, texture: Any) -> None:
+    """Raise InputError if a texture that is one colour has a component below 0 or NaN."""
+    if texture.is_spatially_varying():
+        return
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wavelengths = mi.Spectrum(550.0) if mi.is_spectral else si.wavelengths
+    components = np.ravel(dr.detach(texture.eval(si)))
+    if not np.all(components >= 0):
+        shown = ", ".join(f"{component:g}" for component in components)
+        raise InputError(f"{name} = {shown} is not allowed: give finite values of 0 or more.")

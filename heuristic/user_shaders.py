@@ -1,0 +1,286 @@
+"""Heuristics made of plain functions, in files or programs: parameters, needs, and a trial.
+
+A file is named as ``FILE.py`` or ``FILE.py:function``; the function is ``shade`` unless another is
+named, or a :class:`heuristic.heuristics.Heuristic`. Every process finds the same heuristic by the
+same words, and reads a changed file again::
+
+    import drjit as dr
+    from heuristic import Range
+
+    def shade(point, steps: Range(1, 8) = 3):
+        value = point.ambient * point.material.k_a
+        for light in point.lights:
+            cosine = dr.maximum(dr.dot(point.normal, light.toward), 0)
+            value += point.material.k_d * light.intensity * dr.ceil(cosine * steps) / steps
+        return value
+
+The trial shades :data:`POINTS` points under two lights, seen from many sides. It finds code that
+fails or gives infinite or negative values in most scenes, and what the code reads.
+"""
+
+import inspect
+import runpy
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import wraps
+from math import inf, isfinite
+from numbers import Real
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, get_args
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.random import default_rng
+
+from heuristic.errors import InputError, suggestion
+from heuristic.heuristics import Heuristic, Parameter, Range, content_digest, in_file
+from heuristic.lights import DirectionalLight, PointLight
+from heuristic.materials import PairedMaterial
+from heuristic.points import INPUTS, Point, ShadingArguments
+from heuristic.user_code import contained, error_text, place_of, shaded
+
+FUNCTION = "shade"
+"""Name of the function, if omitted."""
+
+MODULE = "_shading_of_a_user"
+"""Module of a file's functions: a name that does not hide another."""
+
+POINTS = 256
+"""Points of a trial: normals towards the viewer, lights on both sides, all kinds of materials."""
+
+DEFAULT_VARIANT = "llvm_ad_rgb"
+
+ROUNDING = 1e-5
+"""A value below 0 by less than this, in units of display white, is a rounding error."""
+
+_known: dict[tuple[str, Path, str | None], Heuristic] = {}
+
+
+def from_file(word: str) -> Heuristic:
+    """Return the heuristic that a word names, for the current variant of Mitsuba."""
+    name, function = in_file(word) or (word, "")
+    path, function = Path(name), function or FUNCTION
+    key = word, path.resolve(), mi.variant()
+    known = _known.get(key)
+    if known is None or known.code != content_digest(known.files):
+        _known[key] = known = _read(word, path, function)
+    return known
+
+
+def _read(word: str, path: Path, function: str) -> Heuristic:
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such file. Give a Python file with a function `{FUNCTION}(point)`"
+            " that returns a colour, as FILE.py, or FILE.py:FUNCTION for another name."
+        )
+    with contained(path) as modules:
+        try:
+            names = runpy.run_path(str(path.resolve()), run_name=MODULE)
+        except (Exception, SystemExit) as error:  # a user's code may raise anything
+            raise InputError(
+                f"{error_text(error)}. Correct {path}, which is to define a heuristic."
+            ) from error
+        if function not in names:
+            raise _missing(names, function, path)
+        label = path.stem if function == FUNCTION else function
+        heuristic = of_function(names[function], word, label)
+    files = tuple(sorted({path.resolve(), *modules}))
+    return replace(heuristic, files=files, code=content_digest(files))
+
+
+def _missing(names: dict[str, Any], function: str, path: Path) -> InputError:
+    own = [
+        name
+        for name, value in names.items()
+        if getattr(value, "__module__", None) == MODULE and callable(value)
+    ]
+    has = f"It has {', '.join(own)}: give {path}:{own[0]}." if own else "It has none."
+    return InputError(
+        f"{path}: there is no function `{function}`{suggestion(function, own)}. {has}"
+        f" A heuristic is a function `{FUNCTION}(point)` that returns a colour."
+    )
+
+
+def of_function(function: Any, name: str, label: str = "") -> Heuristic:
+    """Return a user's function or object as a heuristic, after a trial.
+
+    The function takes a :class:`heuristic.points.Point`, and numbers with a default: these are the
+    parameters, and a :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps
+    its own label.
+    """
+    if isinstance(function, Heuristic):
+        own = replace(function, name=name)
+        return own if own.prepare else replace(own, reads=examine(own))
+    if not callable(function):
+        raise InputError(
+            f"{name} is of type {type(function).__name__}: give a function of a point that returns"
+            " a colour, or a heuristic.Heuristic."
+        )
+    parameters = _parameters(function)
+    names = [parameter.name for parameter in parameters]
+
+    @wraps(function)
+    def shade(point: Point) -> Any:
+        return function(point, **{each: getattr(point.parameters, each) for each in names})
+
+    everything = Heuristic(name, shade, label, frozenset(INPUTS), parameters)
+    read = examine(everything)
+    needs = {part.partition(".")[0] for part in read} & set(INPUTS)
+    return replace(everything, needs=frozenset(needs), reads=read)
+
+
+def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
+    """Return the parameters of a function: its arguments besides the point."""
+    try:
+        signature = inspect.signature(function, eval_str=True)
+    except (TypeError, ValueError, NameError) as error:
+        raise InputError(f"{place_of(function)}: its signature cannot be read: {error}.") from error
+    arguments = list(signature.parameters.values())
+    positional = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    if not arguments or arguments[0].kind not in positional:
+        raise _unusable(function, "it does not take a point")
+    return tuple(_parameter(function, one) for one in arguments[1:])
+
+
+def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Parameter:
+    if one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD, one.POSITIONAL_ONLY):
+        raise _unusable(function, f"{one} is not a number")
+    is_number = isinstance(one.default, Real) and not isinstance(one.default, bool)
+    if not (is_number and isfinite(one.default)):
+        raise _unusable(function, f"{one.name!r} has no number as its default")
+    parts = one.annotation, *get_args(one.annotation)
+    bounds = next((part for part in parts if isinstance(part, Range)), Range(-inf, inf))
+    try:
+        return Parameter(one.name, float(one.default), bounds.low, bounds.high)
+    except InputError as error:
+        raise InputError(f"{place_of(function)}: {error}") from error
+
+
+def _unusable(function: Callable[..., Any], reason: str) -> InputError:
+    return InputError(
+        f"{place_of(function)}: {reason}. Write a function such as `{function.__name__}(point,"
+        " gloss: Range(0, 1) = 0.5)`: it takes the points, and numbers with a default."
+    )
+
+
+def examine(heuristic: Heuristic) -> tuple[str, ...]:
+    """Try a heuristic, and return what it reads.
+
+    Inputs have the names of :data:`heuristic.points.INPUTS`; the parts of the material are named
+    too, such as ``material.k_d``. InputError if it fails, or returns something that is not a
+    colour, not finite or negative.
+    """
+    if mi.variant() is None:
+        mi.set_variant(DEFAULT_VARIANT)
+    point = trial_points(heuristic)
+    value = shaded(heuristic.name, heuristic.shade, point)
+    colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
+    colours = np.broadcast_to(colours, (len(colours), POINTS))
+    _require(heuristic, point, np.isfinite(colours), colours, "finite")
+    _require(heuristic, point, colours >= -ROUNDING, colours, "0 or more")
+    return tuple(sorted(point.prepared))
+
+
+@dataclass(frozen=True)  # hashable, like what it imitates
+class _WatchedMaterial:
+    """A material that notes which of its attributes are read."""
+
+    _inner: Any
+    _note: Callable[[str], Any]
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._inner, name)
+        self._note(f"material.{name}")
+        return value
+
+
+class _TrialPoint(Point):
+    """Points that note in ``prepared`` which of their inputs are read."""
+
+    def require(self, name: str) -> None:
+        super().require(name)
+        self.prepared[name] = None
+
+    @property
+    def material(self) -> Any:
+        return _WatchedMaterial(Point.material.func(self), self.prepared.setdefault)
+
+
+_TrialPoint.__name__ = "Point"  # for users' AttributeErrors
+
+
+def trial_points(heuristic: Heuristic) -> Point:
+    """Return the points of a trial."""
+    random = default_rng(8)
+
+    def numbers(low: float, high: float) -> Any:
+        return mi.Float(random.uniform(low, high, POINTS))
+
+    def colour(high: float) -> Any:
+        return mi.Spectrum(*(numbers(0, high) for _ in range(dr.size_v(mi.Spectrum))))
+
+    normal, view = random.normal(size=(2, POINTS, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    view *= np.sign(np.sum(normal * view, axis=1))[:, None]
+    view[:8] = normal[:8]  # seen head on
+    position = random.uniform(-1, 1, (POINTS, 3))
+    position[8:16] = -4 * normal[8:16]  # the directional light is along the normal, or against it
+    material = PairedMaterial(
+        **{name: colour(1) for name in ("k_i", "k_a", "k_d", "k_s", "base_color")},
+        n=numbers(1, 100),
+        alpha=numbers(0.05, 1),
+        ior=numbers(1, 2.5),
+        metallic=mi.Float(np.resize([0.0, 0.0, 0.5, 1.0], POINTS)),
+    )
+    intensity = mi.Spectrum(mi.Float(np.full(POINTS, 0.8)))
+    arguments = ShadingArguments(
+        mi.Vector3f(position.T),
+        mi.Vector3f(normal.T),
+        mi.Vector3f(view.T),
+        material,
+        [
+            PointLight((2.0, 1.0, 3.0), intensity, (0, 0, 1)),
+            DirectionalLight((1.0, 2.0, -1.0), intensity),
+        ],
+        colour(0.5),
+        lambda toward, distance: numbers(0, 1) > 0.5,
+    )
+    uv = mi.Point2f(numbers(0, 1), numbers(0, 1))
+    parameters = {each.name: mi.Float(each.default) for each in heuristic.parameters}
+    return _TrialPoint(heuristic.needs, arguments, uv, SimpleNamespace(**parameters), {})
+
+
+def _require(
+    heuristic: Heuristic, point: Point, is_right: np.ndarray, colours: np.ndarray, expected: str
+) -> None:
+    """Reject wrong colours (components, points) on trial, naming one of them."""
+    wrong = np.flatnonzero(~is_right.all(axis=0))
+    if not wrong.size:
+        return
+    shown = ", ".join(f"{component:.3g}" for component in colours[:, wrong[0]])
+    maximum = "max" if heuristic.name.endswith(".glsl") else "drjit.maximum"
+    cure = f"Clamp what can be negative, such as a cosine: {maximum}(cosine, 0)."
+    if expected == "finite":
+        cure = f"Keep divisors, roots and logarithms above 0, as by {maximum}(x, 1e-6)."
+    raise InputError(
+        f"{place_of(heuristic.shade)}: heuristic {heuristic.name} returned ({shown}) on trial, and"
+        f" wrong values at {wrong.size} of {POINTS} points; components"
+        f" must be {expected}. One of the points: {_described(point.arguments, wrong[0])}. {cure}"
+    )
+
+
+def _described(at: ShadingArguments, number: int) -> str:
+    """Return the situation of one point of a trial."""
+    cosines = [
+        f"N.L = {np.array(dr.dot(at.normal, light.illuminate(at.position).toward))[number]:.3g}"
+        for light in at.lights
+    ]
+    material: Any = at.material
+    return (
+        f"N.V = {np.array(dr.dot(at.normal, at.view))[number]:.3g}, {' and '.join(cosines)} for"
+        f" its two lights, alpha = {np.array(material.alpha)[number]:.3g},"
+        f" n = {np.array(material.n)[number]:.3g}"
+    )

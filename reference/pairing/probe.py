@@ -1,0 +1,283 @@
+"""BSDFs and lights measured by their own sampling, by rank-1 lattices of samples.
+
+BSDFs at normal incidence, their textures averaged:
+
+- albedos of reflection and transmission, as weighted by ``sample`` (light as particles, so a
+  refraction's change of solid angle does not count);
+- the diffuse part ``k_d = pi f``, with the BRDF ``f`` 60 degrees off the normal, outside the lobe;
+- the lobe's width from the median slope of the rest, over half vectors: for Beckmann's lobe
+  ``tan^2`` is distributed exponentially, with the median ``alpha^2 ln 2``. A mean would depend on
+  the tail, where the diffuse part is not quite even.
+
+Lights by means over directions and surfaces. What is returned for a graph is a number, a colour, or
+a reference to a node with a tabulated spectrum.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import cos, log, pi, radians, sin
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic.convention import IRRADIANCE_PER_INTENSITY
+from heuristic.errors import InputError
+from reference.scene import values
+from reference.scene.graph import Graph
+
+SAMPLES, SAMPLES_OF_LIGHTS = 8192, 65_536
+LATTICE = (1, 3547, 1663, 5413, 2689)
+"""Generator of the rank-1 lattice (Korobov): three numbers for the sample, two for the texture."""
+LATTICE_OF_LIGHTS = (1, 19_463)
+
+OFF_LOBE = radians(60.0)
+
+WAVELENGTHS = np.linspace(360.0, 830.0, 48)
+"""Wavelengths at which a spectral variant is probed, nm; Mitsuba's own range."""
+
+MEAN = "I_a is the mean radiance over the sphere"
+
+
+@dataclass(frozen=True)
+class Albedos:
+    """A BSDF's albedos at normal incidence, and the lobe's width ``alpha``.
+
+    The albedos are arrays of one value per channel or wavelength, or values of a graph: of all
+    reflection, its diffuse part and its lobe, of light that passes straight or refracted, and of
+    light scattered through.
+    """
+
+    reflected: Any
+    diffuse: Any
+    specular: Any
+    passed: Any
+    scattered: Any
+    alpha: float
+
+
+def probe(bsdf: mi.BSDF) -> Albedos | None:
+    """Return a BSDF's :class:`Albedos` as arrays; None if it cannot be sampled."""
+    try:
+        parts = [_parts(bsdf, chosen) for chosen in _wavelengths()]
+    except RuntimeError:
+        return None
+    reflected, diffuse, passed, scattered = (
+        np.concatenate(column) for column in zip(*(part[:4] for part in parts), strict=True)
+    )
+    alpha = float(np.mean([part[4] for part in parts]))
+    if not np.isfinite([*reflected, *diffuse, *passed, *scattered, alpha]).all():
+        return None
+    return Albedos(reflected, diffuse, np.maximum(reflected - diffuse, 0), passed, scattered, alpha)
+
+
+def with_values(graph: Graph, index: int, **changes: Any) -> Albedos | None:
+    """Probe a node's BSDF, and return values of the graph; None if it cannot be sampled.
+
+    Changes apply only to parameters that are given: others keep their defaults.
+    """
+    part = graph.part(index)
+    props = part.props(0)
+    for key, value in changes.items():
+        if key in props:
+            props[key] = value
+    found = probe(part.instantiate())
+    names = ("reflected", "diffuse", "specular", "passed", "scattered")
+    return found and replace(
+        found, **{name: as_value(graph, getattr(found, name)) for name in names}
+    )
+
+
+def measured(graph: Graph, index: int, **changes: Any) -> Albedos:
+    """Same as :func:`with_values`; InputError for a BSDF that cannot be sampled."""
+    found = with_values(graph, index, **changes)
+    if found is None:
+        raise InputError(
+            f"{graph.name}: {graph.label(index)}: its albedo is not a number, or Mitsuba cannot"
+            " sample it. Check its parameters."
+        )
+    return found
+
+
+def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> Any:
+    """Return albedos as a value of a graph: a number, a colour, or a tabulated spectrum.
+
+    ``emitted`` values are always tabulated in spectral variants, where a number means daylight.
+    """
+    albedo = np.asarray(albedo, float)
+    tabulated = emitted and mi.is_spectral
+    if not tabulated and np.ptp(albedo) <= 1e-6 * max(albedo.max(), 1e-30):
+        return float(albedo.mean())
+    if not mi.is_spectral:
+        return tuple(albedo.tolist())
+    return values.node(
+        graph,
+        "regular",
+        wavelength_min=float(WAVELENGTHS[0]),
+        wavelength_max=float(WAVELENGTHS[-1]),
+        values=", ".join(f"{value:.6g}" for value in albedo),
+    )
+
+
+@cache
+def lattice(size: int, generator: Sequence[int] = LATTICE) -> np.ndarray:
+    """Return the points of a rank-1 lattice in the unit cube, (len(generator), size)."""
+    return (np.outer(generator, np.arange(size)) / size + 0.5 / size) % 1
+
+
+def _wavelengths():
+    return WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
+
+
+def _at(si, wavelengths):
+    """Return an interaction at four wavelengths; opaque ones compile the same kernel for all."""
+    if wavelengths is not None:
+        si.wavelengths = mi.Spectrum(*map(float, wavelengths))
+        dr.make_opaque(si.wavelengths)
+    return si
+
+
+def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
+    points = [mi.Float(row) for row in lattice(SAMPLES)]
+    si = _at(dr.zeros(mi.SurfaceInteraction3f, SAMPLES), wavelengths)
+    si.t = 1.0
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.uv = mi.Point2f(points[3], points[4])
+    si.wi = mi.Vector3f(0, 0, 1)
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    bs, weight = bsdf.sample(context, si, points[0], mi.Point2f(points[1], points[2]), True)
+    weight = dr.select(dr.isfinite(weight) & (bs.pdf > 0), weight, 0)
+    up = bs.wo.z > 0
+    straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null) | ~mi.has_flag(
+        bs.sampled_type, mi.BSDFFlags.Diffuse
+    )
+    around = mi.Float(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+    sin_phi, cos_phi = dr.sincos(around)
+    beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
+    level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
+    dr.eval(bs, weight, up, straight, level)  # one kernel for all values read below
+    reflected, passed, scattered, diffuse = (
+        np.array([np.mean(np.array(channel, float)) for channel in value])
+        for value in (
+            dr.select(up, weight, 0),
+            dr.select(~up & straight, weight, 0),
+            dr.select(~up & ~straight, weight, 0),
+            level,
+        )
+    )
+    diffuse = np.clip(diffuse, 0, reflected)
+    return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
+
+
+def _width(bs, weight, up, diffuse):
+    """Return the root mean square slope of the lobe without the diffuse part, by its median."""
+    weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
+    cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
+    density = np.array(bs.pdf, float)
+    delta = np.array(mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta))
+    # The diffuse part of each sample's weight, f cos / pdf, is k_d cos / (pi pdf).
+    share = np.where(delta, 0, np.mean(diffuse) * cosine / (np.pi * np.maximum(density, 1e-30)))
+    weights = np.maximum(weights - share, 0)
+    slope = np.where(delta, 0, (1 - cosine) / (1 + cosine))  # tan^2 of half the angle
+    order = np.argsort(slope)
+    reached = np.cumsum(weights[order])
+    median = slope[order][np.searchsorted(reached, reached[-1] / 2)] if reached[-1] > 0 else 0.0
+    return float(np.sqrt(median / log(2)))
+
+
+def mean_radiance(graph: Graph, emitter: mi.Emitter) -> Any:
+    """Return the mean radiance of an environment over the sphere, ``int L dw / (4 pi)``."""
+    means, _ = _arriving(emitter)
+    return as_value(graph, means / (4 * np.pi), emitted=True)
+
+
+def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | None:
+    """Return ``int L dw`` of a distant light as intensity ``I_p``, and its mean direction.
+
+    The direction is the mean direction of travel, weighted by radiance. None if no light arrives.
+    """
+    means, toward = _arriving(emitter)
+    if not means.any():
+        return None
+    return as_value(graph, means / IRRADIANCE_PER_INTENSITY, emitted=True), (-toward).tolist()
+
+
+def beam(
+    graph: Graph, emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float]
+) -> tuple[float, Any] | None:
+    """Return cutoff (degrees) and intensity of the even cone with a light's solid angle and flux.
+
+    Directions are spread evenly over a cone about the axis, first the hemisphere, then the
+    narrowest cone that holds all light found there. None if it sends nothing.
+    """
+    widest = 0.0  # cosine of the cone's half angle
+    for _ in range(4):
+        shines = _intensities(emitter, position, axis, widest).max(axis=0) > 0
+        if not shines.any():
+            return None
+        widest = max(1 - (1 - _cosines(widest)[shines].min()) * 1.05, 0.0)
+    found = _intensities(emitter, position, axis, widest)
+    share = (found.max(axis=0) > 0).mean()
+    cutoff = np.degrees(np.arccos(1 - share * (1 - widest)))
+    return float(cutoff), as_value(graph, found.mean(axis=1) / share, emitted=True)
+
+
+def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
+    """Return the mean radiance of a shape that shines, over its surface, seen head on."""
+    emitter = shape.emitter()
+    x, y = _lattice()
+    sample = shape.sample_position(0.0, mi.Point2f(x, y))
+    si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
+    si.p, si.n, si.uv = sample.p, sample.n, sample.uv
+    si.wi = mi.Vector3f(0, 0, 1)
+    means = [_channel_means(emitter.eval(_at(si, wavelengths))) for wavelengths in _wavelengths()]
+    return as_value(graph, np.concatenate(means), emitted=True)
+
+
+def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``int L dw`` per channel, and the unit mean direction towards the light."""
+    it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
+    x, y = _lattice()
+    means, toward = [], np.zeros(3)
+    for wavelengths in _wavelengths():
+        ds, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(x, y))
+        weight = dr.select(dr.isfinite(weight) & (ds.pdf > 0), weight, 0)
+        means.append(_channel_means(weight))
+        toward += np.array(ds.d, float) @ np.mean(np.array(weight, float), axis=0)
+    return np.concatenate(means), toward / max(float(np.linalg.norm(toward)), 1e-30)
+
+
+def _intensities(
+    emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float], widest: float
+) -> np.ndarray:
+    """Return the intensity in directions spread over a cone, (channels, samples)."""
+    cosine = _cosines(widest)
+    sine = np.sqrt(np.maximum(1 - cosine**2, 0))
+    turn = 2 * np.pi * np.array(_lattice()[1], float)
+    local = mi.Vector3f(*(mi.Float(c) for c in (sine * np.cos(turn), sine * np.sin(turn), cosine)))
+    direction = mi.Frame3f(dr.normalize(mi.Vector3f(*axis))).to_world(local)
+    it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
+    it.p = mi.Point3f(*position) + direction
+    found = []
+    for wavelengths in _wavelengths():
+        ds, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(0.5))
+        weight = dr.select(ds.pdf > 0, weight, 0)
+        found.append(np.array(weight, float).reshape(len(weight), SAMPLES_OF_LIGHTS))
+    return np.concatenate(found)
+
+
+def _cosines(widest: float) -> np.ndarray:
+    return 1 - np.array(_lattice()[0], float) * (1 - widest)
+
+
+def _lattice() -> tuple[mi.Float, ...]:
+    return tuple(mi.Float(row) for row in lattice(SAMPLES_OF_LIGHTS, LATTICE_OF_LIGHTS))
+
+
+def _channel_means(spectrum):
+    """Return the mean of each channel, at least 0: sky models dip slightly below."""
+    return np.array([max(np.mean(np.array(channel, float)), 0.0) for channel in spectrum])

@@ -1,0 +1,170 @@
+"""Records: frozen types that define JSON files and their published schemas.
+
+A record is a :class:`Record` whose fields are the keys of a JSON object. The meaning of a field is
+in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, or in the section
+*Attributes* of the docstring, and both go into the schema.
+"""
+
+import inspect
+import json
+import re
+from typing import Annotated, Any, TypeVar, dataclass_transform
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from heuristic.errors import InputError
+
+VERSION = 3
+"""Version of all records. Records of fotismos 0.1 have none."""
+
+CHANGES = "version 3 calls rungs `methods` and prices `attribution`"
+"""What changed since version 2; records in which nothing changed are still read."""
+
+Kind = TypeVar("Kind")
+
+
+Amount = Annotated[float, Meta(ge=0)]
+Positive = Annotated[float, Meta(gt=0)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+Count = Annotated[int, Meta(ge=0)]
+Size = Annotated[int, Meta(ge=1)]
+Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in pixels.")]
+Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
+
+
+# mypy does not know that `frozen` is inherited.
+@dataclass_transform(frozen_default=True, field_specifiers=(msgspec.field,))
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A type that is written as a JSON object."""
+
+
+class Pixels(Record):
+    """The number of pixels whose centre sees a surface, and of all."""
+
+    counted: Count
+    total: Size
+
+
+class Machine(Record):
+    """What times depend on: model of the processor, number of usable cores, system."""
+
+    processor: str
+    cores: Size
+    system: str
+
+
+class Estimated(Record):
+    """A number with a 95 % interval of Student's t over the replicates."""
+
+    value: float
+    low: float
+    high: float
+
+
+def plain(record: Any) -> Any:
+    """Return a record as dictionaries, lists, text, numbers, booleans and None."""
+    return msgspec.to_builtins(record, enc_hook=_numpy)
+
+
+def to_json(record: Any) -> str:
+    """Return the text of a record's file; ``ValueError`` for a NaN or an infinity."""
+    return json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def schema(kind: type) -> dict[str, Any]:
+    """Return the JSON Schema of a type of record."""
+    made = msgspec.json.schema(kind)
+    for definition in made["$defs"].values():
+        _describe(definition)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+
+
+def read(kind: type[Kind], text: str, where: str) -> Kind:
+    """Read a record.
+
+    Parameters
+    ----------
+    kind
+        The type of record.
+    text
+        JSON.
+    where
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        When the text is not such a record, or is of another version.
+    """
+    try:
+        content = json.loads(text)
+        version = content.get("record_version") if isinstance(content, dict) else None
+        if isinstance(content, dict) and version not in (2, VERSION):
+            found = "of fotismos 0.1" if version is None else f"version {version}"
+            raise InputError(
+                f"{where}: this record is {found}, not version {VERSION}. Make it again."
+            )
+        if version == 2:
+            return _of_version_2(kind, content, where)
+        return msgspec.convert(content, kind)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{where}: this is not JSON: {error}. Make it again.") from error
+    except RecursionError as error:
+        raise InputError(f"{where}: it is nested too deep. Make it again.") from error
+    except (ValueError, msgspec.ValidationError) as error:
+        raise InputError(f"{where}: {error}. Make it again.") from error
+
+
+def _of_version_2(kind: type[Kind], content: dict[str, Any], where: str) -> Kind:
+    try:
+        return msgspec.convert(content | {"record_version": VERSION}, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            f"{where}: this record is version 2; {CHANGES} ({error}). Make it again."
+        ) from error
+
+
+def _describe(definition: dict[str, Any]) -> None:
+    """Move the meanings of attributes from a type's docstring to the attributes."""
+    docstring = inspect.cleandoc(
+        re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
+    )
+    text, _, attributes = docstring.partition("\n\nAttributes\n----------\n")
+    if text:
+        definition["description"] = " ".join(text.split())
+    for names, meaning in re.findall(r"^(\S.*)\n((?:    .*\n?)+)", attributes, re.MULTILINE):
+        for name in names.split(", "):
+            definition["properties"][name].setdefault("description", " ".join(meaning.split()))
+
+
+def _numpy(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise NotImplementedError(f"{type(value).__name__} cannot be in a record")
+
+
+WIDTH = 110
+"""Columns: enough for the colours of a block of pixels with their errors."""
+
+
+def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
+    """Return JSON with one line per entry of the outer two levels, and of others if too long.
+
+    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
+    """
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    is_empty = not isinstance(value, (dict, list, tuple)) or not value
+    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
+        return line
+    indent = "  " * (depth + 1)
+    if isinstance(value, dict):
+        keys, items = [f"{json.dumps(key)}: " for key in value], list(value.values())
+    else:
+        keys, items = [""] * len(value), list(value)
+    lines = [
+        indent + key + laid_out(item, depth + 1, indent + key)
+        for key, item in zip(keys, items, strict=True)
+    ]
+    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

@@ -1,0 +1,149 @@
+"""The sampler plugin ``rotated_multijitter``: stratified, with the right mean at any depth.
+
+A pixel's n samples are stratified in every dimension: sample i falls into stratum π(i), with one
+permutation π per dimension. An estimate is unbiased if each single sample is uniform in all
+dimensions together. So π(i) must be uniform, and independent from one dimension to the next.
+Mitsuba's ``multijitter`` hashes π with too few outcomes if n is small. Its dimensions then depend
+on each other, and a product of many, such as a long path, is biased: by −2.2 % inside a sphere of
+albedo 0.9 with 16 samples per pixel. Here a random number rotates the strata ::
+
+    π(i) = (p(i) + r) mod n,    r uniform in 0 … n − 1, by pixel, dimension and seed
+
+which is uniform and independent for any permutation p. Pairs of dimensions are stratified in each
+axis and in cells, like correlated multi-jittered samples; the place within a cell is rotated in the
+same way.
+
+=================  ==============  ==============================================================
+Parameter          Type (default)  Meaning
+=================  ==============  ==============================================================
+``sample_count``   integer (4)     samples per pixel: any number. Two dimensions are stratified
+                                   best where it has two nearly equal factors
+=================  ==============  ==============================================================
+
+Sources: A. Kensler, *Correlated multi-jittered sampling*, 2013, for p and the cells; R. Cranley and
+T. N. L. Patterson, *Randomization of number theoretic methods for multiple integration*, 1976, for
+the rotation.
+"""
+
+from math import isqrt
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic.convention import Array, Mask
+from reference.scene.graph import Graph, properties
+
+SAMPLER = "rotated_multijitter"
+STOCK_SAMPLER = "independent"
+"""The sampler of Mitsuba's examples."""
+
+_ALONG, _ACROSS = 0x68BC21EB, 0x02E5BE93
+"""Odd numbers that distinguish the permutations of one dimension."""
+
+_registered: set[str] = set()
+
+
+def register() -> None:
+    """Register the plugin with Mitsuba for the current variant. Calling it again does nothing."""
+    if mi.variant() not in _registered:
+        _define()
+        _registered.add(mi.variant())
+
+
+def with_sampler(graph: Graph, plugin: str) -> Graph:
+    """Return a copy of a graph whose sensors have a sampler of the given kind."""
+    register()
+    copy = graph.copy()
+    for sensor in copy.nodes(mi.ObjectType.Sensor):
+        for key, _ in copy.children(sensor, mi.ObjectType.Sampler):
+            copy.detach(sensor, key)
+        copy.attach(sensor, "sampler", copy.add(mi.ObjectType.Sampler, properties(plugin)))
+    return copy
+
+
+def cells(count: int) -> tuple[int, int]:
+    """Return the two factors of a number of samples nearest to its root, the smaller first."""
+    small = next(factor for factor in range(isqrt(count), 0, -1) if count % factor == 0)
+    return small, count // small
+
+
+def _define() -> None:
+    class RotatedMultijitter(mi.Sampler):
+        """See the module's docstring."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            # Nothing is computed yet: Mitsuba may make a scene's plugins in several threads.
+            self.dimension = self.index = self.pixel = self.jitter = None
+
+        def seed(self, seed, wavefront_size=0xFFFFFFFF):
+            super().seed(seed, wavefront_size)
+            place = dr.arange(mi.UInt32, self.wavefront_size())
+            pixel = place // self.sample_count()
+            self.index = place - pixel * self.sample_count()
+            self.pixel, _ = mi.sample_tea_32(mi.UInt32(seed), pixel)
+            # One stream per sample: the pairs of numbers differ wherever seed or place do.
+            state, stream = mi.sample_tea_32(mi.UInt32(seed), place)
+            self.jitter = mi.PCG32(len(place), mi.UInt64(state), mi.UInt64(stream))
+            self.dimension = dr.opaque(mi.UInt32, 0)
+
+        def next_1d(self, active=True):
+            count = self.sample_count()
+            stratum, _, _ = self._stratum(active)
+            return _under_one((mi.Float(stratum) + self._within()) * (1 / count))
+
+        def next_2d(self, active=True):
+            columns, rows = cells(self.sample_count())
+            stratum, permutation, turn = self._stratum(active)
+            row = stratum // columns
+            column = stratum - row * columns
+            along = turned(row, rows, permutation * _ALONG, turn * _ALONG, active)
+            across = turned(column, columns, permutation * _ACROSS, turn * _ACROSS, active)
+            x = mi.Float(column) + (mi.Float(along) + self._within()) * (1 / rows)
+            y = mi.Float(row) + (mi.Float(across) + self._within()) * (1 / columns)
+            return mi.Point2f(_under_one(x * (1 / columns)), _under_one(y * (1 / rows)))
+
+        def _stratum(self, active):
+            """Return the stratum of each sample in the next dimension, and its random numbers."""
+            permutation, turn = mi.sample_tea_32(self.pixel, self.dimension)
+            self.dimension += 1
+            stratum = turned(self.index, self.sample_count(), permutation, turn, active)
+            return stratum, permutation, turn
+
+        def _within(self):
+            return mi.Float(self.jitter.next_float32())
+
+        def clone(self):
+            copy = self.fork()
+            if self.dimension is not None:
+                copy.dimension, copy.index = mi.UInt32(self.dimension), mi.UInt32(self.index)
+                copy.pixel, copy.jitter = mi.UInt32(self.pixel), mi.PCG32(self.jitter)
+            return copy
+
+        def fork(self):
+            props = mi.Properties()
+            props["sample_count"] = self.sample_count()
+            return RotatedMultijitter(props)
+
+        def schedule_state(self):
+            super().schedule_state()
+            dr.schedule(self.dimension, self.index, self.pixel, self.jitter)
+
+        def to_string(self):
+            return f"RotatedMultijitter[sample_count={self.sample_count()}]"
+
+    mi.register_sampler(SAMPLER, RotatedMultijitter)
+
+
+def _under_one(number):
+    """Keep a number below 1, which it could reach by rounding."""
+    return dr.minimum(number, dr.one_minus_epsilon(mi.Float))
+
+
+def turned(index: Array, count: int, permutation: Array, turn: Array, active: Mask) -> Array:
+    """Return ``(p(index) + r) mod count`` for a hash of p, and one of r: integers below count."""
+    if count == 1:
+        return mi.UInt32(0)
+    # The high word of the product is uniform in 0 … count - 1, without a division.
+    place = mi.permute_kensler(index, count, permutation, active) + dr.mul_hi(turn, count)
+    return dr.select(place >= count, place - count, place)

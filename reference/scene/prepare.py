@@ -1,0 +1,215 @@
+"""Preparation for both halves of a pair: sensor, film, integrator, ids and BSDFs."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mitsuba as mi
+
+from heuristic.errors import InputError
+from reference.pairing import bsdfs, lights
+from reference.records import Record
+from reference.scene import checks, files
+from reference.scene.graph import Graph, Reference, properties
+
+FILM, INTEGRATOR, SAMPLER, SENSOR, SHAPE = (
+    getattr(mi.ObjectType, kind) for kind in ("Film", "Integrator", "Sampler", "Sensor", "Shape")
+)
+
+PATHS = ("path", "volpath", "volpathmis")
+"""Integrators with the same light as the reference: all paths up to a length."""
+
+PIXEL_FORMATS = ("luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza")
+"""Pixel formats of Mitsuba's films."""
+
+FILM_SIZES = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
+
+
+class Override(Record):
+    """A setting of the scene that is not used, and what is used instead."""
+
+    what: str
+    given: str
+    used: str
+
+
+@dataclass
+class Settings:
+    """What a scene asks for besides its content, filled while it is prepared.
+
+    ``integrator`` is its plugin, None if the scene has none; ``max_depth`` counts like Mitsuba's,
+    -1 for no limit; ``rr_depth`` is None if omitted; ``overridden`` is what it does not get.
+    """
+
+    integrator: str | None = None
+    ambient: Any = None
+    hide_emitters: bool = False
+    max_depth: int = -1
+    rr_depth: int | None = None
+    occlusion: bool = False
+    overridden: list[Override] = field(default_factory=list)
+
+    def override(self, what: str, given: str, used: str) -> None:
+        """Record a setting that is not used."""
+        self.overridden.append(Override(what=what, given=given, used=used))
+
+
+def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:
+    """Check the graph, add what both halves need, and return its :class:`Settings`.
+
+    One of several sensors is kept, by its number in the Mitsuba scene. The integrator is removed:
+    each half gets its own.
+    """
+    _open_merged(graph)
+    bsdfs.give_default(graph)
+    bsdfs.check(graph)
+    lights.check(graph)
+    files.require_files(graph)
+    checks.check(graph)
+    for shape in graph.nodes(SHAPE):
+        if not graph.props(shape).id():
+            graph.props(shape).set_id(f"shape-{shape}")
+    settings = Settings()
+    kept = keep_sensor(graph, sensor)
+    _prepare_film(graph, kept, resolution, settings)
+    for _, index in graph.children(kept, SAMPLER):
+        count = graph.props(index).get("sample_count", 4)
+        given = f"{graph.plugin(index)}, {count} samples per pixel"
+        settings.override("sampler", given, "sampler and samples of the plan")
+    _give_weights(graph, settings)
+    _take_integrator(graph, settings)
+    return settings
+
+
+def _open_merged(graph):
+    """Replace ``merge`` by the shapes inside it: merging is an optimisation, and hides ids."""
+    for index in graph.nodes(SHAPE):
+        if graph.plugin(index) == "merge":
+            for _, child in graph.children(index, SHAPE):
+                graph.attach(0, f"shape_{child}", child)
+            graph.remove(index)
+
+
+def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
+    """Return the given width and height of a sensor's film."""
+    films = graph.children(keep_sensor(graph.copy(), sensor), FILM)
+    for _, film in films:
+        checks.check_node(graph, film)
+    return _size(graph.props(films[0][1]) if films else {})
+
+
+def _size(film):
+    """Return a film's width and height, or Mitsuba's defaults if omitted."""
+    width, height = checks.FILM_SIZE
+    return int(film.get("width", width)), int(film.get("height", height))
+
+
+def keep_sensor(graph: Graph, number: int) -> int:
+    """Keep one sensor of the scene, and return its index."""
+    places = []
+    for key, value in graph.props(0).items():
+        if isinstance(value, Reference):
+            index = value.index()
+            if graph.kind(index) == SENSOR:
+                places.append((0, key, index))
+            places += [(index, inner, child) for inner, child in graph.children(index, SENSOR)
+                       if graph.kind(index) == SHAPE]  # fmt: skip
+    if not places:
+        raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
+    if not 0 <= number < len(places):
+        raise InputError(
+            f"{graph.name}: there is no sensor {number}: choose one from 0 to {len(places) - 1}."
+        )
+    for place, (parent, key, _) in enumerate(places):
+        if place != number:
+            graph.detach(parent, key)
+    return places[number][2]
+
+
+def _prepare_film(graph, sensor, resolution, settings):
+    """Set the film to linear RGB floats, and to the requested resolution."""
+    films = graph.children(sensor, FILM)
+    if not films:
+        films = [("film", graph.add(FILM, properties("hdrfilm")))]
+        graph.attach(sensor, *films[0])
+    ((_, film),) = films
+    if graph.plugin(film) != "hdrfilm":
+        settings.override("film", graph.plugin(film), "hdrfilm")
+        given = graph.props(film)
+        sizes = {name: given[name] for name in FILM_SIZES if name in given}
+        filters = graph.children(film, mi.ObjectType.ReconstructionFilter)
+        graph.replace(film, properties("hdrfilm", **sizes))
+        for key, child in filters:
+            graph.attach(film, key, child)
+    props = graph.props(film)
+    pixel_format = "luminance" if mi.is_monochromatic else "rgb"
+    given = props.get("pixel_format", "rgb")
+    if given.lower() not in PIXEL_FORMATS:
+        raise InputError(
+            f"{graph.name}: {graph.label(film)}: pixel_format = {given!r}: choose one of"
+            f" {', '.join(PIXEL_FORMATS)}."
+        )
+    if given != pixel_format:
+        settings.override("pixel format", given, pixel_format)
+    props["pixel_format"] = pixel_format
+    props["component_format"] = "float32"
+    if resolution is not None:
+        _resize(props, resolution)
+
+
+def _resize(props, resolution):
+    """Set a film's size; a crop keeps its place in the picture."""
+    sides = zip(("width", "height"), "xy", resolution, _size(props), strict=True)
+    for side, name, new, before in sides:
+        if f"crop_{side}" in props:
+            begin = props.get(f"crop_offset_{name}", 0)
+            end = begin + props[f"crop_{side}"]
+            first = min(round(begin * new / before), new - 1)
+            props[f"crop_offset_{name}"] = first
+            props[f"crop_{side}"] = max(round(end * new / before) - first, 1)
+        props[side] = new
+
+
+def _give_weights(graph, settings):
+    """Let lights be sampled that are not: each plan would treat them in another way."""
+    kind = mi.ObjectType.Emitter
+    owners = {
+        child: shape for shape in graph.nodes(SHAPE) for _, child in graph.children(shape, kind)
+    }
+    for index in graph.nodes(kind):
+        props, name = graph.props(index), graph.label(owners.get(index, index))
+        if not props.get("sampling_weight", 1.0) > 0:
+            settings.override(f"sampling_weight of {name}", f"{props['sampling_weight']:g}", "1")
+            props["sampling_weight"] = 1.0
+
+
+def _take_integrator(graph, settings):
+    """Read the scene's integrator, inside those that only add channels, and remove it."""
+    for key, outer in graph.children(0, INTEGRATOR):
+        graph.detach(0, key)
+        index = outer
+        while nested := graph.children(index, INTEGRATOR):
+            settings.override("integrator", graph.plugin(index), "the integrator inside it")
+            index = nested[0][1]
+        plugin, props = graph.plugin(index), graph.props(index)
+        hidden, settings.integrator = props.get("hide_emitters", None), plugin
+        if plugin == "heuristic":
+            settings.ambient = props.get("ambient", None)
+            settings.occlusion = props.get("occlusion", False)
+            # The chapters' background is black, although their ambient light fills the room.
+            settings.hide_emitters = settings.ambient is not None if hidden is None else hidden
+            continue
+        is_kept = plugin in (*PATHS, "direct")
+        try:
+            graph.instantiate(index)
+        except InputError as error:  # one that is replaced may need another variant
+            if is_kept or "not found" in str(error):
+                raise
+        if not is_kept:
+            settings.override("integrator", plugin, "path: all light, as the comparison requires")
+        if plugin == "direct":
+            for name in ("emitter_samples", "bsdf_samples", "shading_samples"):
+                if props.get(name, 1) != 1:  # it may leave out light that only one way finds
+                    settings.override(name, str(props[name]), "1")
+        settings.hide_emitters = bool(hidden)
+        settings.max_depth = 2 if plugin == "direct" else props.get("max_depth", -1)
+        settings.rr_depth = props.get("rr_depth", None)

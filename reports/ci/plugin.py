@@ -1,0 +1,91 @@
+"""The pytest plugin: departures and baselines of scenes in your tests.
+
+::
+
+    def test_textbook_shading_is_close(fotismos):
+        assert fotismos.departure("scenes/lamp.xml") <= 5.0
+
+    def test_nothing_moved(fotismos):
+        assert fotismos.unchanged("scenes/lamp.xml")
+
+A mark renders a test in other variants, one test for each::
+
+    @pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_spectral")
+
+Baselines are in ``baselines/`` next to the test's file; ``pytest --fotismos-update`` writes them.
+Without a usable LLVM the tests are skipped, with the reason. Mitsuba is not imported before a test
+requests the fixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from reports.ci.testing import Fotismos
+
+MARK = "fotismos_variant"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes baselines."""
+    parser.getgroup("fotismos").addoption(
+        "--fotismos-update",
+        action="store_true",
+        help="write the baselines of `fotismos.unchanged` that are missing or moved",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the mark known."""
+    config.addinivalue_line(
+        "markers",
+        f"{MARK}(*names): render in these Mitsuba variants, one test for each",
+    )
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Make one test for each variant of the mark."""
+    mark = metafunc.definition.get_closest_marker(MARK)
+    if mark is not None and "fotismos" in metafunc.fixturenames:
+        metafunc.parametrize("fotismos", mark.args, indirect=True)
+
+
+@pytest.fixture
+def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
+    """Departures and baselines of scenes: see :class:`reports.ci.testing.Fotismos`."""
+    from heuristic import llvm
+    from heuristic.errors import InstallationError
+
+    try:
+        llvm.check()
+    except InstallationError as error:
+        pytest.skip(f"fotismos cannot render here. {error}")
+    import mitsuba as mi
+
+    from reference.scene.graph import set_variant
+    from reports.ci.testing import Fotismos
+
+    before, variant = mi.variant(), getattr(request, "param", None)
+    # A test may make a scene from Mitsuba's types, which needs a variant.
+    set_variant(variant or before or "llvm_ad_rgb")
+    yield Fotismos(
+        folder=request.path.parent / "baselines",
+        pictures=lambda: request.getfixturevalue("tmp_path"),
+        variant=variant,
+        update=request.config.getoption("--fotismos-update"),
+    )
+    if before is not None:
+        mi.set_variant(before)
+
+
+def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
+    """Explain a departure for which an assertion failed."""
+    for one in (left, right):
+        explain = getattr(type(one), "fotismos_explanation", None)
+        if explain is not None:
+            return [f"{left} {op} {right}", *explain(one)]
+    return None

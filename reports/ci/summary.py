@@ -1,0 +1,315 @@
+"""What CI and people read of a run: JUnit XML, a summary in Markdown, lines of a check.
+
+Modules that load metrics or rich are imported late: the options are part of ``--help``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import click
+
+from comparisons import atomic
+from heuristic import program
+from heuristic.errors import InputError, OutputError
+from reports.terminal.verbosity import visible
+
+if TYPE_CHECKING:
+    from comparisons.check.moved import Move
+    from reports.ci.checks import CheckRecord
+    from reports.ci.gates import Gate
+    from reports.page.scene_view import SceneView
+
+_file = click.Path(path_type=Path, dir_okay=False)
+
+options = (
+    click.option("--junit", type=_file, metavar="FILE", help="Write a JUnit XML file."),
+    click.option(
+        "--summary",
+        type=_file,
+        metavar="FILE",
+        help="Append a summary in Markdown, such as for a comment on a pull request.",
+    ),
+    click.option(
+        "--link", metavar="URL", help="Where the page will be, for the summary. [default: its path]"
+    ),
+)
+
+STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
+"""The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""
+
+JUNIT_HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"fotismos "
+"""How JUnit files of fotismos begin."""
+
+SHOWN = 12
+"""Quantities of a scene that are listed; all are in the record."""
+
+NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+# --- Files -----------------------------------------------------------------------------------
+
+
+def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str | Path]) -> None:
+    """Ensure that the files for CI replace no input, and nothing that fotismos did not make.
+
+    A JUnit file replaces only an earlier one; a summary is appended to Markdown, or to
+    ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
+    """
+    paths = [Path(one) for one in inputs]
+    for option, path in (("--junit", junit), ("--summary", summary)):
+        if path is None or not path.is_file():
+            continue
+        if any(one.exists() and one.samefile(path) for one in paths):
+            raise InputError(
+                f"{option} {path}: this file is an input of the same command. Name another one."
+            )
+        with path.open("rb") as file:
+            head = file.read(len(JUNIT_HEAD))
+        is_markdown = path.suffix in (".md", ".markdown")
+        is_markdown |= os.environ.get(STEP_SUMMARY) == str(path)
+        if head and not (is_markdown if option == "--summary" else head == JUNIT_HEAD):
+            kind = "Markdown" if option == "--summary" else "a JUnit file of fotismos"
+            raise InputError(
+                f"{option} {path}: this file is not {kind}, and stays. Name another one."
+            )
+
+
+def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
+    """Write a JUnit file, if one was requested."""
+    if path is None:
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic.put(path, document())
+    except OSError as error:
+        raise InputError(
+            f"--junit {path}: {error.strerror or error}. Name a file that can be written to."
+        ) from error
+
+
+def append(path: Path | None, text: Callable[[], str]) -> None:
+    """Append a summary to a file, if one was requested, and to ``$GITHUB_STEP_SUMMARY``."""
+    step = os.environ.get(STEP_SUMMARY)
+    for option, place in (("--summary", path), (STEP_SUMMARY, Path(step) if step else None)):
+        if place is None or (option == STEP_SUMMARY and place == path):
+            continue
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with place.open("a", encoding="utf-8") as file:
+                file.write(text())
+        except OSError as error:
+            raise OutputError(
+                f"{option} {place}: {error.strerror or error}. Name a file that can be written to."
+            ) from error
+
+
+# --- JUnit -----------------------------------------------------------------------------------
+
+
+def junit_of_checks(checks: Sequence[CheckRecord]) -> bytes:
+    """Return the XML document of checks, one test case for each baseline."""
+    statuses = [made.status for made in checks]
+    seconds = sum(made.seconds for made in checks)
+    counts = {"failures": statuses.count("failed"), "errors": statuses.count("error"), "skipped": 0}
+    root, suite = _suites("check", len(checks), counts, time=f"{seconds:.3f}")
+    for made in checks:
+        names = {"name": _clean(made.name), "file": _clean(made.baseline)}
+        time = f"{made.seconds:.3f}"
+        case = SubElement(suite, "testcase", names, classname="fotismos.check", time=time)
+        if made.status == "failed":
+            failure = SubElement(case, "failure", message=_clean(headline(made)), type="moved")
+            failure.text = _clean("\n".join(moved_lines(made)))
+        elif made.status == "error":
+            error = SubElement(case, "error", message=_clean(made.message), type="error")
+            error.text = _clean(made.message)
+    return _document(root)
+
+
+def junit_of_gates(gates: Sequence[Gate]) -> bytes:
+    """Return the XML document of a comparison's gates, one test case for each."""
+    states = [gate.state for gate in gates]
+    skipped = states.count("undetermined")
+    counts = {"failures": states.count("failed"), "errors": 0, "skipped": skipped}
+    root, suite = _suites("compare", len(gates), counts)
+    for gate in gates:
+        name = _clean(f"{gate.scene}, {gate.name}")
+        case = SubElement(suite, "testcase", name=name, classname="fotismos.compare")
+        kind = {"failed": "failure", "undetermined": "skipped"}.get(gate.state)
+        if kind:
+            SubElement(case, kind, message=_clean(str(gate)))
+    return _document(root)
+
+
+def _suites(
+    command: str, tests: int, counts: dict[str, int], **more: str
+) -> tuple[Element, Element]:
+    """Return the root of a document, and its one suite."""
+    totals = {"name": f"fotismos {command}", "tests": str(tests)}
+    totals |= {name: str(count) for name, count in counts.items()} | more
+    root = Element("testsuites", totals)
+    return root, SubElement(root, "testsuite", totals)
+
+
+def _document(root: Element) -> bytes:
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _clean(text: str) -> str:
+    """Return text with "�" for characters that XML and UTF-8 forbid; file names may have them."""
+    return NOT_IN_XML.sub("�", text)
+
+
+# --- Markdown --------------------------------------------------------------------------------
+
+
+def of_comparison(views: Sequence[SceneView], gates: Sequence[Gate], page: str) -> str:
+    """Return the summary of a run: its finding, a row for each scene, and its gates.
+
+    ``page`` is the address of the page, or its path.
+    """
+    from reports import verdict
+    from reports.ci.gates import HEADINGS, outcome
+    from reports.terminal.tables import escaped, markdown
+    from reports.terminal.words import number, percent
+
+    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
+    lead, usual = verdict.LEADING, verdict.USUAL
+    rows = [("Scene", "Mostly lacks", f"Mean {lead.label}", f"Pixels above {usual:g}")]
+    rows += [
+        (escaped(f.scene), escaped(f.cause or ""), number(f.mean), percent(f.beyond[usual]))
+        for f in found
+    ]
+    sentences = escaped(" ".join(verdict.sentences(found)))
+    parts = ["### fotismos compare", sentences, "\n".join(markdown(rows, 2))]
+    if gates:
+        cells = [[escaped(text) for text in gate.cells()] for gate in gates]
+        parts += ["\n".join(markdown([HEADINGS, *cells], 2)), outcome(gates)]
+    return "\n\n".join([*parts, _link(page)]) + "\n\n"
+
+
+def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
+    """Return the summary of checks; ``page`` is empty if none was written."""
+    from reports.terminal.tables import escaped, markdown
+
+    rows: list[tuple[str, ...]] = [
+        ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
+    ]
+    for made in checks:
+        cells: tuple[str, ...] = (made.message, "", "", "", "")
+        if made.moved:
+            what, *numbers = moved_cells(made.moved[0])
+            cells = (f"{what} ({len(made.moved)} in all)", *numbers)
+        rows.append((made.name, made.status, *cells))
+    table = markdown([rows[0], *([escaped(cell) for cell in row] for row in rows[1:])], right=3)
+    parts = ["### fotismos check", outcome(checks, level), "\n".join(table)]
+    return "\n\n".join([*parts, *([_link(page)] if page else ())]) + "\n\n"
+
+
+def _link(page: str) -> str:
+    from reports.terminal.tables import escaped
+
+    if page.startswith(("https://", "http://")):
+        return f"[Pictures, maps and numbers]({page.replace(')', '%29').replace(' ', '%20')})"
+    return f"Pictures, maps and numbers: {escaped(page) if '`' in page else f'`{visible(page)}`'}"
+
+
+# --- Lines of a check ------------------------------------------------------------------------
+
+
+def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
+    """Yield what moved in each scene, then a table of all scenes."""
+    from reports.terminal.tables import printed
+
+    for made in checks:
+        yield from _details(made)
+    if len(checks) > 1:
+        yield from printed(_table(checks), right=2)
+        yield ""
+    yield outcome(checks, level)
+
+
+def outcome(checks: Sequence[CheckRecord], level: float) -> str:
+    """Return the line that says how it went."""
+    statuses, count = [made.status for made in checks], len(checks)
+    moved, errors = statuses.count("failed"), statuses.count("error")
+    written = statuses.count("created") + statuses.count("updated")
+    if written or "unchanged" in statuses:
+        text = f"{written} of {count} baselines written"
+    else:
+        text = f"{moved} of {count} moved" if moved else f"{count - errors} of {count} unmoved"
+        text += f" (significance {level:g} over all that was tested)"
+    return text + (f"; {errors} could not be checked" if errors else "")
+
+
+def headline(made: CheckRecord) -> str:
+    """Return one line on a baseline of which something moved."""
+    first, *others = made.moved or ()
+    more = f", and {len(others)} more" if others else ""
+    return (
+        f"{first.quantity} moved from {first.before:.6g} to {first.after:.6g}"
+        f" (p = {first.p_corrected:.1g}){more}"
+    )
+
+
+def moved_lines(made: CheckRecord) -> Iterator[str]:
+    """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
+    from reports.terminal.tables import printed
+
+    moved = made.moved or ()
+    rows: list[tuple[str, ...]] = [
+        ("what moved", "baseline", "now", "change", "standard errors", "p")
+    ]
+    for move in moved[:SHOWN]:
+        old, new = move.before, move.after
+        change = f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}"
+        name, before, now, *certainty = moved_cells(move)
+        rows.append((name, before, now, change, *certainty))
+    yield from printed(rows, right=2)
+    if len(moved) > SHOWN:
+        yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
+
+
+def moved_cells(move: Move) -> tuple[str, ...]:
+    """Return the cells of a move: its name, from, to, standard errors and p-value."""
+    errors = move.standard_errors
+    return (
+        move.quantity,
+        f"{move.before:.6g}",
+        f"{move.after:.6g}",
+        "no noise" if errors is None else f"{errors:+.1f}",
+        f"{move.p_corrected:.1g}",
+    )
+
+
+def _details(made: CheckRecord) -> Iterator[str]:
+    if made.message:
+        yield f"{made.name}: {made.message}"
+    if not made.moved:
+        return
+    yield f"{made.name}: {made.status}"
+    yield from ("  " + line for line in moved_lines(made))
+    if made.versions_line:
+        yield "  " + made.versions_line
+    if made.pictures is not None:
+        yield f"  pictures: {made.pictures}"
+    if made.status == "failed":
+        yield f"  if this is meant: {program.command('check', made.baseline, '--update')}"
+    yield ""
+
+
+def _table(checks: Sequence[CheckRecord]) -> Iterator[Sequence[str]]:
+    yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "time"
+    for made in checks:
+        cells = [""] * 4
+        if made.metrics is not None:
+            lead = made.metrics["dE2000"]
+            moved = f"{len(made.moved or ())}", f"{made.tested}"
+            cells = [*moved, f"{lead.before:.3f}", f"{lead.after:.3f}"]
+        yield made.name, made.status, *cells, f"{made.seconds:.1f} s"

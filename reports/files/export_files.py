@@ -1,0 +1,197 @@
+"""The files of an exported scene: glTF 2.0, JSON, a G-buffer, and a README on the conventions."""
+
+import base64
+import json
+from math import atan, pi, radians, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.plain_scene import PlainScene, Triangles
+from reports.files import exr
+from reports.run import results
+
+README = """# {name}, for another program
+
+| File | Holds |
+| --- | --- |
+| camera.json | the camera as matrices, rows of numbers |
+| scene.gltf | geometry, camera, materials and lights in glTF 2.0, its buffer within |
+| lights.json, materials.json | lights and materials as paired |
+| gbuffer.exr | surface hit by the ray through each pixel's centre: `P`, `N`, and `shape.Y` |
+
+- Space is the scene's world, right-handed. Fronts of triangles are counter-clockwise.
+- `to_world` is Mitsuba's: the camera looks along +z, +y is up, +x is to the left. `view` and
+  `projection` are OpenGL's: it looks along -z, and +x is to the right.
+- A picture has {width} by {height} pixels, the first at the top left; the centre of pixel (x, y) is
+  (x + 0.5, y + 0.5).
+- Light is display-linear: a white diffuse surface that faces a light of intensity 1 has the value
+  1. With a light's intensity I and attenuation (k0, k1, k2), the distance d makes it
+  I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is.
+- `ambient` in lights.json is added times k_a; in physical terms it is an environment of that
+  radiance.
+- Angles are in degrees in JSON, in radians in glTF. `direction` is the direction in which light
+  travels.
+- `alpha` is the root mean square slope of the microfacets; glTF's roughness is its square root.
+- `k_d`, `k_s`, `n` are Phong's, as paired; `base_color`, `alpha`, `ior`, `metallic` are the
+  physical material's. Those in `varies` are textures, given by their value in the middle.
+- `shape.Y` is the number of the mesh in scene.gltf, from 1; 0 is the background. Spheres, disks
+  and cylinders are exact in gbuffer.exr, and triangles elsewhere (`--tessellation` says how fine).
+
+Write the picture as linear values with BT.709's primaries, without alpha, and compare it:
+
+    {command}
+"""
+
+
+def write(folder: Path, scene: PlainScene, command: str) -> None:
+    """Write the files of a scene to a folder."""
+    results.own(folder)
+    texts = {
+        "camera.json": _json(scene.camera),
+        "lights.json": _json({"ambient": scene.ambient, "lights": scene.lights}),
+        "materials.json": _json(scene.materials),
+        "scene.gltf": json.dumps(gltf(scene)),
+        "README.md": README.format(name=scene.name, command=command, **scene.camera),
+    }
+    for name, text in texts.items():
+        results.write(folder / name, text)
+    with results.replacing(folder / "gbuffer.exr") as partial:
+        exr.write(partial, scene.layers, {"scene": scene.name})
+
+
+def _json(content: object) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+# --- glTF --------------------------------------------------------------------------------------
+
+
+def gltf(scene: PlainScene) -> dict[str, Any]:
+    """Return a scene as glTF 2.0, buffer included.
+
+    A light's intensity is pi times the I_p of the pair, as irradiance is. Attenuation other than by
+    the inverse square, which glTF lacks, is in ``extras``, as Phong's coefficients are. By hand,
+    since libraries keep neither lights nor the index of refraction.
+    """
+    arrays: list[np.ndarray] = []
+    meshes = [_mesh(shape, arrays) for shape in scene.shapes]
+    camera = scene.camera
+    nodes: list[dict[str, Any]] = [
+        *({"name": shape.name, "mesh": number} for number, shape in enumerate(scene.shapes)),
+        {"name": "camera", "camera": 0, "matrix": _columns(np.linalg.inv(camera["view"]))},
+        *(_light_node(light, number) for number, light in enumerate(scene.lights)),
+    ]
+    starts = np.cumsum([0, *(array.nbytes for array in arrays)]).tolist()
+    content = base64.b64encode(b"".join(array.tobytes() for array in arrays)).decode()
+    lights = [_light(light) for light in scene.lights]
+    return {
+        "asset": {"version": "2.0", "generator": "fotismos"},
+        "extensionsUsed": ["KHR_materials_ior", "KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": lights}},
+        "scene": 0,
+        "scenes": [{"name": scene.name, "nodes": list(range(len(nodes)))}],
+        "nodes": nodes,
+        "cameras": [
+            {
+                "type": "perspective",
+                "perspective": {
+                    "aspectRatio": camera["width"] / camera["height"],
+                    "yfov": 2 * atan(1 / camera["projection"][1][1]),
+                    "znear": camera["near"],
+                    "zfar": camera["far"],
+                },
+            }
+        ],
+        "materials": [_material(material) for material in scene.materials],
+        "meshes": meshes,
+        "accessors": [_accessor(number, array) for number, array in enumerate(arrays)],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes, "target": _target(array)}
+            for start, array in zip(starts, arrays, strict=False)
+        ],
+        "buffers": [
+            {"byteLength": starts[-1], "uri": f"data:application/octet-stream;base64,{content}"}
+        ],
+    }
+
+
+def _mesh(shape: Triangles, arrays: list[np.ndarray]) -> dict[str, Any]:
+    """Append a shape's arrays to the buffer's, and return its mesh."""
+
+    def add(array: np.ndarray, dtype: type[np.generic]) -> int:
+        arrays.append(np.ascontiguousarray(array, dtype))
+        return len(arrays) - 1
+
+    attributes = {"POSITION": add(shape.positions, np.float32)}
+    if shape.normals is not None:
+        attributes["NORMAL"] = add(shape.normals, np.float32)
+    if shape.texcoords is not None:  # v points down in glTF
+        attributes["TEXCOORD_0"] = add(shape.texcoords * [1, -1] + [0, 1], np.float32)
+    indices = add(shape.faces.ravel(), np.uint32)
+    primitive = {"attributes": attributes, "indices": indices, "material": shape.material}
+    return {"name": shape.name, "primitives": [primitive]}
+
+
+def _accessor(number: int, array: np.ndarray) -> dict[str, Any]:
+    kind = "SCALAR" if array.ndim == 1 else f"VEC{array.shape[1]}"
+    component = 5125 if array.ndim == 1 else 5126  # unsigned integers, floats
+    bounds = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+    return {
+        "bufferView": number,
+        "componentType": component,
+        "count": len(array),
+        "type": kind,
+        **(bounds if kind == "VEC3" else {}),
+    }
+
+
+def _target(array: np.ndarray) -> int:
+    return 34963 if array.ndim == 1 else 34962  # indices, attributes of vertices
+
+
+def _material(material: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "name": material["name"],
+        "doubleSided": material["twosided"],
+        "emissiveFactor": [min(value, 1.0) for value in material["k_i"]],
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*(min(value, 1.0) for value in material["base_color"]), 1.0],
+            "metallicFactor": material["metallic"],
+            "roughnessFactor": sqrt(material["alpha"]),
+        },
+        "extensions": {"KHR_materials_ior": {"ior": material["ior"]}},
+        "extras": {name: material[name] for name in ("k_i", "k_a", "k_d", "k_s", "n", "form")},
+    }
+
+
+def _light(light: dict[str, Any]) -> dict[str, Any]:
+    largest = max(*light["intensity"], 1e-30)
+    outer = min(radians(light.get("cutoff", 0.0)), pi / 2)
+    spot = {"spot": {"innerConeAngle": 0.0, "outerConeAngle": outer}}
+    return {
+        "name": light["name"],
+        "type": light["type"],
+        "color": [value / largest for value in light["intensity"]],
+        "intensity": pi * largest,
+        "extras": {key: value for key, value in light.items() if key not in ("name", "type")},
+        **(spot if light["type"] == "spot" else {}),
+    }
+
+
+def _light_node(light: dict[str, Any], number: int) -> dict[str, Any]:
+    """Return a light's node, whose -z is the direction in which it shines."""
+    matrix = np.eye(4)
+    if "direction" in light:
+        z = -np.array(light["direction"], float) / np.linalg.norm(light["direction"])
+        side = np.cross([0, 1, 0] if abs(z[1]) < 0.9 else [1, 0, 0], z)
+        side /= np.linalg.norm(side)
+        matrix[:3, :3] = np.stack([side, np.cross(z, side), z], axis=1)
+    matrix[:3, 3] = light.get("position", (0, 0, 0))
+    extensions = {"KHR_lights_punctual": {"light": number}}
+    return {"name": light["name"], "extensions": extensions, "matrix": _columns(matrix)}
+
+
+def _columns(matrix: np.ndarray) -> list[float]:
+    return matrix.T.ravel().tolist()

@@ -1,0 +1,264 @@
+"""Folders of results: whose they are, and how files get into them.
+
+fotismos promises this, and no more: a folder is its own if it has the mark ``.fotismos``. In it,
+each file is replaced atomically. Nothing in a folder without the mark is overwritten or deleted.
+One command at a time writes to a folder. A scene's record is removed first and written last
+(:mod:`reports.run.scene`): without it, the scene is unfinished, and begins again.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import platform
+import unicodedata
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from itertools import chain
+from pathlib import Path
+from pkgutil import iter_modules
+from time import perf_counter
+from typing import Annotated
+
+from filelock import FileLock, Timeout
+from msgspec import Meta
+
+import reports.commands
+from comparisons import atomic
+from comparisons.case import file_of, name_of
+from heuristic.errors import InputError, OutputError
+from reference.records import VERSION, Machine, Record, Versions
+
+START = perf_counter()
+
+MARK, LOCK = ".fotismos", ".fotismos-lock"
+
+PAGE, RUN, TABLES, FIGURES = "index.html", "run.json", "tables", "figures"
+
+RESERVED = {PAGE, RUN, TABLES, FIGURES, "assets", "departures"} | {
+    module.name for module in iter_modules(reports.commands.__path__)
+}
+"""Names that no scene's folder may have."""
+
+LONGEST = 100
+"""Bytes of a scene folder's name."""
+
+PATIENCE_S = 0.5
+"""Seconds to wait for a command that is just ending."""
+
+WITHOUT_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
+"""Errors of file systems without locks, where no command is kept out."""
+
+
+class Failure(Record):
+    """A scene that could not be compared; ``scene`` is the folder for its results."""
+
+    scene: str
+    error: str
+
+
+class RunRecord(Record, kw_only=True):
+    """What one command did, besides the records of its scenes: ``run.json``."""
+
+    command: str
+    stages: Annotated[
+        dict[str, float],
+        Meta(description="Wall time in seconds, summed over simultaneous processes."),
+    ]
+    failures: tuple[Failure, ...]
+    machine: Machine
+    versions: Versions
+    record_version: int = VERSION
+
+
+# --- The folder of a command -----------------------------------------------------------------
+
+
+@contextmanager
+def hold(folder: str | Path, command: str) -> Iterator[Path]:
+    """Make or take the output folder, and keep other commands out of it while the block runs.
+
+    ``command`` names this one to others. A command that writes nothing leaves no trace.
+    """
+    folder = Path(folder)
+    lock = FileLock(folder / LOCK, PATIENCE_S, fallback_to_soft=False, preserve_lock_file=True)
+    with atomic.explained(folder / LOCK):
+        folder.mkdir(parents=True, exist_ok=True)
+        _require_file(folder / LOCK)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise OutputError(_held_by_another(folder)) from None
+        except OSError as error:
+            if error.errno not in WITHOUT_LOCKS:
+                raise
+    try:
+        with atomic.explained(folder):
+            holder = {"pid": os.getpid(), "host": platform.node(), "command": command}
+            holder["since"] = datetime.now().astimezone().isoformat(" ", "seconds")
+            (folder / LOCK).write_text(json.dumps(holder), encoding="utf-8")
+            own(folder, PAGE, RUN)
+            _tidy(folder)
+        yield folder
+    finally:
+        with suppress(OSError):
+            _tidy(folder)
+            is_used = any(p.name in (PAGE, RUN) or is_own(p) for p in folder.iterdir())
+            if is_own(folder) and not is_used:
+                (folder / MARK).unlink()
+            if not is_own(folder):
+                (folder / LOCK).unlink()
+        lock.release()
+
+
+def _held_by_another(folder: Path) -> str:
+    try:
+        holder = json.loads((folder / LOCK).read_text(encoding="utf-8"))
+        who = "process {pid} on {host}, since {since}: {command}".format(**holder)
+    except (OSError, ValueError, KeyError, TypeError):
+        who = "an unknown process"
+    return (
+        f"{atomic.printable(folder)}: another command writes there ({who}). Wait until it ends, or"
+        " choose another output folder with -o."
+    )
+
+
+def _tidy(folder: Path) -> None:
+    """Delete partial files of killed commands, and folders in which only a mark is left."""
+    for path in folder.iterdir():
+        if path.name.endswith(atomic.PARTIAL):
+            path.unlink()
+        elif not path.is_symlink() and is_own(path):
+            with suppress(OSError):  # an inaccessible folder does not hinder the others
+                _tidy(path)
+                if os.listdir(path) == [MARK]:
+                    (path / MARK).unlink()
+                    path.rmdir()
+
+
+# --- Whose it is -----------------------------------------------------------------------------
+
+
+def is_own(folder: Path) -> bool:
+    """Return whether a folder has the mark of fotismos."""
+    mark = folder / MARK
+    return mark.is_file() and not mark.is_symlink()
+
+
+def own(folder: Path, *names: str) -> Path:
+    """Make a folder and mark it, unless it is marked.
+
+    One that others made must be empty, or else lack the ``names`` that are to be written there.
+    """
+    with atomic.explained(folder / MARK):
+        _require_file(folder / MARK)
+        if is_own(folder):
+            return folder
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            raise _not_ours(folder)
+        folder.mkdir(exist_ok=True)
+        there = names or [name for name in os.listdir(folder) if name != LOCK]
+        for name in there:
+            if os.path.lexists(folder / name):
+                raise _not_ours(folder / name if names else folder)
+        (folder / MARK).touch()
+    return folder
+
+
+def _not_ours(path: Path) -> InputError:
+    kind = "folder" if path.is_dir() else "file"
+    return InputError(
+        f"{atomic.printable(path)}: this {kind} was not made by fotismos. Move it away, or choose"
+        " another output folder with -o."
+    )
+
+
+def _require_file(path: Path) -> None:
+    if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+
+
+# --- Files -----------------------------------------------------------------------------------
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a file to write to, which replaces ``path`` at the end."""
+    if os.path.lexists(path) and not is_own(path.parent):
+        raise _not_ours(path)
+    with atomic.replacing(path) as partial:
+        yield partial
+
+
+def write(path: Path, content: str | bytes) -> None:
+    """Write bytes, or text as UTF-8, see :func:`replacing`."""
+    with replacing(path) as partial:
+        partial.write_bytes(atomic.encoded(content))
+
+
+def clear(folder: Path, names: Iterable[str]) -> None:
+    """Delete files of a marked folder."""
+    if is_own(folder):
+        with atomic.explained(folder):
+            for name in names:
+                (folder / name).unlink(missing_ok=True)
+
+
+# --- The folder of a scene -------------------------------------------------------------------
+
+
+def places(folder: Path, scenes: Iterable[str]) -> dict[str, str]:
+    """Return the names of the scenes' folders, with the words that name the scenes."""
+    scenes = list(scenes)
+    found = assigned(folder, [(name_of(scene), file_of(scene)) for scene in scenes])
+    return dict(zip(found, scenes, strict=True))
+
+
+def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[str]:
+    """Make and mark a folder for each subject: a name, and its file if it has one.
+
+    A folder belongs to one subject, which its mark names, also in later commands.
+    """
+    known = {path.name: _subject_of(path) for path in sorted(folder.iterdir()) if is_own(path)}
+    found: list[str] = []
+    for name, file in subjects:
+        # Relative, so that the folder and the file may move together.
+        path = file and os.path.relpath(file.resolve(), folder.resolve())
+        subject = f"of: {path or f'built-in {name}'}"
+        places = [place for place, of in known.items() if of == subject]
+        free = (place for place in _candidates(name) if _is_free(folder / place))
+        place = next(one for one in chain(places, free) if one not in found)
+        own(folder / place)
+        if known.get(place) != subject:
+            atomic.write(folder / place / MARK, os.fsencode(subject))
+        found.append(place)
+    return found
+
+
+def folder_name(name: str, taken: Iterable[str] = ()) -> str:
+    """Return a name for a folder: plain characters, neither reserved nor taken."""
+    taken = set(taken)
+    return next(each for each in _candidates(name) if each not in taken)
+
+
+def _candidates(name: str) -> Iterator[str]:
+    composed = unicodedata.normalize("NFC", name)
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in composed)
+    plain = plain.encode(errors="replace")[:LONGEST].decode(errors="ignore").strip(".") or "scene"
+    if plain.casefold() not in RESERVED:
+        yield plain
+    number = 1
+    while True:
+        number += 1
+        yield f"{plain}-{number}"
+
+
+def _is_free(place: Path) -> bool:
+    """Return whether no subject is known to own a place; one of 0.2 has none in its mark."""
+    return not is_own(place) or not _subject_of(place).startswith("of: ")
+
+
+def _subject_of(place: Path) -> str:
+    return os.fsdecode((place / MARK).read_bytes()[: 2**16])

@@ -1,0 +1,267 @@
+"""One scene of a command: compared and written, or found finished."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from msgspec import structs
+
+from comparisons import atomic
+from comparisons.comparison import CAUSES, ComparisonRecord
+from comparisons.departure.metrics import METRICS, drawn
+from heuristic import version
+from heuristic.errors import FotismosError
+from heuristic.heuristics import named
+from reference.records import VERSION, Record, plain, to_json
+from reports.files import exr, images
+from reports.page import embedding, terms_view
+from reports.page.scene_view import SceneView
+from reports.run import results
+
+if TYPE_CHECKING:
+    from comparisons.case import Case
+    from comparisons.comparison import Comparison, Images
+    from comparisons.cost.cost import Study
+    from reference.rendering.passes import Progress
+    from reports.run.batch import Job
+
+RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"
+
+Seconds = dict[str, float]
+"""Wall time by stage of a run."""
+
+
+class Finished(Record):
+    """The content of ``view.json``: the scene's part of the page, and a digest of each file."""
+
+    view: SceneView
+    digests: dict[str, str]
+
+
+def compare(
+    name: str, folder: Path, place: str, job: Job, progress: Progress
+) -> tuple[SceneView, Seconds]:
+    """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
+    from comparisons.case import open_case
+    from comparisons.compare import compare
+
+    begin = perf_counter()
+    case = open_case(name, job.request)
+    key = key_of(case, job)
+    view = None if job.fresh else load(folder / place, key)
+    spent = {"finished scenes": perf_counter() - begin}
+    if view is not None:
+        return view, spent
+    begin = perf_counter()
+    comparison = compare(case.source, case.options, progress, case.command())
+    spent |= _stages(comparison.record, perf_counter() - begin)
+    study, begin = None, perf_counter()
+    if job.with_cost:
+        comparison, study = _explained(case, progress, comparison, job.coarse)
+        spent["cost"] = perf_counter() - begin
+    begin = perf_counter()
+    if job.figures:  # first, since the record marks the scene as finished
+        from reports.charts import figures
+
+        figures.write_scene(folder / results.FIGURES, place, comparison)
+    view = write(folder, place, comparison, study, key)
+    return view, spent | {"files": perf_counter() - begin}
+
+
+def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
+    """Split the seconds of a comparison by its record of time."""
+    stages = record.time.stages
+    preparing = sum(stages.get(name, 0.0) for name in ("scene and pairing", "planning", "geometry"))
+    rendering = record.time.heuristic.total_s + record.time.reference.total_s
+    return {
+        "scenes and plans": preparing,
+        "rendering": rendering,
+        "metrics": seconds - preparing - rendering,
+    }
+
+
+def _explained(
+    case: Case, progress: Progress, comparison: Comparison, coarse: bool
+) -> tuple[Comparison, Study | None]:
+    """Return a comparison with its causes, or a warning, and its study of cost if there is one."""
+    from comparisons.cost.cost import quick
+    from comparisons.cost.measure import COARSE, QUICK
+    from comparisons.hybrids.dominance import named
+    from comparisons.pictures import likeness
+
+    begin, study, record = perf_counter(), None, comparison.record
+    try:
+        if case.options.image:  # cannot be studied: it is nearest to some rendering
+            record = likeness.with_nearest(comparison, case.source, case.options, progress)
+        else:
+            effort = COARSE if coarse else QUICK
+            study = quick(case.source, case.options, progress, case.command() + " --why", effort)
+            record = named(comparison, study.causes.maps)
+    except FotismosError as error:
+        warnings = (*record.warnings, f"The causes are unknown: {error}")
+        return replace(comparison, record=structs.replace(record, warnings=warnings)), None
+    stages = record.time.stages | {CAUSES: perf_counter() - begin}
+    time = structs.replace(record.time, stages=stages)
+    return replace(comparison, record=structs.replace(record, time=time)), study
+
+
+# --- Finished scenes -------------------------------------------------------------------------
+
+
+def key_of(case: Case, job: Job) -> str | None:
+    """Return a digest of all that a result depends on; None for a scene in Python.
+
+    That is the scene with each file that it reads, the code of the heuristic or the pictures in its
+    place, options, versions, and the sources of fotismos where it runs from a checkout. What a
+    script reads is not known.
+    """
+    from comparisons.pictures.picture_files import path_of
+    from comparisons.record import versions
+    from reference.scene.source import digest
+
+    if Path(case.word).suffix == ".py":
+        return None
+    files = [path_of(word) for word in case.options.image]
+    parts: dict[str, Any] = {
+        "record": VERSION,
+        "metrics": list(METRICS),
+        "cost, figures, coarse": (job.with_cost, job.figures, job.coarse),
+        "options": plain(case.options),
+        "variant": case.variant,
+        "versions": versions(),
+        "sources": version.source_digest(),
+        "heuristic": named(case.options.heuristic).digest(),
+        "pictures": [_digest_of(path) for path in files if path.is_file()],
+        "scene": digest(case.source),
+    }
+    return _digest(json.dumps(parts, sort_keys=True).encode())
+
+
+def load(place: Path, key: str | None) -> SceneView | None:
+    """Return the view of a finished scene; None if its key is another or a file was changed."""
+    if key is None:
+        return None
+    try:
+        # JSON has no bytes: pictures are text in it.
+        found = msgspec.convert(atomic.Entry(place / VIEW, key).load(), Finished, builtin_types=())
+        current = {name: _digest_of(place / name) for name in found.digests}
+        return found.view if current == found.digests else None
+    except (msgspec.ValidationError, OSError):
+        return None
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _digest_of(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+# --- Files -----------------------------------------------------------------------------------
+
+
+def write(
+    folder: Path,
+    name: str,
+    comparison: Comparison,
+    study: Study | None = None,
+    key: str | None = None,
+) -> SceneView:
+    """Write the files of one comparison to ``folder/name``, and return its part of the page.
+
+    The record is removed first and written last. Files of an earlier result that this one does not
+    have are deleted. With a key, :func:`load` finds the result.
+    """
+    place, record = folder / name, comparison.record
+    results.own(place)
+    earlier = _files(place)
+    results.clear(place, (RECORD, VIEW))
+    layers = _layers(comparison.images)
+    view = view_of(comparison, layers)
+    made = {
+        f"{each}.png": png
+        for each, png in images.pictures(comparison.images, record.viewing.exposure).items()
+    }
+    linked: tuple[str, ...] = (RECORD, PICTURE)
+    if study:
+        from reports.run import cost_files
+
+        priced = cost_files.documents(study)
+        made |= priced
+        linked = (*linked, "cost.json")
+        charts = tuple(cost_files.figures(study.record))
+        view = structs.replace(view, charts=charts, cost=cost_files.view(study, priced))
+    view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
+    for file, content in made.items():
+        results.write(place / file, content)
+    exr.write(place / PICTURE, layers, _header(record))
+    made[RECORD] = atomic.encoded(to_json(record))
+    digests = {file: _digest(content) for file, content in made.items()}
+    digests[PICTURE] = _digest_of(place / PICTURE)
+    results.clear(place, earlier - digests.keys())
+    finished = Finished(view=view, digests=digests)
+    atomic.Entry(place / VIEW, key or "none").save(plain(finished))
+    results.write(place / RECORD, made[RECORD])
+    return view
+
+
+def remove(place: Path) -> None:
+    """Delete the files of a result; a folder that is empty then goes with the command."""
+    results.clear(place, (RECORD, VIEW, *_files(place)))
+
+
+def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> SceneView:
+    """Return a comparison's part of the page without links; ``layers`` are its images."""
+    record, shown = comparison.record, comparison.images
+    exposure = record.viewing.exposure
+    small = images.thumbnails(shown, exposure)
+    picked = terms_view.picked(comparison.terms, record.regions, shown.reference)
+    return SceneView(
+        record=record,
+        thumbnails={name: images.webp_of(png) for name, png in small.items()},
+        embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
+        terms=terms_view.view(comparison.terms, comparison.no_terms, picked),
+    )
+
+
+def _files(place: Path) -> set[str]:
+    """Return the files of the result in a place, as far as its view names them."""
+    try:
+        digests = json.loads((place / VIEW).read_bytes())["content"]["digests"]
+        return {name for name in digests if "/" not in name}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+
+
+def _layers(shown: Images) -> dict[str, Any]:
+    return {
+        "heuristic": shown.heuristic,
+        "reference": shown.reference,
+        "reference_stderr": shown.reference_stderr,
+        "P": shown.position,
+        "N": shown.normal,
+        **{name: shown.maps[name] for name in drawn()},
+        "significant": shown.significant,
+    }
+
+
+def _header(record: ComparisonRecord) -> dict[str, str]:
+    header: dict[str, object] = {
+        "scene": record.scene,
+        "variant": record.variant,
+        "seed": record.seed,
+        "spp": record.plan.spp,
+        "passes": record.plan.passes,
+        "pairing": record.pairing.convention,
+    }
+    header |= {f"version {name}": version for name, version in record.versions.items()}
+    return {key: str(value) for key, value in header.items()}

@@ -1,1 +1,0 @@
-"""Faults by kind: each module yields them from ``faults()``."""

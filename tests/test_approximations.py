@@ -1,0 +1,432 @@
+"""Approximations of light transport: closed forms, Mitsuba's path, and the kernel's shadow rays."""
+
+import dataclasses
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.gallery.builtin import SCENES
+from heuristic import meshes
+from heuristic.approximations import ambient, indirect, shadow_maps
+from heuristic.errors import InputError
+from heuristic.heuristics import named
+from reference.pairing.halves import pair
+from reference.rendering.renderer import Renderer
+from reference.scene.source import Source
+from tests.random_scenes import is_sound, random_scene
+from tests.sky import sky_above, two_colours
+
+AMBIENT = ("mean-ambient", "hemisphere-ambient")
+MODELS = (*AMBIENT, "shadow-map", "soft-shadow-map")
+
+
+def looking(origin, target, up=(0, 0, 1), size=32, fov=40.0, **others):
+    """A camera with a small film."""
+    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+    to_world = mi.ScalarTransform4f().look_at(origin, target, up)
+    return {"type": "perspective", "fov": fov, "to_world": to_world, "film": film, **others}
+
+
+def image(scene, model, spp=4, **parameters):
+    """Render the heuristic half of a scene with a model."""
+    integrator = {"type": "heuristic", "model": model, **parameters}
+    return np.array(Renderer(scene, mi.load_dict(integrator), spp, model).render(1), float)
+
+
+# --- Ambient light --------------------------------------------------------------------------------
+
+
+def integrating_sphere(k_d):
+    """The inside of a sphere of radius 2 with a lamp in its middle."""
+    wall = {"type": "phong", "k_d": k_d}
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic"},
+        "sensor": looking((0.5, 0.3, 0.1), (2, 0, 0), fov=80.0),
+        "wall": {"type": "sphere", "radius": 2.0, "flip_normals": True, "bsdf": wall},
+        "lamp": {"type": "heuristic_point", "k0": 0.0, "k2": 1.0}
+        | {"intensity": {"type": "uniform", "value": 3.0}},
+    }
+
+
+@pytest.mark.parametrize(
+    "variant", ["llvm_ad_rgb", "llvm_ad_mono", "llvm_ad_spectral"], indirect=True
+)
+def test_an_integrating_sphere_has_the_light_of_its_closed_form(variant):
+    """It is lit alike everywhere, so ``I = rho (I_p + I)`` and ``I = I_p rho / (1 - rho)``."""
+    scene = mi.load_dict(integrating_sphere(0.5))
+    found, again = indirect.gather(scene), indirect.gather(scene)
+    np.testing.assert_allclose(found.mean(), 3 / 4 * 0.5 / (1 - 0.5), rtol=0.01)
+    np.testing.assert_allclose(found.k_d, 0.5, rtol=0.02)
+    np.testing.assert_array_equal(found.arriving, again.arriving)
+
+
+def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
+    """Of the physical half by ``path``, whose lamp has an extent: a few percent."""
+    found = pair(SCENES["cornell-box"].source(), resolution=(32, 32))
+    physical, half = found.physical.instantiate(), found.heuristic.instantiate()
+    full, direct = (
+        np.mean([mi.render(physical, integrator=path, spp=128, seed=s) for s in (1, 2)], 0)
+        for path in (mi.load_dict({"type": "path", "max_depth": depth}) for depth in (-1, 2))
+    )
+    plain = image(half, "phong", 16, occlusion=True)
+    for model in AMBIENT:
+        added = image(half, model, 16, occlusion=True) - plain
+        np.testing.assert_allclose(
+            added.mean(axis=(0, 1)), (full - direct).mean(axis=(0, 1)), rtol=0.07, err_msg=model
+        )
+
+
+def test_an_environment_replaces_ambient_light_and_is_gathered_where_nothing_hides_it(rgb):
+    """A sphere under an even sky receives it everywhere, whatever ``I_a`` says."""
+    scene = mi.load_dict(sky_above(lambda toward: np.full((len(toward), 3), 0.25)))
+    assert indirect.gather(scene).mean() == pytest.approx(0.25, rel=0.005)
+    for model in AMBIENT:
+        shown = image(scene, model, ambient=9.0)[16, 16]
+        assert shown == pytest.approx(0.25 * 0.8, rel=0.01), model
+
+
+def corner():
+    """A floor and a wall of one unit's height at x = 0, both wide."""
+    turned = mi.ScalarTransform4f().translate((0, 0, 0.5)).rotate((0, 1, 0), 90)
+    bsdf = {"type": "phong", "k_a": 0.4, "k_d": 0.5, "twosided": True}
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic"},
+        "sensor": looking((2.5, -1, 2.5), (0.3, 0, 0.2), size=96, fov=90.0),
+        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(300), "bsdf": bsdf},
+        "wall": {
+            "type": "rectangle",
+            "to_world": turned @ mi.ScalarTransform4f().scale((0.5, 300, 1)),
+            "bsdf": bsdf,
+        },
+    }
+
+
+def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
+    scene = mi.load_dict(corner())
+    plain = image(scene, "phong", ambient=2.0)
+    assert plain.max() == pytest.approx(0.8)
+    for model in AMBIENT:
+        np.testing.assert_allclose(image(scene, model, ambient=2.0), plain, atol=1e-6)
+
+
+def test_light_from_surfaces_and_from_around_add_up(rgb):
+    """The mean of a picture by ``path``, of the same surfaces under the same sky and lamp."""
+    given = corner()
+    given["sky"] = sky_above(two_colours)["sky"]
+    given["wall"]["bsdf"] = {"type": "phong", "k_d": 0.9, "twosided": True}
+    given["lamp"] = {"type": "heuristic_directional", "direction": (-2, 1, -1)}
+    scene = mi.load_dict(given)
+    path = mi.load_dict({"type": "path", "hide_emitters": True})
+    expected = np.array(mi.render(scene, integrator=path, spp=128)).mean(axis=(0, 1))
+    for model in AMBIENT:
+        found = image(scene, model, 4, occlusion=True, hide_emitters=True).mean(axis=(0, 1))
+        np.testing.assert_allclose(found, expected, rtol=0.02, err_msg=model)
+
+
+def test_a_sun_is_gathered_without_noise(rgb):
+    """One texel of the sky holds all light: paths alone would meet it once in ten thousand."""
+
+    def sun(toward):
+        nearest = np.argmax(toward @ np.array((0.2, -0.5, 0.9)))
+        return 500.0 * (np.arange(len(toward)) == nearest)[:, None] * np.ones(3)
+
+    means = [
+        indirect.gather(mi.load_dict(sky_above(sun, height=height))).mean() * height**2
+        for height in (32, 64)
+    ]
+    np.testing.assert_allclose(*means, rtol=0.15)
+
+
+def test_sky_and_ground_are_found_again(rgb):
+    prepared = ambient.prepare(mi.load_dict(sky_above(two_colours)))
+    assert list(prepared.up) == [0, 0, 1]
+    for table, end in ((prepared.sky, 1), (prepared.ground, -1)):
+        (expected,) = two_colours(np.array([(0, 0, end)]))
+        np.testing.assert_allclose(np.ravel(table.at(())), expected, rtol=0.08, atol=0.01)
+
+
+def test_a_fit_keeps_the_mean_and_is_not_negative():
+    random = np.random.default_rng(3)
+    for case in range(200):
+        count = int(random.integers(1, 40))
+        normal = random.normal(size=(count, 3)) if case % 3 else np.ones((count, 3))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        arriving, k_d = random.random((2, count, 3)) ** 4
+        found = indirect.GatheredLight(normal, arriving, k_d * (random.random((count, 3)) < 0.8))
+        sky, ground = ambient.fit(found, np.array((0.0, 0.0, 1.0)))
+        assert min(sky.min(), ground.min()) >= 0
+        fitted = sky * (1 + normal[:, 2:]) / 2 + ground * (1 - normal[:, 2:]) / 2
+        mean = dataclasses.replace(found, arriving=fitted).mean()
+        np.testing.assert_allclose(mean, found.mean(), rtol=1e-6, atol=1e-9)
+
+
+# --- Shadow maps ----------------------------------------------------------------------------------
+
+LAMPS = {
+    "point": {"type": "heuristic_point", "position": (0.8, -0.7, 2.5)},
+    "spot": {
+        "type": "heuristic_spot",
+        "position": (0.8, -0.7, 2.5),
+        "direction": (-0.3, 0.3, -1),
+        "cutoff": 40.0,
+    },
+    "directional": {"type": "heuristic_directional", "direction": (-0.4, 0.3, -1)},
+}
+
+
+def still_life(*lamps):
+    """A cube and a ball on a floor under lamps."""
+    bsdf = {"type": "phong", "k_d": 0.5, "k_s": 0.3, "n": 10}
+    place = mi.ScalarTransform4f()
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "heuristic"},
+            "sensor": looking((-0.7, -2.2, 2.2), (0, 0.3, 0), size=128, fov=50.0),
+            "floor": {"type": "rectangle", "to_world": place.scale(3), "bsdf": bsdf},
+            "cube": {"type": "cube", "to_world": place.translate((-0.6, 0.4, 0.3)).scale(0.3)}
+            | {"bsdf": bsdf},
+            "ball": {"type": "sphere", "center": (0.5, 0, 0.8), "radius": 0.35, "bsdf": bsdf},
+        }
+        | {name: LAMPS[name] for name in lamps}
+    )
+
+
+def wrong(scene, resolution):
+    """The share of pixels whose centre a hard shadow map shades otherwise than rays do."""
+    rays = image(scene, "phong", 1, occlusion=True)
+    found = image(scene, "shadow-map", 1, resolution=resolution)
+    return np.mean(np.any(abs(found - rays) > 1e-4, axis=2))
+
+
+def test_errors_lie_along_edges_and_fall_with_the_resolution(rgb):
+    """An edge is as wide as a texel: eight times the resolution, an eighth of the pixels."""
+    for lamps in (("point",), ("spot",), ("directional",), tuple(LAMPS)):
+        scene = still_life(*lamps)
+        coarse, fine = (wrong(scene, resolution) for resolution in (32, 256))
+        assert coarse > 0.01
+        assert fine < min(0.35 * coarse, 0.01 * len(lamps)), lamps
+
+
+def test_a_lamp_on_a_shape_is_not_hidden_by_it(rgb):
+    for name in ("cornell-box", "plastic-spheres"):
+        scene = pair(SCENES[name].source(), resolution=(48, 48)).heuristic.instantiate()
+        assert wrong(scene, 512) < 0.015, name
+
+
+def test_no_plane_hides_itself_with_the_default_bias(rgb):
+    """A plane alone, which a lamp meets at many angles; without a bias it would hide itself."""
+
+    def floor_under(kind, angle):
+        toward = np.array((np.sin(angle), 0, np.cos(angle)))
+        place = {"directional": {"direction": -toward}, "point": {"position": 4 * toward}}[kind]
+        lamp = {name: value.tolist() for name, value in place.items()}
+        return mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "heuristic"},
+                "sensor": looking((0, -3, 3), (0, 0, 0), size=64),
+                "floor": {"type": "rectangle", "bsdf": {"type": "phong", "k_d": 0.5}},
+                "lamp": {"type": f"heuristic_{kind}"} | lamp,
+            }
+        )
+
+    for kind in ("point", "directional"):
+        for angle in np.deg2rad((0, 60, 87)):
+            scene = floor_under(kind, float(angle))
+            plain = image(scene, "phong", 1)
+            for model, resolution in (("shadow-map", 32), ("soft-shadow-map", 256)):
+                found = image(scene, model, 1, resolution=resolution)
+                np.testing.assert_allclose(found, plain, rtol=1e-5)
+    scene = floor_under("point", float(np.deg2rad(60)))
+    bare = image(scene, "shadow-map", 1, bias=0.0)
+    assert np.mean(bare < 0.5 * image(scene, "phong", 1)) > 0.1
+
+
+def test_a_filter_has_the_mean_of_rays_and_softens_edges(rgb):
+    scene = still_life("directional")
+    rays, soft = image(scene, "phong", 16, occlusion=True), image(scene, "soft-shadow-map", 16)
+    assert soft.mean() == pytest.approx(rays.mean(), rel=0.02)
+    wide = image(scene, "soft-shadow-map", 1, radius=8.0)
+    bright, dark = (image(scene, "phong", 1, occlusion=hides) for hides in (False, True))
+    half = np.all((wide < 0.95 * bright) & (wide > dark + 0.05 * bright), axis=2)
+    assert half.mean() > 0.02
+    assert (wide <= bright + 1e-5).all()
+
+
+def test_an_edge_is_a_ramp_as_wide_as_the_filter(rgb):
+    """A roof over half of a floor, under light from straight above."""
+    bsdf = {"type": "phong", "k_d": 1.0, "twosided": True}
+    roof = mi.ScalarTransform4f().translate((-1, 0, 0.5))
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "heuristic"},
+            "sensor": looking((0.5, -3, 0.45), (0.2, 0, 0)),
+            "floor": {"type": "rectangle", "bsdf": bsdf},
+            "roof": {"type": "rectangle", "to_world": roof, "bsdf": bsdf},
+            "lamp": {"type": "heuristic_directional", "direction": (0, 0, -1)},
+        }
+    )
+    taps, radius = 4, 8.0
+    lamp = scene.emitters()[0].light(dr.zeros(mi.SurfaceInteraction3f))
+    depths = shadow_maps.light_map(scene, lamp, 256)
+    width = float(depths.texel(mi.Float(1.0))[0])
+    x = np.linspace(-12, 12, 97) * width
+    offset = depths.offset(mi.Point3f(mi.Float(x), 0.1, 0.0))
+    places = [radius * (2 * (tap + 0.5) / taps - 1) for tap in range(taps)]
+    frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    reached = [
+        np.array(depths.distance(offset) * 0.999 <= depths.depth(offset, frame, u, v))
+        for u in places
+        for v in places
+    ]
+    # Which of the map's axes is which does not matter: a row of taps is as wide as a column.
+    expected = np.clip(0.5 + x / width / (2 * radius), 0, 1)
+    assert abs(np.mean(reached, axis=0) - expected).max() <= 1 / taps + 1e-6
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_mono", "llvm_ad_spectral"], indirect=True)
+def test_other_variants_have_the_same_shadows(variant):
+    scene = still_life("point", "directional")
+    rays, found = image(scene, "phong", 4, occlusion=True), image(scene, "shadow-map", 4)
+    assert np.mean(np.any(abs(found - rays) > 1e-3, axis=2)) < 0.05
+
+
+# --- All of them ----------------------------------------------------------------------------------
+
+
+def test_a_scene_without_lamps_or_with_too_many_is_refused_with_the_reason(rgb):
+    for model, count, reason in (
+        ("shadow-map", 0, "it has no lamp"),
+        ("soft-shadow-map", 17, "it has 17 lamps, and at most 16 get a depth image"),
+    ):
+        given = integrating_sphere(0.5)
+        lamp = given.pop("lamp")
+        scene = mi.load_dict(given | {f"lamp{i}": lamp for i in range(count)})
+        with pytest.raises(
+            InputError, match=f"heuristic {model} cannot shade this scene: {reason}"
+        ):
+            image(scene, model)
+        assert named(model).refuse(scene)
+
+
+@pytest.mark.parametrize(
+    ("variant", "seeds"),
+    [
+        ("llvm_ad_rgb", (3, 8)),
+        pytest.param("llvm_ad_mono", (12,), marks=pytest.mark.thorough),
+        pytest.param("llvm_ad_spectral", (28,), marks=pytest.mark.thorough),
+    ],
+    indirect=["variant"],
+)
+def test_random_scenes_are_finite_and_not_negative(variant, seeds, tmp_path):
+    for seed in seeds:
+        graph = pair(Source(f"seed {seed}", random_scene(seed, tmp_path))).heuristic
+        scene = graph.instantiate()
+        for model in MODELS:
+            refuse = named(model).refuse
+            if refuse is None or not refuse(scene):
+                other = graph.copy()
+                (integrator,) = other.nodes(mi.ObjectType.Integrator)
+                other.props(integrator)["model"] = model
+                renderer = Renderer(scene, other.instantiate().integrator(), 4, model)
+                assert is_sound(np.array(renderer.render(seed))), (seed, model)
+
+
+LONE_BALLS = {
+    "an exponent of 1e7": {"n": 1e7, "k_s": 0.9},
+    "a lamp 1e5 away": {"lamp": (4e4, -6e4, 6e4), "intensity": 1e10},
+    "a lamp next to the surface": {"lamp": (0.0, -1.001, 0.0), "intensity": 1e-4},
+    "lengths of 1e-4": {"scale": 1e-4},
+    "lengths of 1e5": {"scale": 1e5},
+    "a white surface": {"k_d": 1.0, "k_s": 0.0},
+    "a black surface": {"k_d": 0.0, "k_s": 0.0},
+    "no light": {"intensity": 0.0},
+}
+
+
+def lone_ball(scale=1.0, lamp=(2.0, -3.0, 3.0), intensity=10.0, **material):
+    """A ball under a lamp, with lengths in units of ``scale``."""
+    lens = {"size": 16, "fov": 35.0, "near_clip": 0.01 * scale, "far_clip": 100 * scale}
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic"},
+        "sensor": looking((0, -4 * scale, 0), (0, 0, 0), **lens),
+        "ball": {
+            "type": "sphere",
+            "radius": scale,
+            "bsdf": {"type": "phong", "k_d": 0.5, "k_s": 0.4, "n": 9.0} | material,
+        },
+        "lamp": {
+            "type": "heuristic_point",
+            "position": [scale * place for place in lamp],
+            "intensity": intensity,
+            "k0": 0.0,
+            "k2": 1 / scale**2,
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    "variant",
+    [
+        "llvm_ad_rgb",
+        pytest.param("llvm_ad_mono", marks=pytest.mark.slow),
+        pytest.param("llvm_ad_spectral", marks=pytest.mark.slow),
+    ],
+    indirect=True,
+)
+def test_nothing_is_added_to_a_lone_ball(variant):
+    """Nothing hides light from a convex body, and none of it comes back."""
+    for case, change in LONE_BALLS.items():
+        scene = mi.load_dict(lone_ball(**change))
+        plain = image(scene, "phong")
+        assert (plain.max() > 0) == (case not in ("a black surface", "no light"))
+        for model in MODELS:
+            found = image(scene, model)
+            assert is_sound(found), (case, model)
+            # Maps have texels: at the terminator, where next to no light arrives, they may err.
+            atol = 2e-3 * max(plain.max(), 1e-6)
+            np.testing.assert_allclose(found, plain, atol=atol, err_msg=f"{case}, {model}")
+
+
+def test_vertices_and_faces_are_shaded_too_and_later_passes_replay_the_first(rgb):
+    given = sky_above(two_colours, ambient=0.25)
+    given["lamp"] = {"type": "heuristic_directional", "direction": (1, 2, -1)}
+    scene = mi.load_dict(given)
+    given["ball"] = meshes.to_mesh(mi.load_dict(given["ball"]), 24)
+    polygons = mi.load_dict(given)
+    for model in MODELS:
+        integrator = mi.load_dict({"type": "heuristic", "model": model})
+        renderer = Renderer(scene, integrator, 2, model)
+        for seed in (1, 2, 3):
+            smooth = np.array(renderer.render(seed))
+            again = mi.render(scene, integrator=renderer.integrator, spp=2, seed=seed)
+            np.testing.assert_array_equal(smooth, np.array(again))
+        assert renderer.replays
+        for interpolation in ("flat", "gouraud"):
+            found = image(polygons, model, interpolation=interpolation)
+            assert found.mean() == pytest.approx(smooth.mean(), rel=0.03), (model, interpolation)
+
+
+def test_a_prepared_parameter_prepares_again_where_it_changes(rgb, monkeypatch):
+    resolutions, right = [], shadow_maps.light_map
+    monkeypatch.setattr(
+        shadow_maps, "light_map", lambda *given: resolutions.append(given[2]) or right(*given)
+    )
+    scene = integrating_sphere(0.5)
+    scene["integrator"] = {"type": "heuristic", "model": "shadow-map", "resolution": 32.0}
+    scene = mi.load_dict(scene)
+    for resolution in (32.0, 64.0):
+        parameters = mi.traverse(scene)
+        parameters["integrator.resolution"] = resolution
+        parameters.update()
+        for _ in range(2):
+            mi.render(scene, spp=1)
+    assert resolutions == [32, 64]
+    assert scene.integrator().preparation > 0

@@ -1,0 +1,173 @@
+"""Attribution on numbers: Shapley values, errors without noise, and dominating effects."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import LEADING
+from comparisons.departure.regions import Region
+from comparisons.hybrids.attribution import ErrorMeter, shares
+from comparisons.hybrids.dominance import LEAST, NONE, UNCOUNTED, dominating, in_region
+from comparisons.hybrids.hybrids import subsets
+from reference.rendering.sums import Estimate
+
+# -- Shapley values --------------------------------------------------------------------------------
+
+
+def by_definition(players, value):
+    """Shapley's value as the mean gain over all orders, written out."""
+    gains = {player: [] for player in players}
+    for order in permutations(players):
+        for place, player in enumerate(order):
+            before = frozenset(order[:place])
+            gains[player].append(value(before | {player}) - value(before))
+    return [np.mean(gains[player], axis=0) for player in players]
+
+
+def game(players, shape=()):
+    rng = np.random.default_rng(5)
+    return {subset: rng.normal(size=shape) for subset in subsets(players)}.__getitem__
+
+
+def of(players, value, exact=6, orders=48):
+    return shares(players, value, 0, exact, orders)
+
+
+def test_shares_are_the_mean_gains_over_all_orders():
+    for shape in ((), (3, 4)):
+        value = game("abcd", shape)
+        found, errors, orders = of("abcd", value)
+        np.testing.assert_allclose(found, by_definition("abcd", value), atol=1e-12)
+        assert (errors, orders) == ((0.0,) * 4, 0)
+
+
+def test_drawn_shares_lie_within_their_error_and_add_up():
+    players = "abcdefg"
+    for orders in (4, 48):
+        value = game(players)
+        found, errors, drawn = of(players, value, orders=orders)
+        assert drawn == orders
+        whole = value(frozenset(players)) - value(frozenset())
+        assert sum(found) == pytest.approx(whole)
+        assert min(errors) > 0
+        if orders == 48:
+            missed = np.abs(np.subtract(found, by_definition(players, value)))
+            assert (missed < 4 * np.array(errors)).all()
+
+
+def test_a_player_without_influence_gets_nothing_and_equals_share_alike():
+    found, _, _ = of("abc", lambda subset: 6.0 if {"a", "b"} <= subset else 0.0)
+    assert found == pytest.approx((3.0, 3.0, 0.0))
+    assert of((), lambda subset: 1.0)[0] == ()
+
+
+# -- Errors without noise --------------------------------------------------------------------------
+
+SIZE, REPLICATES, NOISE = 32, 8, 0.05
+"""Noise of one replicate, linear, on a grey of 0.3: ΔE2000 of some 4."""
+
+DRAWN = {
+    "normal": lambda rng, shape: rng.normal(size=shape),
+    "skewed": lambda rng, shape: rng.exponential(size=shape) - 1,
+}
+
+
+def without_noise(rng, draw, value):
+    """Return errors (R + 1,) of images of a value, against a noisy reference of 0.3."""
+
+    def noisy(value):
+        noise = draw(rng, (REPLICATES, SIZE, SIZE, 1))
+        return np.broadcast_to(value, (SIZE, SIZE, 3)) + NOISE * noise * np.ones(3)
+
+    groups = noisy(0.3)
+    error = groups.std(axis=0, ddof=1) / np.sqrt(REPLICATES)
+    reference = Estimate(groups.mean(axis=0), error, error, REPLICATES)
+    everywhere = np.ones((SIZE, SIZE), bool)
+    meter = ErrorMeter(reference, everywhere, DEFAULT_VIEWING, groups=groups)
+    return meter.without_noise(noisy(value)).mean(axis=1), meter.floor
+
+
+def true(value):
+    pixel = LEADING(np.full((1, 1, 3), value), np.full((1, 1, 3), 0.3), DEFAULT_VIEWING)
+    return float(pixel[0, 0])
+
+
+@pytest.mark.guarantee(
+    "attribution",
+    "Errors behind attributions exclude noise: none of it remains where nothing differs, and at "
+    "most two fifths near the noise.",
+)
+@pytest.mark.parametrize("draw", DRAWN.values(), ids=DRAWN)
+def test_noise_is_taken_out_at_any_departure(draw):
+    """Departures of 0, under the noise, and far above it; two fifths are left at most."""
+    rng = np.random.default_rng(3)
+    for value, share in ((0.3, 0.25), (0.31, 0.4), (0.36, 0.25)):
+        found = [without_noise(rng, draw, value) for _ in range(12)]
+        floor = found[0][1]
+        assert floor > 1
+        left = abs(np.mean([errors[0] for errors, _ in found]) - true(value))
+        assert left < share * floor, value
+
+
+def test_the_jackknife_tells_the_spread():
+    rng = np.random.default_rng(5)
+    repeats = [without_noise(rng, DRAWN["normal"], 0.33)[0] for _ in range(40)]
+    found = np.array([values[0] for values in repeats])
+    stated = [np.sqrt((REPLICATES - 1) * values[1:].var()) for values in repeats]
+    assert 0.8 * found.std() < np.sqrt(np.mean(np.square(stated))) < 2.5 * found.std()
+
+
+def test_without_noise_errors_are_the_metrics():
+    found, floor = without_noise(np.random.default_rng(1), lambda rng, shape: np.zeros(shape), 0.36)
+    np.testing.assert_allclose(found, true(0.36), rtol=1e-6)
+    assert floor == 0
+
+
+# -- Dominating effects ----------------------------------------------------------------------------
+
+ALL = np.ones((4, 6), bool)
+
+
+def maps(**values):
+    return {name: np.full((4, 6), value, float) for name, value in values.items()}
+
+
+def region(x, y, width, height):
+    return Region(x=x, y=y, width=width, height=height, share=0.5, mean_dE2000=1.0)
+
+
+def test_the_largest_dominates_where_it_can_be_seen():
+    effects = maps(shadow=2.0, gloss=1.5)
+    effects["gloss"][:, 3:] = 3.0
+    effects["shadow"][0] = effects["gloss"][0] = LEAST / 2
+    counted = ALL.copy()
+    counted[3] = False
+    found = dominating(effects, counted)
+    assert (found[0] == NONE).all()
+    assert (found[1:3] == [0, 0, 0, 1, 1, 1]).all()
+    assert (found[3] == UNCOUNTED).all()
+    assert (dominating(maps(shadow=-9.0, gloss=1.1), ALL) == 1).all()
+    assert (dominating({}, ALL) == NONE).all()
+
+
+def test_a_region_of_a_larger_image_is_found_in_the_smaller_map():
+    effects = maps(shadow=0.0, gloss=2.0)
+    effects["shadow"][2:, 3:] = 8.0
+    size = (60, 40)
+    assert in_region(region(30, 20, 30, 20), size, effects) == "shadow"
+    assert in_region(region(0, 0, 30, 20), size, effects) == "gloss"
+    assert in_region(region(59, 39, 1, 1), size, effects) == "shadow"
+
+
+def test_a_second_effect_is_named_where_it_removes_half_as_much():
+    box = region(0, 0, 6, 4)
+    for values, expected in (
+        ({"a": 4.0, "b": 2.0, "c": 1.0}, "a, then b"),
+        ({"a": 4.0, "b": 1.9}, "a"),
+        ({"a": 1.2, "b": 0.9}, "a"),  # what cannot be seen is not named
+        ({"a": 0.9}, None),
+        ({}, None),
+    ):
+        assert in_region(box, (6, 4), maps(**values)) == expected

@@ -1,0 +1,366 @@
+"""Checks, gates and what CI reads of them: exit codes, JUnit, Markdown, and what they replace."""
+
+import json
+import re
+import shutil
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import click
+import jsonschema
+import numpy as np
+import OpenEXR
+import pytest
+from msgspec import structs
+
+from comparisons.check.measurement import HALVES, MeasuredScene, measurement
+from comparisons.check.moved import Check, Move, differences, moved
+from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import METRICS
+from comparisons.departure.noise import ShareInterval
+from reference.rendering.gbuffer import ObjectIds
+from reports.ci import checks, gates, summary
+from tests import records
+from tests.programs import command_line
+from tests.schemas import schema
+from tests.small_baselines import FAST, change
+from tests.small_scene import SCENE
+
+SMALL = ("--spp", 4, "--resolution", "12x8")
+
+# --- Gates -----------------------------------------------------------------------------------
+
+
+@pytest.mark.guarantee(
+    "checks",
+    "A gate fails only if the interval's lower end is above its bound.",
+)
+def test_a_gate_fails_only_where_noise_is_no_reason():
+    made = records.record()
+    between = {"2": ShareInterval(low=0.3, high=0.5)}
+    lead = structs.replace(made.metrics["dE2000"], low=0.3, high=0.5, visible_between=between)
+    record = structs.replace(made, metrics=made.metrics | {"dE2000": lead})
+    states = {0.2: "failed", 0.3: "undetermined", 0.4: "undetermined", 0.5: "passed"}
+    for bound, state in states.items():
+        assert [gate.state for gate in gates.evaluate([record], bound, bound)] == [state] * 2
+    assert gates.evaluate([record], None, None) == []
+    (only,) = gates.evaluate([record], None, 0.1)
+    assert only.name == "above ΔE2000 2"
+
+
+def test_percentages_are_read_with_their_sign():
+    read = gates.Percentage().convert
+    words = {"5%": 0.05, "0%": 0, "100 %": 1, " 2.5% ": 0.025}
+    assert {word: read(word, None, None) for word in words} == pytest.approx(words)
+    for word in ("5", "0.05", "-1%", "101%", "nan%", "inf%", "%", "5%%", "5%x", ""):
+        with pytest.raises(click.BadParameter, match="from 0% to 100%, such as 5%"):
+            read(word, None, None)
+
+
+def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
+    assert two_scenes.code == 1
+    assert "gates: 2 failed" in two_scenes.printed
+    suite = ElementTree.parse(two_scenes.folder / "j.xml").getroot().find("testsuite")
+    assert (suite.get("tests"), suite.get("failures")) == ("4", "2")
+    assert "at most 1.00 allowed" in suite.find("testcase/failure").get("message")
+    text = (two_scenes.folder / "s.md").read_text(encoding="utf-8")
+    assert "| failed |" in text
+    assert f"`{two_scenes.out / 'index.html'}`" in text
+
+
+# --- Checks ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def failure(made_baselines, tmp_path_factory):
+    """A check of two baselines, one of which moved, and then one of which none did."""
+    folder = tmp_path_factory.mktemp("failed")
+    baselines = shutil.copytree(made_baselines, folder / "baselines")
+    change(baselines / "fig-8-6b.json")
+    (baselines / "broken.json").write_text("{", encoding="utf-8")
+    words = ("check", baselines, "-o", folder / "out")
+    files = ("--junit", folder / "j.xml", "--summary", folder / "s.md")
+    code, printed, messages = command_line(*words, *files)
+    shutil.copytree(folder / "out", folder / "kept")
+    (baselines / "broken.json").unlink()
+    change(baselines / "fig-8-6b.json", factor=1 / 1.5)
+    again = command_line(*words, "--seed", 7)
+    return SimpleNamespace(
+        folder=folder, baselines=baselines, code=code, printed=printed, messages=messages,
+        out=folder / "kept/check", again=again,
+    )  # fmt: skip
+
+
+def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
+    assert failure.code == 2, "one baseline could not be read"
+    assert "1 of 3 moved" in failure.printed
+    assert "1 could not be checked" in failure.printed
+    assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
+    accepting = f"fotismos check {failure.baselines / 'fig-8-6b.json'} --update"
+    assert accepting in failure.printed
+    assert re.search(r"error: .*broken\.json: this is not JSON", failure.messages)
+
+
+@pytest.mark.guarantee(
+    "checks", "A failure writes one page: before, now, where, on which object, and why."
+)
+def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
+    html = (failure.out / "index.html").read_text(encoding="utf-8")
+    for part in (
+        "1 of 3 moved", "Only the reference moved", "row 2, column 3", "sphere",
+        "reference R, block 2,3", "reference, before", "If this change is intended", "--update",
+    ):  # fmt: skip
+        assert part in html, part
+    names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
+    assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
+    record = json.loads((failure.out / "fig-8-6b/check.json").read_text(encoding="utf-8"))
+    assert record["objects"]["reference"]["sphere"] > 0.9
+    assert record["causes"][0].startswith("Only the reference moved")
+    (move,) = record["moved"]
+    assert (move["half"], move["block"]) == ("reference", [2, 3])
+    assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
+    assert record["tested"] == len(METRICS) + 1 + 2 * 3 * (1 + 4 * 4)  # halves, channels, blocks
+
+
+def test_once_it_passes_nothing_speaks_of_the_failure(failure):
+    code, printed, messages = failure.again
+    assert (code, messages) == (0, "")
+    assert "2 of 2 unmoved" in printed
+    assert list((failure.folder / "out").iterdir()) == []
+
+
+def test_ci_reads_what_moved_and_what_was_not_checked(failure):
+    suite = ElementTree.parse(failure.folder / "j.xml").getroot().find("testsuite")
+    assert [suite.get(key) for key in ("tests", "failures", "errors")] == ["3", "1", "1"]
+    (message,) = suite.findall("testcase/failure")
+    assert message.get("message").startswith("reference R, block 2,3 moved from ")
+    assert "standard errors" in message.text
+    text = (failure.folder / "s.md").read_text(encoding="utf-8")
+    assert "| fig-8-6b | failed | reference R, block 2,3 (1 in all) |" in text
+    assert f"`{failure.folder / 'out/check/index.html'}`" in text
+
+
+def test_json_follows_its_schema_and_a_lost_metric_is_not_tested(run, baselines_folder, tmp_path):
+    path = baselines_folder / "fig-8-6a.json"
+    data = json.loads(path.read_text(encoding="utf-8"))
+    jsonschema.validate(data, schema("baseline"))
+    for name in ("ldr_flip", "hdr_flip"):
+        del data["metrics"][name]
+    path.write_text(json.dumps(data), encoding="utf-8")
+    code, printed, _ = run("check", path, "--json", "-o", tmp_path / "out")
+    found = json.loads(printed)
+    jsonschema.validate(found, schema("check"))
+    assert (code, set(found["checks"][0]["metrics"])) == (0, set(data["metrics"]))
+
+
+def test_names_that_xml_and_utf_8_forbid_are_shown():
+    move = Move("dE2000", None, None, 2.0, 3.0, 0.1, 9.0, 1e-8, 1e-7)
+    made = checks.CheckRecord(
+        baseline="a\x00\udcff<b>.json", scene="s", status="failed", seconds=1.0, moved=(move,)
+    )
+    case = ElementTree.fromstring(summary.junit_of_checks([made])).find("testsuite/testcase")
+    assert case.get("name") == "a��<b>"
+    assert "x00" in summary.of_checks([made], 0.01, "").encode().decode()
+
+
+def test_bad_words_are_refused(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("empty", "a", "b"):
+        (tmp_path / name).mkdir()
+    for name in ("a/x.xml", "b/x.xml"):
+        (tmp_path / name).write_text(SCENE, encoding="utf-8")
+    for words, expected in {
+        ("check", "nix.json"): "no such baseline",
+        ("check", "empty"): "no baseline",
+        ("check", "nix.json", "--update"): "--scene",
+        ("check", "nix.json", "--update", "--scene", "fig-0"): "'fig-0' is neither",
+        ("check", "n.json", "--update", "--scene", "fig-8-6a", "--scene", "a/x.xml"): "one --scene",
+        ("check", "new", "--update", "--scene", "a/x.xml", "--scene", "b/x.xml"): "one name",
+        ("check", "nix.json", "--spp", "4"): "--spp.*--update",
+        ("check", "nix.json", "--scene", "fig-8-6b"): "--scene.*--update",
+        ("check", "nix.json", "--significance", "nan"): "range",
+        ("compare", "fig-8-9", "--max-mean", "nan"): "range",
+        ("compare", "fig-8-9", "--max-visible", "5"): "such as 5%",
+    }.items():
+        code, _, messages = run(*words)
+        assert (code, bool(re.search(expected, messages))) == (2, True), (words, messages)
+        assert "Traceback" not in messages
+
+
+# --- Updates ---------------------------------------------------------------------------------
+
+
+def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
+    whole = {path.name: path.read_bytes() for path in baselines_folder.iterdir()}
+    change(baselines_folder / "fig-8-6b.json")
+    code, printed, _ = run("check", baselines_folder, "--update")
+    assert code == 0
+    assert "fig-8-6b: updated" in printed
+    assert "reference R, block 2,3" in printed
+    assert "1 of 2 baselines written" in printed
+    assert {path.name: path.read_bytes() for path in baselines_folder.iterdir()} == whole
+
+
+def test_other_options_and_a_named_scene_write_a_baseline_anew(run, baselines_folder):
+    path = baselines_folder / "fig-8-6b.json"
+    assert run("check", path, "--update", "--pairing", "literal", "--seed", 4)[0] == 0
+    options = json.loads(path.read_text(encoding="utf-8"))["options"]
+    assert (options["pairing"], options["seed"]) == ("literal", 4)
+    assert (options["spp"], options["resolution"]) == (32, [16, 12])
+    path.write_text("{", encoding="utf-8")
+    code, _, messages = run("check", path, "--update")
+    assert (code, "--update --scene" in messages) == (2, True)
+    assert run("check", path, "--update", "--scene", "fig-8-6b", *FAST)[0] == 0
+
+
+def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.xml").write_text(SCENE, encoding="utf-8")
+    assert run("check", "base", "--update", "--scene", "a/x.xml", *FAST)[0] == 0
+    before = (tmp_path / "base/x.json").read_bytes()
+    assert json.loads(before)["scene"] == "../a/x.xml", "found from anywhere"
+    code, _, messages = run("check", "base", "--update", "--scene", "b/x.xml", *FAST)
+    assert (code, (tmp_path / "base/x.json").read_bytes()) == (2, before)
+    assert "the baseline of ../a/x.xml, not of b/x.xml" in messages
+    other = tmp_path / "package.json"
+    for text in ('{"name": "mine"}', "[]", "mine"):
+        other.write_text(text)
+        assert run("check", other, "--update", "--scene", "a/x.xml", *FAST)[0] == 2
+        assert other.read_text() == text
+
+
+# --- Causes ----------------------------------------------------------------------------------
+
+
+def check_of(heuristic=lambda image: image, reference=lambda image: image):
+    """Return a check of halves that were changed by functions of images (16, 16, 3)."""
+    rng = np.random.default_rng(0)
+    before = rng.uniform(0.3, 0.7, (2, 16, 16, 3)) + 1e-4 * rng.normal(size=(4, 2, 16, 16, 3))
+    after = np.stack(
+        [[heuristic(one[0].copy()), reference(one[1].copy())] for one in before]
+    ) + 1e-4 * rng.normal(size=before.shape)
+    sides = [
+        measurement(each, np.ones((16, 16), bool), DEFAULT_VIEWING) for each in (before, after)
+    ]
+    moves = differences(*sides)
+    pictures = dict(zip(HALVES, after.mean(axis=0), strict=True))
+    now = MeasuredScene(sides[1], pictures, 4, None)
+    return Check(sides[0], now, moves, tuple(moved(moves)), 0.01)
+
+
+def redder(image):
+    image[4:8, 8:12, 0] *= 1.5
+    return image
+
+
+def test_causes_name_the_half_the_place_the_colour_and_the_object():
+    found = check_of(reference=redder)
+    causes = " ".join(found.causes())
+    assert "Only the reference moved" in causes
+    assert "in 1 of 16 blocks, most in row 2, column 3." in causes
+    assert "Only red moved in the reference" in causes
+    level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
+    assert "1.3 times the light everywhere" in level
+    assert "look at a colour" not in level
+    assert check_of(redder, redder).causes()[0].startswith("Both halves moved: look at what")
+    places = np.zeros((16, 16), int)
+    places[4:8, 8:10] = 1  # half of the block that moved
+    found = Check(**vars(found) | {"seen": ObjectIds(places, ("wall", "lamp"))})
+    assert found.objects("reference") == pytest.approx({"wall": 0.5, "lamp": 0.5}, abs=0.01)
+    before = found.now.pictures["reference"].copy()
+    before[places == 1] -= 0.1
+    assert found.objects("reference", before) == pytest.approx({"lamp": 1.0})
+
+
+# --- Files of others -------------------------------------------------------------------------
+
+
+@pytest.mark.guarantee(
+    "runs",
+    "--junit, --summary and --images replace nothing that fotismos did not make, and no input.",
+)
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [("--junit", "a.xml"), ("--summary", "a.xml"), ("--junit", "mine.txt"), ("--summary", "b.md")],
+)
+def test_a_file_of_others_is_not_replaced_by_compare(option, name, run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = {"a.xml": SCENE, "mine.txt": "mine", "b.md": SCENE}
+    for each, text in files.items():
+        (tmp_path / each).write_text(text)
+    scene = "b.xml" if name == "b.md" else "a.xml"
+    if name == "b.md":  # a link to an input
+        (tmp_path / "b.xml").symlink_to("b.md")
+    code, _, messages = run("compare", scene, *SMALL, option, name)
+    assert code == 2
+    assert f"{option} {name}: " in messages
+    assert {each: (tmp_path / each).read_text() for each in files} == files
+    assert not (tmp_path / "out").exists(), "refused before anything is rendered"
+
+
+def test_a_baseline_is_not_replaced_by_its_report(run, made_baselines, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(made_baselines / "fig-8-6b.json", "b.json")
+    before = (tmp_path / "b.json").read_bytes()
+    for option in ("--junit", "--summary"):
+        code, _, messages = run("check", "b.json", option, "b.json")
+        assert code == 2
+        assert f"{option} b.json: " in messages
+        assert (tmp_path / "b.json").read_bytes() == before
+
+
+def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "b.exr").write_bytes(b"mine")
+    words = ("check", "b.json", "--update", "--scene", "fig-8-6b", "--images", *SMALL)
+    code, _, messages = run(*words)
+    assert code == 2
+    assert "b.exr" in messages
+    assert (tmp_path / "b.exr").read_bytes() == b"mine"
+    (tmp_path / "b.exr").unlink()
+    for seed in range(2):  # its own are
+        assert run(*words, "--seed", seed)[0] == 0
+        with OpenEXR.File("b.exr", separate_channels=True) as file:
+            assert "baseline.reference.R" in file.channels()
+
+
+def test_a_report_replaces_an_earlier_one_and_a_summary_is_appended(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.xml").write_text(SCENE)
+    (tmp_path / "s.md").write_text("before\n")
+    words = ("compare", "a.xml", *SMALL, "--max-mean", 100, "--junit", "j.xml", "--summary", "s.md")
+    for count in (1, 2):
+        assert run(*words)[0] == 0
+        assert (tmp_path / "j.xml").read_text().count("<testcase") == 1
+        text = (tmp_path / "s.md").read_text()
+        assert text.startswith("before\n")
+        assert text.count("### fotismos compare") == count
+
+
+@pytest.mark.guarantee(
+    "runs",
+    "Names and messages from a scene reach a terminal, a CI log, Markdown and spreadsheets as"
+    " text: no escape sequence, command, markup or formula of theirs is executed.",
+)
+def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary"))
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    hidden = "z&#10;::stop-commands::x&#x9b;31m"
+    text = SCENE.replace('<bsdf type="roughplastic"', f'<bsdf type="roughplastic" id="{hidden}"')
+    text = text.replace('<shape type="sphere"', '<shape type="sphere" id="=1+1"', 1)
+    assert text.count(hidden) == 1
+    for name, content in (("*a*|b.xml", text), ("bad.xml", text.replace('"path"', f'"{hidden}"'))):
+        (tmp_path / name).write_text(content)
+        _, printed, messages = run("compare", name, *SMALL, "-v", "-o", "out", "--summary", "s.md")
+        for line in (printed + messages).split("\n"):
+            assert not line.lstrip().startswith("::")
+            assert "\x9b" not in line
+    assert "stop-commands" in messages
+    assert "\\*a\\*\\|b" in (tmp_path / "out/tables/metrics.md").read_text()
+    assert "\\*a\\*\\|b" in (tmp_path / "s.md").read_text()
+    csv = (tmp_path / "out/tables/carriers.csv").read_text()
+    assert "=1+1" in csv
+    assert ",=1+1" not in csv

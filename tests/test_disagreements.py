@@ -1,0 +1,166 @@
+"""Scenes in which Mitsuba's integrators disagree: what the plan renders, and what is said of it."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.compare import compare
+from comparisons.options import Options
+from comparisons.prepared import prepare
+from reference.planning.facts import Facts
+from reference.planning.rules import LIGHT_BY_LIGHT
+from reference.rendering.passes import pass_seed
+from reference.scene.source import Source
+from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
+
+PASSES = 8
+
+
+def estimate(render):
+    """The mean of passes over all pixels, and its standard error."""
+    passes = [float(np.mean(np.array(render(pass_seed(0, number))))) for number in range(PASSES)]
+    return np.mean(passes), np.std(passes, ddof=1) / PASSES**0.5
+
+
+def stock(description, spp=256):
+    made = mi.load_dict(description, optimize=False)
+    return estimate(lambda seed: mi.render(made, spp=spp, seed=seed))
+
+
+def planned(description, spp=256):
+    """The plan of a scene, and the mean of its reference."""
+    made = prepare(Source("a test", description), Options(spp=spp * PASSES))
+    made.reference.spp = spp
+    return made, estimate(made.reference.render)
+
+
+def agree(one, other):
+    (mean, error), (expected, noise) = one, other
+    return bool(abs(mean - expected) < 0.001 * expected + 4 * np.hypot(error, noise))
+
+
+# --- Mesh lamps ------------------------------------------------------------------------------
+
+
+def lit_by_meshes(folder, face_normals):
+    """Two octahedra that shine on a floor."""
+    turned = mi.ScalarTransform4f()
+    found = {"floor": {"type": "rectangle", "bsdf": DIFFUSE, "to_world": turned.scale(4)}}
+    for number, x in enumerate((-1.2, 1.2)):
+        found[f"lamp{number}"] = {
+            "type": "ply",
+            "filename": str(octahedron(folder / "lamp.ply")),
+            "face_normals": face_normals,
+            "to_world": turned.translate((x, 0, 0.7)).rotate((1, 1, 0), 25).scale((0.3, 0.7, 0.2)),
+            "emitter": {"type": "area", "radiance": 4.0},
+            "bsdf": BLACK,
+        }
+    return scene((0, -5, 3), integrator="direct", **found)
+
+
+@pytest.mark.guarantee(
+    "plans",
+    "Mesh lamps whose shading normals differ from their true ones are left to the scene's own"
+    " integrator, because Mitsuba's two ways to find their light disagree.",
+)
+@pytest.mark.parametrize("face_normals", [True, False])
+def test_the_light_of_a_mesh_with_smooth_normals_is_stock_mitsubas(rgb, tmp_path, face_normals):
+    described = lit_by_meshes(tmp_path, face_normals)
+    ways = [
+        described | {"integrator": {"type": "direct", "hide_emitters": True, way: 0}}
+        for way in ("bsdf_samples", "emitter_samples")
+    ]
+    assert agree(*map(stock, ways)) is face_normals
+    described["point"] = lamp((0, 0, 2.5), 2.0)
+    made, found = planned(described)
+    facts = Facts.of(made.pair, made.scene)
+    assert LIGHT_BY_LIGHT.check(facts).applies is face_normals
+    assert agree(found, stock(described))
+
+
+# --- Hidden lamps ----------------------------------------------------------------------------
+
+
+def behind_a_lamp(shape, integrator, near_clip=None):
+    """A shape behind a large lamp, which is hidden, or behind the near clip plane."""
+    towards_it = mi.ScalarTransform4f().look_at((0, -2, 0), (0, 0, 0), (0, 0, 1))
+    return scene(
+        integrator={"type": integrator, "hide_emitters": near_clip is None},
+        camera={"near_clip": near_clip} if near_clip else {},
+        body={"bsdf": DIFFUSE, **shape},
+        lamp={
+            "type": "rectangle",
+            "to_world": towards_it.scale(1.5),
+            "bsdf": BLACK,
+            "emitter": {"type": "area", "radiance": 4.0},
+        },
+    )
+
+
+@pytest.mark.guarantee(
+    "plans", "What the camera sees through a hidden lamp is lit right, whatever its shape."
+)
+@pytest.mark.parametrize("plugin", ["disk", "sphere", "cylinder", "rectangle"])
+def test_a_shape_seen_through_a_hidden_lamp_is_as_bright_as_without_looking_through(rgb, plugin):
+    to_world = mi.ScalarTransform4f().look_at((0, 0, 0), (0, -4, 0), (0, 0, 1))
+    shape = {"type": plugin, "to_world": to_world} if plugin in ("disk", "rectangle") else {}
+    shape = shape or {"type": plugin}
+    truth = stock(behind_a_lamp(shape, "path", near_clip=2.5))
+    for integrator in ("path", "direct", "volpath"):
+        described = behind_a_lamp(shape, integrator)
+        made, found = planned(described)
+        if integrator != "direct" or plugin != "cylinder":  # its inside is lit by itself
+            assert agree(found, truth), (integrator, made.plan.integrator, found, truth)
+        whole = planned_whole(described)
+        assert agree(whole, found), (integrator, whole, found)
+
+
+def planned_whole(description, spp=256):
+    made = prepare(Source("a test", description), Options(spp=spp * PASSES, everything=True))
+    made.reference.spp = spp
+    return estimate(made.reference.render)
+
+
+# --- Settings of the scene's own integrator --------------------------------------------------
+
+
+def mirrored(integrator, sampling_weight=1.0):
+    """A mirror that shows a lamp, on a floor."""
+    mirror = mi.ScalarTransform4f().look_at((0, 1, 0), (0, -4, 0), (0, 0, 1))
+    above = mi.ScalarTransform4f().look_at((0, -2, 1.5), (0, 1, 0), (0, 1, 0)).scale(0.7)
+    emitter = {"type": "area", "radiance": 4.0, "sampling_weight": sampling_weight}
+    return scene(
+        integrator=integrator,
+        mirror={"type": "rectangle", "to_world": mirror, "bsdf": {"type": "conductor"}},
+        lamp={"type": "rectangle", "to_world": above, "bsdf": BLACK, "emitter": emitter},
+        point=lamp((0, -3, 0)),
+        floor={
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
+            "bsdf": DIFFUSE,
+        },
+    )
+
+
+def overridden(description):
+    record = compare(Source("a test", description), Options(spp=16)).record
+    return {entry.what: (entry.given, entry.used) for entry in record.overridden}
+
+
+@pytest.mark.guarantee(
+    "plans", "Settings of the scene's integrator that the plan does not use are named."
+)
+def test_samples_of_direct_and_weights_that_change_the_light_are_named(rgb):
+    given = {"type": "direct", "bsdf_samples": 0, "emitter_samples": 4}
+    found = overridden(mirrored(given))
+    assert (found["bsdf_samples"][0], found["emitter_samples"][0]) == ("0", "4")
+    assert overridden(mirrored({"type": "direct"})) == {}
+    assert overridden(mirrored({"type": "direct", "shading_samples": 1})) == {}
+    found = overridden(mirrored({"type": "path"}, sampling_weight=0.0))
+    assert found["sampling_weight of lamp"] == ("0", "1")
+
+
+@pytest.mark.parametrize("integrator", ["path", "direct"])
+def test_a_light_without_a_weight_shines_like_any_other(rgb, integrator):
+    _, found = planned(mirrored({"type": integrator}, sampling_weight=0.0))
+    assert agree(found, stock(mirrored({"type": integrator})))

@@ -1,0 +1,238 @@
+"""Files of results: layers that two readers read back, pictures, and tables with all numbers."""
+
+import csv
+import json
+from io import BytesIO, StringIO
+
+import mitsuba as mi
+import numpy as np
+import OpenEXR
+import pytest
+from markdown_it import MarkdownIt
+from msgspec import structs
+from PIL import Image
+
+from comparisons.cost.cost_record import Seconds
+from comparisons.departure.metrics import METRICS, RATIO, drawn
+from comparisons.hybrids.attribution import Contribution, MeanError, ObjectContribution
+from heuristic.errors import InputError
+from reference.records import Estimated, plain
+from reports.files import exr, images
+from reports.terminal import tables
+from tests import cost_records, records
+
+CONTRACT = {
+    *(f"heuristic.{c}" for c in "RGB"),
+    *(f"reference.{c}" for c in "RGB"),
+    *(f"reference_stderr.{c}" for c in "RGB"),
+    *(f"P.{c}" for c in "XYZ"),
+    *(f"N.{c}" for c in "XYZ"),
+    *(f"{map_}.Y" for map_ in ("dE2000", "dE_ITP", "dE_CAM16UCS", "significant")),
+}
+
+
+@pytest.fixture
+def layers():
+    rng = np.random.default_rng(0)
+    images = {name: rng.normal(0, 3, (5, 7, 3)) for name in sorted(exr.FULL_PRECISION)}
+    maps = {name: 40 * rng.random((5, 7)) for name in ("dE2000", "dE_ITP", "dE_CAM16UCS")}
+    return images | maps | {"significant": rng.random((5, 7)) > 0.5}
+
+
+def read(path):
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return dict(file.header()), {name: c.pixels.copy() for name, c in file.channels().items()}
+
+
+def test_openexr_reads_back_what_was_written(tmp_path, layers):
+    path = tmp_path / "comparison.exr"
+    exr.write(path, layers, {"seed": "3", "fotismos": "1.0", "scene": "fig-8-9 <φ>"})
+    header, channels = read(path)
+    assert set(channels) == CONTRACT
+    for name, image in layers.items():
+        suffixes = "Y" if image.ndim == 2 else "XYZ" if name in exr.VECTORS else "RGB"
+        for index, suffix in enumerate(suffixes):
+            got = channels[f"{name}.{suffix}"]
+            expected = image[..., index] if image.ndim == 3 else image
+            if name in exr.FULL_PRECISION:
+                assert got.dtype == np.float32
+                np.testing.assert_array_equal(got, expected.astype(np.float32))
+            else:
+                assert got.dtype == np.float16
+                np.testing.assert_allclose(got, expected, rtol=2**-11)
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    np.testing.assert_allclose(header["chromaticities"], exr.BT709, rtol=1e-6)
+    assert (header["seed"], header["fotismos"]) == ("3", "1.0")
+    assert header["scene"] == "fig-8-9 <φ>"
+    # tev and Blender split a name at its last dot, and take a second one for a group.
+    assert {name.count(".") for name in channels} == {1}
+    earlier = path.read_bytes()
+    with pytest.raises(InputError, match="shape"):
+        exr.write(path, {"a": np.zeros((2, 2, 4))}, {})
+    with pytest.raises(InputError, match=r"\(3, 3\)"):
+        exr.write(path, {"a": np.zeros((2, 2)), "b": np.zeros((3, 3))}, {})
+    assert path.read_bytes() == earlier
+    assert [file.name for file in tmp_path.iterdir()] == ["comparison.exr"]
+
+
+def test_mitsuba_splits_it_into_layers(tmp_path, layers):
+    path = tmp_path / "comparison.exr"
+    exr.write(path, layers, {})
+    formats = {
+        **dict.fromkeys(("heuristic", "reference", "reference_stderr"), mi.Bitmap.PixelFormat.RGB),
+        **dict.fromkeys(("P", "N"), mi.Bitmap.PixelFormat.XYZ),
+        **dict.fromkeys(("dE2000", "dE_ITP", "dE_CAM16UCS"), mi.Bitmap.PixelFormat.Y),
+        "significant": mi.Bitmap.PixelFormat.Y,
+    }
+    split = dict(mi.Bitmap(str(path)).split())
+    assert {name: part.pixel_format() for name, part in split.items()} == formats
+    for name in sorted(exr.FULL_PRECISION):
+        np.testing.assert_array_equal(np.array(split[name]), layers[name].astype(np.float32))
+    for name in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
+        np.testing.assert_allclose(np.array(split[name]).squeeze(), layers[name], rtol=2**-11)
+
+
+def test_a_value_beyond_half_stays_finite(tmp_path):
+    path = tmp_path / "large.exr"
+    exr.write(path, {"a": np.full((2, 2), 70_000.0), "b": np.full((2, 2), -65_504.0)}, {})
+    channels = read(path)[1]
+    assert channels["a.Y"].dtype == np.float32
+    assert channels["b.Y"].dtype == np.float16
+    assert channels["a.Y"].max() == 70_000.0
+    assert channels["b.Y"].min() == -65_504.0
+
+
+# --- Pictures --------------------------------------------------------------------------------
+
+
+def pixels_of(picture):
+    return np.asarray(picture.convert("RGB"))
+
+
+def decode(png):
+    with Image.open(BytesIO(png)) as image:
+        return pixels_of(image)
+
+
+def test_tonemap_is_the_srgb_curve():
+    linear = np.array([[[-1.0, 0.0, 0.0031308], [0.21586, 0.5, 1.0], [1e6, 0.04, 0.002]]])
+    # IEC 61966-2-1: 0.21586 is the linear value of 128/255.
+    expected = [[[0, 0, 10], [128, 188, 255], [255, 56, 7]]]
+    np.testing.assert_array_equal(pixels_of(images.tonemap(linear)), expected)
+    np.testing.assert_array_equal(pixels_of(images.tonemap(linear / 8, exposure=8)), expected)
+
+
+def test_png_keeps_small_images_and_shrinks_large_ones_on_request():
+    pixels = np.random.default_rng(0).integers(0, 256, (6, 9, 3), dtype=np.uint8)
+    picture = Image.fromarray(pixels)
+    np.testing.assert_array_equal(decode(images.png(picture)), pixels)
+    np.testing.assert_array_equal(decode(images.png(picture, longest=9)), pixels)
+    assert images.png(picture) == images.png(picture)
+    large = images.error_map(np.zeros((40, 100)), 1.0)
+    assert decode(images.png(large)).shape == (40, 100, 3)
+    assert decode(images.png(large, longest=50)).shape == (20, 50, 3)
+
+
+def test_error_map_spans_magma_and_stays_in_it():
+    row = pixels_of(images.error_map([[0.0, 10.0, 20.0, 500.0, -1.0]], 20.0))[0]
+    assert images.css_colour(row[0]) == "#000004"
+    assert images.css_colour(row[2]) == "#fcfdbf"
+    np.testing.assert_array_equal(row[3], row[2])
+    np.testing.assert_array_equal(row[4], row[0])
+    assert row[0].sum() < row[1].sum() < row[2].sum()
+
+
+def test_signed_map_is_blue_below_red_above_and_pale_at_zero():
+    below, zero, above = pixels_of(images.signed_map([[-3.0, 0.0, 3.0]], 3.0))[0].astype(int)
+    assert below[2] > below[0] + 50
+    assert above[0] > above[2] + 50
+    assert zero.min() > 240
+
+
+def test_mask_map_has_four_colours():
+    picture = pixels_of(images.mask_map([[1.0, 0.0, 0.5, 0.5]], [[True, True, True, False]]))
+    assert [tuple(map(int, p)) for p in picture[0]] == [
+        images.MARKED,
+        images.UNMARKED,
+        images.UNDETERMINED,
+        images.UNCOUNTED,
+    ]
+
+
+def test_colour_bar_has_the_ends_of_the_map():
+    bar = images.colour_bar("magma")
+    assert bar.startswith("linear-gradient(to right, #000004")
+    assert bar.endswith("#fcfdbf)")
+
+
+def test_pictures_draw_a_map_over_its_printed_range():
+    for name in (*drawn(), RATIO.name):
+        top = RATIO.limit if name == RATIO.name else METRICS[name].map_range[1]
+        made = images.pictures(records.images(1, 2, {name: np.array([[top, 0.99 * top]])}))
+        assert set(made) == {"heuristic", "reference", "significant", *drawn(), RATIO.name}
+        end, below = decode(made[name])[0]
+        last = images.colour_table("RdBu_r" if name == RATIO.name else "magma")[-6:]
+        assert images.css_colour(end) == f"#{last}"
+        assert (below != end).any()
+
+
+# --- Tables ----------------------------------------------------------------------------------
+
+
+def two_records():
+    other = records.data()
+    other["scene"] = 'a "b", c | d'
+    other["metrics"]["dE2000"]["mean"] = 99.5
+    return [records.record(), records.of(other)]
+
+
+def test_csv_holds_every_number_in_full():
+    made = two_records()
+    rows = list(csv.DictReader(StringIO(tables.metrics_csv(made))))
+    assert len(rows) == 2 * len(made[0].metrics)
+    for row in rows:
+        (record,) = [each for each in made if each.scene == row["scene"]]
+        metric = plain(record.metrics[row["metric"]])
+        for name in ("mean", "p50", "p95", "max", "noise_floor"):
+            assert float(row[name]) == metric[name]
+        for part in ("after_exposure", "visible"):
+            for name, value in metric[part].items():
+                assert float(row[f"{part}.{name}"]) == value
+        assert float(row["significant"]) == record.significant.fraction
+    assert {row["visible.5"] for row in rows if row["metric"] == "rmse"} == {""}
+
+
+def test_markdown_is_a_table_with_a_row_a_scene():
+    text = "\n".join(tables.metrics_markdown(two_records()))
+    page = MarkdownIt().enable("table").render(text)
+    assert page.count("<tr>") == 3
+    assert "a &quot;b&quot;, c | d" in page
+    assert "4.33 (3.07; 0.0532)" in page
+
+
+def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
+    amount = Estimated(1.5, 1.25, 1.75)
+    one = Contribution("occlusion", amount, -0.5, 3.0, amount, 0.0)
+    found = cost_records.record()
+    seconds, error = Seconds(0.25, 0.125, 0.5), MeanError(12.75, 12.5, 13.0)
+    point = structs.replace(found.points[0], method="direct", spp=4, seconds=seconds, error=error)
+    whole = structs.replace(found.attribution, effects=(one,))
+    wall = ObjectContribution("wall", 12, 0.75, 2.5, (amount,), 1.0)
+    shown = structs.replace(found, points=(point,), attribution=whole, objects=(wall,))
+    tables.write_cost(tmp_path / "tables", "box", shown)
+    read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
+    parts = ("attribution", "cost", "shapes")
+    assert sorted(read) == [f"box-{part}.{kind}" for part in parts for kind in ("csv", "md")]
+    assert "\nwall,12,0.75,2.5,occlusion,1.5,1.25,1.75\n" in read["box-shapes.csv"]
+    assert "\ndirect,4,0.25,0.125,0.5,12.75,12.5,13.0,yes\n" in read["box-cost.csv"]
+    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-attribution.csv"]
+    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 | 1.50 |" in read["box-attribution.md"]
+
+
+@pytest.mark.parametrize("colour", ["", "1"])
+def test_printed_tables_hold_no_codes_and_fold_long_cells(monkeypatch, colour):
+    monkeypatch.setenv("FORCE_COLOR", colour)
+    lines = list(tables.printed([("scene", "rule"), ("x", "word " * 60)]))
+    assert len(lines) > 2
+    assert max(map(len, lines)) <= tables.WIDTH
+    assert "\x1b" not in json.dumps(lines)

@@ -1,0 +1,315 @@
+"""What fotismos promises about the files of results: fresh, whole, and only its own replaced."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import heuristic.version
+from comparisons import atomic
+from heuristic.errors import InputError, OutputError
+from reports.run import results, scene
+from tests import records
+from tests.programs import ROOT
+from tests.small_scene import SCENE
+
+SMALL = ("--spp", 4, "--resolution", "12x8")
+
+# --- Finished scenes -------------------------------------------------------------------------
+
+
+def rendered(run, scene_file, out, *more):
+    """Whether the same command renders again."""
+    record = out / "my-scene/comparison.json"
+    before = record.stat().st_mtime_ns if record.exists() else None
+    assert run("compare", scene_file, *SMALL, "-o", out, *more)[0] == 0
+    return record.stat().st_mtime_ns != before
+
+
+@pytest.mark.guarantee(
+    "runs",
+    "A finished scene is rendered again once fotismos itself changes, or a file of its results.",
+)
+def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
+    run, scene_file, tmp_path, monkeypatch
+):
+    out = tmp_path / "out"
+    assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
+    record = out / "my-scene/comparison.json"
+    content = record.read_text(encoding="utf-8")
+    mean = str(json.loads(content)["metrics"]["dE2000"]["mean"])
+    record.write_text(content.replace(mean, mean[::-1]), encoding="utf-8")
+    assert record.stat().st_size == len(content.encode())
+    assert rendered(run, scene_file, out)
+    assert mean in record.read_text(encoding="utf-8")
+    record.unlink()
+    assert rendered(run, scene_file, out)
+    with monkeypatch.context() as patched:
+        patched.setattr(heuristic.version, "source_digest", lambda: "terms.diffuse, halved")
+        assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
+    for more in (("--fresh",), ("--seed", 1), ("--noise", 9)):
+        assert rendered(run, scene_file, out, *more)
+    scene_file.write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"), encoding="utf-8")
+    assert rendered(run, scene_file, out, "--noise", 9)
+
+
+def test_a_scene_in_python_is_never_reused(run, tmp_path):
+    path = tmp_path / "my scene.py"
+    path.write_text("import mitsuba as mi\nscene = mi.cornell_box()")
+    out = tmp_path / "out"
+    assert [rendered(run, path, out) for _ in range(2)] == [True, True]
+
+
+def test_the_digest_of_sources_changes_with_them(tmp_path):
+    digests = set()
+    for text in ("a = 1", "a = 2"):
+        (tmp_path / "heuristic").mkdir(exist_ok=True)
+        (tmp_path / "heuristic/terms.py").write_text(text)
+        digests.add(heuristic.version.digest_of(tmp_path))
+    assert len(digests) == 2
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    """A comparison that was not rendered."""
+    return records.comparison()
+
+
+def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
+    view = scene.write(results.own(tmp_path), "a", comparison, key="key")
+    place = tmp_path / "a"
+    assert scene.load(place, "key") == view
+    assert scene.load(place, "another") is None
+    assert scene.load(place, None) is None
+    text = (place / "view.json").read_text(encoding="utf-8")
+    cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
+    for broken in ("", "[]", "{}", text.replace("planes", "plains"), *cuts):
+        (place / "view.json").write_text(broken, encoding="utf-8")
+        assert scene.load(place, "key") is None
+    (place / "view.json").write_text(text, encoding="utf-8")
+    (place / "comparison.exr").unlink()
+    assert scene.load(place, "key") is None
+
+
+class EndedError(Exception):
+    """The end of a process, at a moment."""
+
+
+def test_the_record_is_removed_first_and_written_last(comparison, tmp_path, monkeypatch):
+    """Whichever writing is the last one, an unfinished scene has no record."""
+    folder, replace, count = results.own(tmp_path), Path.replace, 0
+    scene.write(folder, "a", comparison)
+
+    def stopping(path, target):
+        nonlocal count
+        count -= 1
+        if count < 0:
+            raise EndedError
+        assert not (folder / "a/comparison.json").exists()
+        return replace(path, target)
+
+    for moment in range(100):
+        count = moment
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "replace", stopping)
+            try:
+                scene.write(folder, "a", comparison, key="key")
+            except EndedError:
+                assert not (folder / "a/comparison.json").exists()
+                assert scene.load(folder / "a", "key") is None
+            else:
+                break
+    assert moment > 8
+    assert scene.load(folder / "a", "key")
+
+
+# --- Whose it is -----------------------------------------------------------------------------
+
+
+def test_files_of_others_stay_and_ours_are_replaced(tmp_path):
+    with results.hold(tmp_path / "out", "test") as out:
+        results.write(out / "index.html", "old")
+        results.write(results.own(out / "cost") / "cost.json", "old")
+    (out / "mine.txt").write_text("mine")
+    (out / "cost/mine.txt").write_text("mine")
+    with results.hold(out, "test"):
+        results.write(out / "index.html", "new")
+        results.clear(out / "cost", ["cost.json", "none.json"])
+    names = {str(path.relative_to(out)) for path in out.rglob("*")}
+    assert names == {
+        ".fotismos", ".fotismos-lock", "index.html", "mine.txt", "cost", "cost/.fotismos",
+        "cost/mine.txt",
+    }  # fmt: skip
+    assert (out / "index.html").read_text() == "new"
+
+
+@pytest.mark.guarantee(
+    "runs", "Nothing that fotismos did not make is overwritten or deleted in an output folder."
+)
+@pytest.mark.parametrize("name", ["index.html", "run.json", "tables", "my-scene", "figures"])
+@pytest.mark.parametrize("make", ["file", "folder", "pipe", "link"])
+def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, name, make):
+    place, other = tmp_path / "out" / name, tmp_path / "other"
+    place.parent.mkdir()
+    other.mkdir()
+    (other / "mine.txt").write_text("mine")
+    {
+        "file": lambda: place.write_text("mine"),
+        "folder": lambda: (place.mkdir(), (place / "mine.txt").write_text("mine")),
+        "pipe": lambda: os.mkfifo(place),
+        "link": lambda: place.symlink_to(other),
+    }[make]()
+    code, printed, messages = run("compare", scene_file, "-o", place.parent, *SMALL, "--figures")
+    assert (code, printed) == (2, "")
+    assert messages.startswith(f"fotismos: error: {place}: this ")
+    assert "was not made by fotismos" in messages
+    assert [path.name for path in place.parent.iterdir()] == [name]
+    assert make != "folder" or (place / "mine.txt").read_text() == "mine"
+    assert [path.name for path in other.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize("name", [results.MARK, results.LOCK])
+def test_a_mark_or_lock_that_is_no_file_is_refused(name, tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / name).symlink_to(tmp_path / "mine")
+    with (
+        pytest.raises(OutputError, match=r"File exists\. Move away"),
+        results.hold(tmp_path / "out", "test"),
+    ):
+        pass
+    assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_a_command_that_writes_nothing_leaves_nothing(tmp_path):
+    with results.hold(tmp_path / "out", "test") as out:
+        results.own(out / "tables")
+        results.assigned(results.own(out / "cost"), [("a", None)])
+    assert list(out.iterdir()) == []
+
+
+def test_what_killed_commands_left_is_cleared_away(tmp_path):
+    with results.hold(tmp_path, "test") as out:
+        results.write(results.own(out / "a") / "a.png", "whole")
+    ours = [f"{place}.a.png.123{atomic.PARTIAL}" for place in ("", "a/")]
+    (tmp_path / "theirs").mkdir()
+    theirs = f"theirs/.a.png.123{atomic.PARTIAL}"
+    for name in (*ours, theirs):
+        (tmp_path / name).write_text("half")
+    with results.hold(tmp_path, "test"):
+        assert not any((tmp_path / name).exists() for name in ours)
+    assert (tmp_path / theirs).exists()
+    assert (tmp_path / "a/a.png").exists()
+
+
+HOLD = """
+import sys
+from reports.run import results
+with results.hold(sys.argv[1], "fotismos compare mine.xml"):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.guarantee("runs", "Two commands never write to one folder: the second says who does.")
+def test_two_commands_in_one_folder_are_refused(tmp_path):
+    words = [sys.executable, "-P", "-c", HOLD, str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(words, env=environment, text=True, **pipes) as other:
+        assert other.stdout.readline() == "held\n"
+        said = rf"process {other.pid} on .*: fotismos compare mine\.xml\)\. Wait"
+        with pytest.raises(OutputError, match=said), results.hold(tmp_path, "second"):
+            pass
+        other.kill()  # the lock ends with its process
+    with results.hold(tmp_path, "third") as out:
+        results.write(out / "index.html", "")
+
+
+# --- Names -----------------------------------------------------------------------------------
+
+
+def test_a_folder_belongs_to_one_scene_also_later(tmp_path):
+    out = results.own(tmp_path / "out")
+    files = [tmp_path / name / "x.xml" for name in ("a", "b", "c")]
+    first = results.assigned(out, [("x", files[0]), ("x", files[1]), ("x", None)])
+    assert first == ["x", "x-2", "x-3"]
+    for name in first:
+        results.write(out / name / "comparison.json", "{}")
+    assert results.assigned(out, [("x", files[2]), ("x", files[1])]) == ["x-4", "x-2"]
+    assert results.assigned(out, [("x", None), ("x", None)]) == ["x-3", "x-5"]
+    (out / "y").mkdir()
+    (out / "y/mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="y: this folder was not made by fotismos"):
+        results.assigned(out, [("y", None)])
+
+
+def test_names_of_folders_are_plain_and_free(tmp_path):
+    names = {
+        "my scene": "my-scene", "../../evil": "-..-evil", "a/b\nc": "a-b-c", "..": "scene",
+        "cost": "cost-2", "Tables": "Tables-2", "index.html": "index.html-2",
+        "u\u0308": "\u00fc", "x" * 300: "x" * 100, "\udcff": "-",
+    }  # fmt: skip
+    assert {name: results.folder_name(name) for name in names} == names
+    out = results.own(tmp_path / "out")
+    results.assigned(out, [(name, None) for name in names])
+    assert {path.name for path in tmp_path.iterdir()} == {"out"}
+
+
+# --- Disks -----------------------------------------------------------------------------------
+
+
+def test_what_a_user_names_is_written_in_place_of_a_file_or_into_a_device(tmp_path):
+    """Never in place of a device or a link, which `/dev/stdout` is."""
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to("file")
+    atomic.put(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "new"
+    (tmp_path / "full").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="No space left"):
+        atomic.put(tmp_path / "full", "too much")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="pipe: No such device"):
+        atomic.put(tmp_path / "pipe", "nobody reads it")
+    with pytest.raises(OutputError, match="too long"):
+        atomic.put(tmp_path / ("x" * 300), "no file")
+
+
+@pytest.mark.guarantee(
+    "runs", "If a write fails, the earlier file stays whole, and no partial one is left."
+)
+@pytest.mark.parametrize("call", ["write_bytes", "replace"])
+def test_a_write_that_fails_leaves_the_earlier_file(call, tmp_path, monkeypatch):
+    atomic.write(tmp_path / "a", "old")
+
+    def fails(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, call, fails)
+        with pytest.raises(OutputError, match=r"a: No space left on device\. Free some space"):
+            atomic.write(tmp_path / "a", "new")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", "old")]
+
+
+def test_an_entry_is_its_content_under_its_key_or_nothing(tmp_path):
+    entry = atomic.Entry(tmp_path / "r.json", "key")
+    entry.save({"rows": [1, 2.5, None, "ü"]})
+    assert entry.load() == {"rows": [1, 2.5, None, "ü"]}
+    assert atomic.Entry(entry.path, "another").load() is None
+    whole = entry.path.read_bytes()
+    flipped = (whole[:i] + bytes([whole[i] ^ 1]) + whole[i + 1 :] for i in range(len(whole)))
+    cut = (whole[:i] for i in range(len(whole)))
+    for damaged in (b"[]", b"3", b"\xff\xfe", whole + b" ", *flipped, *cut):
+        entry.path.write_bytes(damaged)
+        assert entry.load() is None
+    entry.path.unlink()
+    os.mkfifo(entry.path)
+    assert entry.load() is None
+    with pytest.raises(InputError, match=r"not a regular file.* -o"):
+        entry.save({})

@@ -1,0 +1,625 @@
+"""Studies: designs, surfaces against formulas, points that are kept, datasets and findings."""
+
+import importlib
+import json
+import multiprocessing
+import os
+import re
+import signal
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from comparisons.processes.pool import Pool
+from comparisons.study import dataset, design, rendered, running, surface
+from heuristic.errors import InputError
+from reference.pairing import factors
+from reference.pairing.albedo import RoughPlastic
+from reports.charts import study_charts
+from tests import dask_cluster
+from tests.programs import ROOT
+
+# --- Designs --------------------------------------------------------------------------------------
+
+
+def part(parameters, scene="lobe", more=""):
+    return f"[[part]]\nscene = '{scene}'\n{more}\n[part.parameters]\n{parameters}\n"
+
+
+def points(*words):
+    return design.parse(part(*words)).parts[0].points()
+
+
+def test_a_grid_has_all_combinations_the_material_slowest():
+    found = points("light_angle = [0, 30]\nalpha = {from = 0.1, to = 0.4, steps = 3}")
+    combinations = [(a, angle) for a in (0.1, 0.25, 0.4) for angle in (0, 30)]
+    assert [(p["alpha"], p["light_angle"]) for p in found] == combinations
+    assert all(p["int_ior"] == 1.5 and p["reflectance"] == 0.5 for p in found)
+    found = points("alpha = {from = 0.1, to = 0.8, steps = 4, scale = 'log'}")
+    assert [p["alpha"] for p in found] == pytest.approx([0.1, 0.2, 0.4, 0.8])
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol"])
+def test_a_drawn_design_fills_its_ranges_evenly(kind):
+    words = (
+        "alpha = {from = 0.1, to = 1, scale = 'log'}\nlight_angle = {from = 20, to = 60}\n"
+        "int_ior = [1.3, 1.7]", "lobe", f"design = '{kind}'\npoints = 1024\nseed = ",
+    )  # fmt: skip
+    found = points(*words[:2], words[2] + "3")
+    assert found == points(*words[:2], words[2] + "3")
+    assert found != points(*words[:2], words[2] + "4")
+    names = ("alpha", "light_angle", "int_ior")
+    alpha, angle, ior = (np.array([p[name] for p in found]) for name in names)
+    assert np.all((alpha >= 0.1) & (alpha <= 1) & (angle >= 20) & (angle <= 60))
+    assert abs(np.mean(ior == 1.3) - 0.5) < 0.05
+    counts = np.histogram2d(np.log10(alpha), angle, bins=8, range=((-1, 0), (20, 60)))[0]
+    # Sobol's points are a net: each cell of 8 x 8 has its 16. Binomial spread is 4 for random ones.
+    assert abs(counts - 16).max() <= (0 if kind == "sobol" else 24)
+
+
+FIGURE = "[[figure]]\nname = 'f'\ntitle = 't'\npart = 'lobe'\nkind = 'map'\nx = 'alpha'\n"
+MISTAKES = (
+    ("", "there are no parts"),
+    ("parts = []", "'parts' is not known .did you mean part"),
+    ("title = \n[[part]]", "not TOML.*line 1"),
+    ("a = " + 100_000 * "[" + 100_000 * "]", "not TOML"),
+    (part("alpha = " + 10_000 * "1"), "not TOML"),
+    ("[[part]]\nname = 'a'", "part 'a': .*`scene`"),
+    ("part = 5", "array"),
+    ("title = 5\n" + part("alpha = 1"), "`str"),
+    (part(""), "no parameters are given"),
+    (part("alfa = 1"), "'alfa' is not known.*alpha"),
+    (part("alpha = 0"), "alpha = 0: give a number from 0.02 to 1[.]"),
+    (part("alpha = [0.1, 'rough']"), "alpha = 'rough'"),
+    (part("alpha = nan"), "alpha = nan"),
+    (part("alpha = true"), "alpha = True"),
+    (part("alpha = []"), "at least one value"),
+    (part("light_angle = 95"), "light_angle = 95: give a number from 0 to 89 deg"),
+    (part("alpha = {from = 0.1, to = 1}"), "from, steps, to"),
+    (part("alpha = {from = 0.5, to = 0.1, steps = 3}"), "from 0.5 to 0.1"),
+    (part("alpha = {from = 0.1, to = 1, steps = 1}"), "steps = 1"),
+    (part("alpha = {from = 0.1, to = 1, steps = 3, scale = 'cubic'}"), "linear or log"),
+    (part("light_angle = {from = 0, to = 9, steps = 3, scale = 'log'}"), "above 0"),
+    (part("alpha = 0.1\nn = 3"), "two materials"),
+    (part("alpha = 0.1", "lobe", "design = 'latin'"), "latin"),
+    (part("alpha = 0.1", "lobe", "pairing = 'fit'"), "'fit'.*matched"),
+    (part("alpha = 0.1", "lobe", "colour = 1"), "`colour`"),
+    (part("alpha = {from = 0.1, to = 1}", "lobe", "design = 'sobol'\npoints = 500"), "256 or 512"),
+    (part("alpha = {from = 0.1, to = 1}", "lobe", "design = 'random'"), "0 points"),
+    (part("alpha = [0.1]", "lobe", "design = 'random'\npoints = 4"), "no parameter has a range"),
+    (part("alpha = 0.1") * 2, "each its own"),
+    (part("alpha = 0.1", "lobe", "heuristic = 'mine.py'"), "is not rendered.*mine.py on sphere or"),
+    (part("alpha = 0.1", "lobe", "name = '../../evil'"), "name = '../../evil': .*slash"),
+    (part("alpha = 0.1", "lobe", "name = '/tmp/evil'"), "name = '/tmp/evil'"),
+    (part("alpha = 0.1") + FIGURE, "`values`"),
+    (part("alpha = 0.1") + FIGURE + "values = ['dE2000']", "a map needs y"),
+    (part("alpha = 0.1") + FIGURE + "y = 'n'\nvalues = ['dE2000']", "'n' is not known"),
+    (part("alpha = 0.1") + FIGURE + "values = [5]", "Expected `str`"),
+    (part("alpha = 0.1") + FIGURE.replace("'f'", "'../evil'") + "values = []", "'../evil'.*slash"),
+    (part("alpha = 0.1") + FIGURE.replace("'lobe'", "'nix'") + "values = []", "part = 'nix'"),
+    (part("alpha = 0.1") + FIGURE.replace("'map'", "'pie'") + "values = []", "pie"),
+)
+
+
+@pytest.mark.guarantee("runs", "A mistake in a study's file is one message, before anything runs.")
+def test_a_mistake_is_refused_with_what_is_allowed(tmp_path):
+    for text, expected in MISTAKES:
+        with pytest.raises(InputError, match=f"(?s){expected}"):
+            design.parse(text)
+    with pytest.raises(InputError, match=r"nix\.toml: No such file"):
+        design.read(tmp_path / "nix.toml")
+
+
+# --- Surfaces -------------------------------------------------------------------------------------
+# Against formulas that share nothing with the kernel or Mitsuba.
+
+
+def rows(*words):
+    blocks = running.all_blocks(design.parse(part(*words)))
+    found = [row for block in blocks for row in running.rows(block)]
+    assert all(row["error"] is None for row in found), found[0]["error"]
+    return found
+
+
+def fresnel(cosine, ior):
+    """Unpolarised reflectance of a dielectric, from Snell's law."""
+    refracted = np.sqrt(1 - (1 - cosine**2) / ior**2)
+    s = (cosine - ior * refracted) / (cosine + ior * refracted)
+    p = (refracted - ior * cosine) / (refracted + ior * cosine)
+    return (s**2 + p**2) / 2
+
+
+def torrance_sparrow(light, view, alpha, ior):
+    """Specular radiance in the plane of incidence, display-linear: pi f cos(light).
+
+    Beckmann's distribution and Smith's shadowing in its exact form; Mitsuba has Walter's rational
+    fit of the latter, within 0.4 %.
+    """
+
+    def shadowing(angle):
+        a = 1 / (alpha * np.maximum(np.tan(angle), 1e-6))
+        return 2 / (1 + erf(a) + np.exp(-(a**2)) / (a * np.sqrt(np.pi)))
+
+    light, view = np.deg2rad(light), np.deg2rad(view)
+    half = (light - view) / 2
+    slopes = np.exp(-((np.tan(half) / alpha) ** 2)) / (np.pi * alpha**2 * np.cos(half) ** 4)
+    reflectance = fresnel(np.cos((light + view) / 2), ior)
+    return np.pi * reflectance * slopes * shadowing(light) * shadowing(view) / (4 * np.cos(view))
+
+
+def phong_albedo(k_d, k_s, n, degrees):
+    """Exitance over irradiance of (8.10), by midpoints; light at ``degrees``."""
+    theta, phi = (np.arange(300) + 0.5) * np.pi / 600, (np.arange(300) + 0.5) * np.pi / 300
+    theta, phi = np.meshgrid(theta, phi)
+    a = np.deg2rad(degrees)
+    cosine = np.sin(a) * np.sin(theta) * np.cos(phi) + np.cos(a) * np.cos(theta)
+    radiance = k_d * np.cos(a) + k_s * np.maximum(cosine, 0) ** n
+    weight = np.cos(theta) * np.sin(theta) * (np.pi / 600) * (np.pi / 300)
+    return 2 * np.sum(radiance * weight) / (np.pi * np.cos(a))
+
+
+def test_phong_reflects_more_than_it_receives_for_a_large_k_s():
+    parameters = "n = [1, 9, 100]\nk_d = 0.3\nk_s = [0.5, 2]\nlight_angle = [0, 75]"
+    found = rows(parameters, "lobe", "pairing = 'literal'")
+    for row in found:
+        expected = phong_albedo(0.3, row["k_s"], row["n"], row["light_angle"])
+        assert row["albedo_heuristic"] == pytest.approx(expected, rel=1e-3)
+        assert row["albedo_reference"] < 1
+    assert max(row["albedo_heuristic"] for row in found if row["n"] == 1) > 1
+    (row,) = rows("k_s = 0\nk_d = 0.6\nlight_angle = 30")  # diffuse
+    assert row["dE2000"] == pytest.approx(0, abs=1e-4)
+    assert (row["albedo_heuristic"], row["albedo_reference"]) == pytest.approx((0.6, 0.6), rel=1e-5)
+
+
+def test_the_reference_rises_towards_grazing_and_peaks_off_the_mirror_direction():
+    """By Fresnel's factor and the view's cosine, neither of which Phong's model has."""
+    found = rows("alpha = 0.1\nlight_angle = [0, 40, 80]")
+    for row in found:
+        angle = row["light_angle"]
+        assert row["specular_heuristic"] == pytest.approx(row["k_s"], rel=1e-5)
+        expected = torrance_sparrow(angle, angle, 0.1, 1.5)
+        assert row["specular_reference"] == pytest.approx(expected, rel=0.01)
+    first, _, last = (row["specular_reference"] for row in found)
+    assert last / first > fresnel(np.cos(np.deg2rad(80)), 1.5) / fresnel(1.0, 1.5) > 9
+    views = np.arange(0, 89.9, 0.02)
+    for row in rows("alpha = [0.2, 0.4]\nlight_angle = [40, 50]"):
+        angle = row["light_angle"]
+        peak = views[np.argmax(torrance_sparrow(angle, views, row["alpha"], 1.5))]
+        assert peak > angle + 1
+        assert row["peak_reference"] == pytest.approx(peak, abs=0.4)
+        assert row["peak_heuristic"] == pytest.approx(angle, abs=0.11)
+
+
+def test_a_patch_is_the_lobe_in_one_direction():
+    profile = rows("alpha = 0.3\nlight_angle = 50\nview_angle = {from=0, to=80, steps=81}", "patch")
+    views = np.array([row["view_angle"] for row in profile])
+    specular = np.array([row["specular_reference"] for row in profile])
+    assert specular == pytest.approx(torrance_sparrow(50, views, 0.3, 1.5), rel=0.02, abs=1e-3)
+    k_d, k_s, n = (profile[0][name] for name in ("k_d", "k_s", "n"))
+    lobe = np.maximum(np.cos(np.deg2rad(views - 50)), 0) ** n
+    expected = k_d * np.cos(np.deg2rad(50)) + k_s * lobe
+    assert [row["heuristic"] for row in profile] == pytest.approx(expected, rel=1e-4)
+    # The azimuth turns the viewer away from the mirror image.
+    parameters = "n = 20\nlight_angle = 40\nview_angle = 40\nazimuth = [0, 90, 180]"
+    found = rows(parameters, "patch", "pairing = 'literal'")
+    cosines = [np.sin(np.deg2rad(40)) ** 2 * np.cos(np.deg2rad(a)) for a in (0, 90, 180)]
+    expected = [0.5 * (c + np.cos(np.deg2rad(40)) ** 2) ** 20 for c in cosines]
+    specular = [row["specular_heuristic"] for row in found]
+    assert specular == pytest.approx(expected, rel=1e-4, abs=1e-7)
+
+
+def test_views_see_equal_shares_of_the_surface():
+    cosine = surface.views()[2]
+    # Over projected solid angle, cos^2 is uniform in [0, 1].
+    assert np.mean(cosine**2) == pytest.approx(1 / 2, rel=1e-6)
+    assert np.mean(cosine) == pytest.approx(2 / 3, rel=1e-3)
+    assert surface.hemisphere()[1] @ surface.hemisphere()[0][2] == pytest.approx(2 / 3)
+
+
+def test_a_material_out_of_reach_says_by_how_much():
+    found = rows("n = 1\nk_d = 0.3\nk_s = [0.05, 2]\nlight_angle = 0")
+    assert found[0]["miss"] < 1e-4
+    # Phong's lobe alone wants the albedo 4/3; no surface reflects more than 1.
+    assert found[1]["miss"] > 0.25
+
+
+# --- Renderings -----------------------------------------------------------------------------------
+
+SMALL = "spp = 16\nresolution = [12, 12]"
+TEXT = f"""title = "A small study"
+[[part]]
+scene = "lobe"
+[part.parameters]
+alpha = [0.2, 0.4]
+light_angle = [0, 60]
+[[part]]
+name = "again"
+scene = "lobe"
+[part.parameters]
+alpha = [0.4]
+light_angle = [0, 60]
+[[part]]
+scene = "enclosure"
+{SMALL}
+[part.parameters]
+wall_albedo = [0, 0.9]
+[[part]]
+scene = "sphere"
+{SMALL}
+[part.parameters]
+n = 20
+k_d = 0.3
+k_s = 0.4
+[[part]]
+scene = "cornell-box"
+{SMALL}
+[part.parameters]
+"white.reflectance" = [0.2, 0.9]
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A study of all kinds of scenes, its folder, and what was told of its progress."""
+    folder, told = tmp_path_factory.mktemp("study"), []
+    study = design.parse(TEXT)
+    outcome = running.run(study, folder, progress=lambda *words: told.append(words))
+    assert (outcome.done, outcome.cached, outcome.failed) == (9, 2, 0), outcome.table["error"]
+    return study, folder, outcome.table, told
+
+
+def of_part(table, name):
+    return [row for row in table.to_pylist() if row["part"] == name]
+
+
+def test_a_row_names_the_material_that_pairing_derived(finished):
+    """Of either side: by the factors for the values of the row."""
+    (row,) = of_part(finished[2], "sphere")
+    phong = factors.Phong((0.3,) * 3, (0.4,) * 3, 20.0)
+    plastic, _ = factors.to_roughplastic(phong, factors.Convention.MATCHED)
+    assert row["reflectance"] == pytest.approx(plastic.diffuse_reflectance[0], rel=1e-3)
+    assert (row["alpha"], row["int_ior"]) == pytest.approx((plastic.alpha, plastic.int_ior))
+    row, _ = of_part(finished[2], "enclosure")
+    phong = factors.to_phong(RoughPlastic((0.5,) * 3, 0.3, 1.5), factors.Convention.MATCHED)
+    derived = phong.n, phong.k_d[0], phong.k_s[0]
+    assert (row["n"], row["k_d"], row["k_s"]) == pytest.approx(derived, rel=1e-3)
+
+
+def test_steps_name_what_changes_the_image(finished):
+    dark, bright = of_part(finished[2], "enclosure")
+    assert (dark["dominant"], bright["dominant"]) == ("form", "interreflection")
+    assert dark["interreflection"] < 0.02 * bright["interreflection"]
+    # The sphere's shadow on white walls, and none where the sphere is alone.
+    assert bright["occlusion"] > 0.02
+    (alone,) = of_part(finished[2], "sphere")
+    assert (alone["occlusion"], alone["interreflection"]) == (0, 0)
+    # All steps together lead from the one half to the other.
+    total = bright["form"] + bright["occlusion"] + bright["interreflection"]
+    assert bright["rmse"] <= total + 1e-9
+
+
+def test_a_scene_of_ones_own_is_varied_by_paths(finished, rgb):
+    dark, bright = of_part(finished[2], "cornell-box")
+    assert (dark["white.reflectance"], bright["white.reflectance"]) == (0.2, 0.9)
+    assert bright["reference"] > 1.3 * dark["reference"]
+    assert bright["interreflection"] > 2 * dark["interreflection"]
+    for scene, path, expected in (
+        ("cornell-box", "white.albedo", "white.reflectance"),
+        ("cornell-box", "floor.to_world", "is not a number"),
+        ("nowhere", "a.b", "neither a file nor"),
+        ("metameric-pair", "a.b", "llvm_ad_spectral"),
+    ):
+        with pytest.raises(InputError, match=f"part '{scene}': .*{expected}"):
+            rows(f"'{path}' = 0.5", scene)
+
+
+def test_points_that_two_parts_share_are_done_once(finished):
+    _, folder, table, told = finished
+    assert len(list((folder / "points").glob("*.json"))) == 4 + 2 + 1 + 2
+    assert told[0] == ("points", 2, 11)
+    assert told[-1] == ("points", 11, 11)
+    once, twice = (of_part(table, name) for name in ("lobe", "again"))
+    for old, new, number in zip(once[2:], twice, (0, 1), strict=True):
+        assert new == old | {"part": "again", "point": number}
+
+
+def test_the_dataset_says_units_meanings_and_where_it_comes_from(finished, tmp_path):
+    study, _, table, _ = finished
+    (tmp_path / "d.parquet").write_bytes(dataset.file_of(table))
+    again = dataset.read(tmp_path / "d.parquet")
+    assert again.equals(table, check_metadata=True)
+    assert all(field.metadata[b"description"] for field in again.schema)
+    assert again.schema.field("light_angle").metadata[b"unit"] == b"deg"
+    assert again.schema.metadata[b"study"].decode() == study.text
+    assert "mitsuba" in json.loads(again.schema.metadata[b"versions"])
+    (tmp_path / "bad.parquet").write_text("nothing")
+    with pytest.raises(InputError, match=r"bad\.parquet"):
+        dataset.read(tmp_path / "bad.parquet")
+
+
+def test_other_values_and_options_are_other_points(rgb):
+    keys = []
+    for scene, parameters, more in (
+        *(("sphere", "alpha = 0.1", more) for more in ("", "seed = 1", "spp = 16",
+                                                       "resolution = [8, 8]",
+                                                       "pairing = 'literal'")),
+        ("sphere", "alpha = 0.2", ""),
+        ("enclosure", "alpha = 0.1", ""),
+        ("sphere", "alpha = 0.1", "name = 'other'"),
+    ):  # fmt: skip
+        (block,) = running.all_blocks(design.parse(part(parameters, scene, more)))
+        keys.append(block.key)
+    assert keys[-1] == keys[0]
+    assert len(set(keys)) == len(keys) - 1
+
+
+FILES = """<scene version="3.0.0"><integrator type="path"/>
+<sensor type="perspective"><film type="hdrfilm"/></sensor>
+<shape type="obj"><string name="filename" value="m.obj"/><bsdf type="diffuse" id="paint">
+<rgb name="reflectance" value="0.5"/></bsdf></shape>
+<emitter type="point"><point name="position" x="0" y="0" z="-2"/>
+<rgb name="intensity" value="9"/></emitter></scene>"""
+
+
+@pytest.mark.guarantee("runs", "A study is done again once a file of its scene changes.")
+def test_a_study_is_done_again_once_a_file_of_its_scene_changes(rgb, tmp_path):
+    def write(size):
+        lines = [f"v {x * size} {y * size} 3" for x, y in ((-1, -1), (1, -1), (0, 2))]
+        (tmp_path / "m.obj").write_text("\n".join([*lines, "f 1 2 3", "f 3 2 1", ""]))
+
+    text = part("'paint.reflectance' = 0.4", "s.xml", SMALL)
+    study, values, scene = design.parse(text, folder=tmp_path), [], tmp_path / "s.xml"
+    for change in (lambda: scene.write_text(FILES), lambda: write(2),
+                   lambda: scene.write_text(FILES.replace('"9"', '"3"'))):  # fmt: skip
+        write(1) if not values else None
+        change()
+        outcome = running.run(study, tmp_path / "out")
+        assert (outcome.done, outcome.failed) == (1, 0)
+        assert running.run(study, tmp_path / "out").done == 0
+        values += outcome.table["reference"].to_pylist()
+    assert len(set(values)) == 3
+
+
+# --- Runs that end early --------------------------------------------------------------------------
+
+
+class Ending:
+    """A pool of this process that is interrupted after some tasks."""
+
+    def __init__(self, count):
+        self.count = count
+
+    def each(self, tasks):
+        for number, done in enumerate(Pool(0).each(tasks)):
+            if number == self.count:
+                raise KeyboardInterrupt
+            yield done
+
+
+@pytest.mark.guarantee("runs", "A study that ended early goes on, and repeats nothing.")
+def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path):
+    study = design.parse(part("alpha = [0.1, 0.2, 0.3, 0.4]\nlight_angle = [0, 60]"))
+    whole = running.run(study, tmp_path / "whole").table
+    with pytest.raises(KeyboardInterrupt):
+        running.run(study, tmp_path / "cut", Ending(3))
+    half = next((tmp_path / "cut/points").glob("*.json"))
+    half.write_text(half.read_text(encoding="utf-8")[:40], encoding="utf-8")
+    outcome = running.run(study, tmp_path / "cut")
+    assert (outcome.done, outcome.cached, outcome.failed) == (6, 2, 0)  # the damaged one again
+    assert outcome.table.equals(whole)
+    assert running.run(study, tmp_path / "cut").done == 0
+
+
+def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
+    study = design.parse(part("alpha = [0.1, 0.2, 0.3]"))
+    lobe = surface.lobe
+
+    def fails_once(point, convention):
+        return 1 / 0 if point["alpha"] == 0.2 else lobe(point, convention)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(surface, "lobe", fails_once)
+        outcome = running.run(study, tmp_path)
+    assert outcome.failed == 1
+    assert outcome.table["error"].to_pylist() == [None, "ZeroDivisionError: division by zero", None]
+    assert outcome.table["dE2000"].to_pylist()[1] is None
+    assert outcome.table["alpha"].to_pylist() == [0.1, 0.2, 0.3]
+    again = running.run(study, tmp_path)
+    assert (again.done, again.cached, again.failed) == (1, 2, 0)
+
+
+def end_the_first(_):
+    """Let the first process of a pool die while it works, and no other."""
+    for child in multiprocessing.active_children():
+        os.kill(child.pid, signal.SIGABRT)
+    return True
+
+
+@pytest.mark.thorough
+def test_processes_give_the_same_and_a_dead_one_fails_its_points_alone(rgb, tmp_path):
+    study = design.parse(part("alpha = [0.1, 0.3]\nlight_angle = {from=0, to=85, steps=7}"))
+    alone = running.run(study, tmp_path / "a").table
+    ends = iter([False, False, True])
+    with Pool(2) as pool:
+        outcome = running.run(
+            study, tmp_path / "b", pool, lambda *_: next(ends, False) and end_the_first(_)
+        )
+    assert 1 <= outcome.failed <= 2
+    errors = {row["error"] for row in outcome.table.to_pylist()} - {None}
+    assert errors == {"points of lobe: its process died of SIGABRT in native code."}
+    outcome = running.run(study, tmp_path / "b")
+    assert outcome.cached >= 12
+    assert outcome.table.equals(alone)
+
+
+@pytest.mark.thorough
+def test_a_cluster_gives_the_same_without_a_worker_and_resumes_without_a_scheduler(
+    run, apart, tmp_path
+):
+    text = part("alpha = [0.1, 0.3]\nlight_angle = {from=0, to=80, steps=8}")
+    (tmp_path / "small.toml").write_text(text, encoding="utf-8")
+    kept, processes = tmp_path / "out/study/small/points", []
+    with dask_cluster.ending(processes):
+        address = dask_cluster.start(processes)
+        first = dask_cluster.command(
+            "study", tmp_path / "small.toml", "-o", tmp_path / "out", "--scheduler", address
+        )
+        while len(list(kept.glob("*.json"))) < 3:
+            assert first.poll() is None, first.communicate()
+        processes[0].send_signal(signal.SIGKILL)
+        _, messages = first.communicate(timeout=120)
+        assert first.returncode == 1
+        assert "run the same command again" in messages
+        assert "Traceback" not in messages
+        done = len(list(kept.glob("*.json")))
+        words = ("--scheduler", dask_cluster.start(processes))
+        code, printed, messages = run("study", tmp_path / "small.toml", "-o", tmp_path / "out",
+                                      *words)  # fmt: skip
+    assert code == 0, messages
+    assert f"{done} points were cached" in printed
+    table = dataset.read(tmp_path / "out/study/small/small.parquet")
+    alone = running.run(design.parse(text), tmp_path).table
+    assert table["dE2000"].equals(alone["dE2000"])
+
+
+# --- The command ----------------------------------------------------------------------------------
+
+
+def test_the_command_writes_dataset_and_figures(run, tmp_path):
+    file, out = tmp_path / "small.toml", tmp_path / "out"
+    file.write_text(part("alpha = [0.2, 0.4]\nlight_angle = [0, 60]"), encoding="utf-8")
+    code, printed, messages = run("study", file, "-o", out)
+    assert (code, messages) == (0, "")
+    assert dataset.read(out / "study/small/small.parquet").num_rows == 4
+    assert "<svg" in (out / "study/small/figures/lobe.svg").read_text(encoding="utf-8")
+    assert "4       0" in printed
+    code, printed, _ = run("study", file, "-o", out)
+    assert (code, "4 points were cached" in printed) == (0, True)
+    file.write_text(part("alfa = 1"), encoding="utf-8")
+    code, printed, messages = run("study", file, "-o", out)
+    assert (code, printed) == (2, "")
+    assert "small.toml: part 1: 'alfa' is not known" in messages
+
+
+# --- A heuristic's own parameters -----------------------------------------------------------------
+
+WRAPPED = """
+import drjit as dr
+from heuristic import Range
+
+def shade(point, wrap: Range(0, 1) = {}):
+    lit = [each.intensity * dr.maximum((dr.dot(point.normal, each.toward) + wrap) / (1 + wrap), 0)
+           for each in point.lights]
+    return sum(lit) * point.material.base_color
+"""
+
+
+def test_a_study_sweeps_declared_parameters(rgb, written):
+    more = f"{SMALL}\nheuristic = 'mine.py'"
+    written(WRAPPED.format(0.5))
+    found = rows("heuristic.wrap = [0, 0.5, 1]\nalpha = 0.6", "sphere", more)
+    assert len({row["dE2000"] for row in found}) == 3
+    keys = set()
+    for row in found[::2]:  # as with that default in the file
+        written(WRAPPED.format(row["heuristic.wrap"]))
+        keys |= {
+            block.key
+            for block in running.all_blocks(design.parse(part("alpha = 0.6", "sphere", more)))
+        }
+        (alone,) = rows("alpha = 0.6", "sphere", more)
+        assert row["heuristic"] == pytest.approx(alone["heuristic"], rel=1e-5)
+        assert row["dE2000"] == pytest.approx(alone["dE2000"], rel=1e-4)
+    assert len(keys) == 2
+    for text, message in (
+        ("heuristic.warp = 1", "parameter of mine.py:? 'warp' is not known .did you mean wrap"),
+        ("heuristic.wrap = [0, 2]", "wrap = 2.0 is not allowed: give a value from 0 to 1"),
+    ):
+        with pytest.raises(InputError, match=message):
+            rows(text, "sphere", more)
+
+
+# --- The shipped study ----------------------------------------------------------------------------
+
+FILE = ROOT / "studies/phong-roughplastic.toml"
+PAGE = ROOT / "docs/findings.md"
+LATER = {"ldr_flip", "hdr_flip"}
+"""Metrics that are younger than the shipped dataset."""
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return design.read(FILE), dataset.read(FILE.with_suffix(".parquet"))
+
+
+def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
+    study, table = shipped
+    assert FILE.with_suffix(".parquet").stat().st_size < 1_000_000
+    assert table.schema.metadata[b"study"].decode() == study.text
+    assert table["error"].null_count == len(table)
+    everywhere = [(part.name, values) for part in study.parts for values in part.points()]
+    for row, (name, values) in zip(table.to_pylist(), everywhere, strict=True):
+        assert row == row | values | {"part": name}
+    every = {"incidence": 80, "by name": 160, "profile": 1, "lamp": 28}
+    blocks = running.all_blocks(study)
+    for name, step in every.items():
+        known = {row["point"]: row for row in dataset.rows(table, name)}
+        for block in [block for block in blocks if block.part.name == name][::step]:
+            for row in running.rows(block):
+                for column in row.keys() - LATER - {"exposure"}:
+                    value, expected = row[column], known[row["point"]][column]
+                    if isinstance(value, float):
+                        # The fourth digit: compilers differ, and noise floors magnify it.
+                        close = pytest.approx(expected, rel=2e-3, abs=2e-3)
+                        assert value == close, (name, column, row["point"])
+
+
+def test_the_page_says_what_the_dataset_says(shipped, monkeypatch):
+    study, table = shipped
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    findings, text = importlib.import_module("findings"), PAGE.read_text(encoding="utf-8")
+    assert findings.page(study, table) == text
+    column = table.column_names.index("dE2000")
+    changed = table.set_column(column, table.schema.field("dE2000"), table["rmse"])
+    assert findings.page(study, changed) != text
+    items = re.findall(r"^- (.*?)(?=^- |^$)", text, re.MULTILINE | re.DOTALL)
+    assert len(items) >= 12
+    assert all(re.search(r"\(figure \d+( against figure \d+)?\)\.\s*$", item) for item in items)
+    shown = re.findall(r"!\[Figure (\d+): .*?\]\((.*?)\)", text)
+    assert [int(number) for number, _ in shown] == list(range(1, len(study.figures) + 1))
+    assert all("<svg" in (PAGE.parent / path).read_text(encoding="utf-8") for _, path in shown)
+
+
+def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
+    study, table = shipped
+    for figure in study.figures:
+        spec = study_charts.chart(figure, table, study)
+        assert spec["title"]["text"] == figure.title
+        assert len(spec["data"]["values"]) >= 12
+        assert "http" not in str({key: spec[key] for key in spec if key != "$schema"})
+    figure = design.StudyFigure(
+        name="f", title="t", part="energy", kind="map", x="k_s", y="n", values=("dE2000",)
+    )
+    spec = study_charts.chart(figure, table, study)
+    assert spec["title"]["subtitle"] == "mean over light angle"
+    for cell in spec["data"]["values"][::9]:
+        found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
+        assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))
+
+
+def test_rows_are_found_by_what_there_is(shipped):
+    with pytest.raises(InputError, match="column 'dE1976' is not known"):
+        dataset.rows(shipped[1], "incidence", {"dE1976": 1})
+    with pytest.raises(InputError, match="no point of part 'x'"):
+        dataset.rows(shipped[1], "x")
+    with pytest.raises(InputError, match="no point"):
+        dataset.rows(shipped[1], "incidence", {"alpha": 0.33})
+
+
+def test_values_are_set_in_scenes_as_numbers_and_grey(rgb):
+    (one,) = design.parse(part("'white.reflectance' = 0.5", "cornell-box")).parts
+    graph = rendered.source_of(one, {}).parse()
+    rendered.set_values(graph, {"white.reflectance": 0.25})
+    (props,) = [graph.props(i) for i in graph.nodes_in_use() if graph.props(i).id() == "white"]
+    assert list(mi.ScalarColor3f(props["reflectance"])) == [0.25] * 3

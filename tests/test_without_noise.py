@@ -1,0 +1,134 @@
+"""Means without noise: their bias, how often their intervals hold the truth, and what is said."""
+
+import numpy as np
+import pytest
+
+from comparisons.departure import statistics
+from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import LEADING, METRICS, Pixelwise
+from comparisons.departure.noise import contrasts, debiased
+from reports.terminal.words import NOTICEABLE, about_noise, may_be_none
+from tests import noisy
+
+GREY = np.full((32, 32, 3), 0.2)
+
+
+def summary(test, passes, metric=LEADING, counted=None):
+    """Summarise a test image against passes (n, H, W, 3) of a reference."""
+    counted = np.ones(test.shape[:2], bool) if counted is None else counted
+    found = noisy.estimate(test - passes, counted)
+    return statistics.summarise(
+        metric, test, test - found.mean, counted, noise=found.noise, grouped=found.grouped
+    )[0]
+
+
+def passes_of(truth, count, spread, rng):
+    """Return skewed passes of a reference: lognormal, of one relative deviation in a mean."""
+    sigma = np.sqrt(np.log1p(spread**2 * count))
+    factors = np.exp(sigma * rng.normal(size=(count, *truth.shape[:2], 1)) - sigma**2 / 2)
+    return truth * factors
+
+
+def without_noise(test, passes):
+    """Return the mean as it is and the debiased one, with its interval."""
+    found = noisy.estimate(test - passes)
+    raw = LEADING(test, test - found.mean).ravel()
+    return raw.mean(), debiased(LEADING, test, found.grouped, DEFAULT_VIEWING, raw)
+
+
+@pytest.mark.guarantee(
+    "means",
+    "Intervals of mean ΔE2000 contain the truth at departures of 0, 1 and 5.",
+)
+@pytest.mark.parametrize("count", [4, 16])
+@pytest.mark.parametrize(("factor", "about"), [(1.0, 0), (1.045, 1), (1.245, 5)])
+def test_the_mean_without_noise_has_little_bias_and_an_honest_interval(rgb, factor, about, count):
+    """Noise alone gives a mean of 1.2 or so. Intervals of 95 % hold the truth 16 times of 20.
+
+    They would fail to do so once in 3,000 times.
+    """
+    rng = np.random.default_rng(count)
+    test = factor * GREY
+    true = LEADING(test, GREY).mean()
+    assert true == pytest.approx(about, abs=0.3)
+    results = [without_noise(test, passes_of(GREY, count, 0.07, rng)) for _ in range(20)]
+    assert sum(one["low"] <= true <= one["high"] for _, one in results) >= 16
+    raw = np.mean([raw for raw, _ in results]) - true
+    clean = np.mean([one["debiased"] for _, one in results]) - true
+    assert abs(clean) < 0.4 * abs(raw) + 0.06
+    if not about:
+        assert raw > 1.0
+        assert np.mean([one["high"] for _, one in results]) < raw
+
+
+def test_shares_of_visible_pixels_are_within_their_intervals(rgb):
+    """Departures rise from none at the left to 6 at the right."""
+    rng = np.random.default_rng(3)
+    test = GREY * np.linspace(1.0, 1.3, 32)[:, None]
+    departures, inside = LEADING(test, GREY), []
+    for _ in range(15):
+        _, found = without_noise(test, passes_of(GREY, 16, 0.05, rng))
+        inside.append(
+            [
+                share.low <= (departures > float(limit)).mean() <= share.high
+                for limit, share in found["visible_between"].items()
+            ]
+        )
+    assert np.mean(inside, axis=0).min() >= 0.75
+
+
+@pytest.mark.guarantee(
+    "means",
+    "A brightness error of a tenth on plain grey does not pass as noise.",
+)
+@pytest.mark.parametrize("spread", [0.3, 0.45])
+def test_a_tenth_more_brightness_is_no_noise_on_a_plain_grey(rgb, spread):
+    """The mean is at its floor, up to 1.1 times, which says nothing: noise hides the departure."""
+    grey = np.full((96, 96, 3), 0.2)
+    noise = 4 * spread * np.random.default_rng(4).normal(size=(16, 96, 96, 1))
+    found = summary(1.1 * grey, grey * (1 + noise))
+    assert found.mean < 1.1 * found.noise_floor
+    assert not about_noise(found)
+    assert found.high > LEADING(1.1 * grey, grey).mean()
+
+
+def test_nothing_but_noise_is_said_only_where_a_departure_would_have_shown(rgb):
+    rng = np.random.default_rng(5)
+    fine = summary(GREY, passes_of(GREY, 16, 0.05, rng))
+    coarse = summary(GREY[:16, :16], passes_of(GREY[:16, :16], 4, 0.2, rng))
+    few = summary(GREY, passes_of(GREY, 2, 0.3, rng))
+    assert about_noise(fine)
+    for found in (coarse, few):
+        assert may_be_none(found)
+        assert not about_noise(found)
+        assert found.high > NOTICEABLE
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, each in METRICS.items() if isinstance(each, Pixelwise)]
+)
+def test_every_metric_has_an_interval_around_the_truth(rgb, name):
+    rng = np.random.default_rng(6)
+    metric, test = METRICS[name], 1.3 * GREY
+    true = metric.mean(metric(test, GREY).ravel())
+    found = summary(test, passes_of(GREY, 16, 0.05, rng), metric)
+    assert found.low <= found.debiased <= found.high
+    assert found.high - found.low < 0.2 * true
+    assert found.debiased == pytest.approx(true, rel=0.1)
+
+
+def test_without_noise_the_mean_is_its_own_interval(rgb):
+    found = summary(1.2 * GREY, np.stack([GREY] * 4))
+    assert found.low == found.debiased == found.high == found.mean > 1
+    assert found.visible_between["2"].low == found.visible["2"] == 1
+    empty = summary(1.2 * GREY, np.stack([GREY] * 4), counted=np.zeros((32, 32), bool))
+    assert empty.low == empty.high == 0
+
+
+def test_contrasts_make_noise_as_large_as_that_of_the_mean():
+    for sizes in ([2, 2, 2, 2], [3, 3, 2], [1] * 8):
+        weights = contrasts(np.array(sizes))
+        assert len(weights) == min(3, len(sizes) - 1)
+        np.testing.assert_allclose(weights.sum(axis=1), 0, atol=1e-12)
+        variances = weights @ np.diag(1 / np.array(sizes)) @ weights.T
+        np.testing.assert_allclose(variances, np.eye(len(weights)) / sum(sizes), atol=1e-12)
