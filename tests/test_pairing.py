@@ -175,7 +175,7 @@ def half_width(plastic):
 
 
 def test_a_matched_highlight_is_wider_by_what_the_documents_say(rgb):
-    """In percent at half the height, as in the table of docs/pairing.md; Blinn's is as wide."""
+    """In percent at half the height; Blinn's is as wide."""
     wider = {3: 35, 5: 18, 9: 9, 15: 5, 30: 2.6, 100: 0.8, 400: 0.3}
     for n, percent in wider.items():
         plastic, _ = factors.to_roughplastic(Phong((0.1,) * 3, (0.2,) * 3, n), MATCHED)
