@@ -15,6 +15,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
+from comparisons.departure import criterion
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
 from reports import verdict
@@ -64,11 +65,11 @@ def caption(hero: Hero) -> Iterator[str]:
     """Yield the sentences below the picture, which hold its numbers."""
     found = hero.finding
     parts = ", ".join(f"{part.effect} {number(part.size)}" for part in found.parts)
-    share = 100 * found.beyond[verdict.USUAL]
+    share = 100 * found.beyond[criterion.TOLERANCE]
     yield (
         f"*`{hero.command}`: the mean departure is {LEADING.label} {number(found.mean)}, and"
-        f" {share:.0f} % of the pixels depart by more than {verdict.USUAL:g}, which shows side by"
-        f" side. The bar splits the mean by the effects that would remove it: {parts}.*"
+        f" {share:.0f} % of the pixels depart by more than {criterion.TOLERANCE:g}, which shows"
+        f" side by side. The bar splits the mean by the effects that would remove it: {parts}.*"
     )
 
 

@@ -19,7 +19,10 @@ from heuristic.errors import InputError
 VERSION = 3
 """Version of all records. Records of fotismos 0.1 have none."""
 
-CHANGES = "version 3 calls rungs `methods` and prices `attribution`"
+CHANGES = (
+    "version 3 calls rungs `methods` and prices `attribution`, and `visible` holds shares of pixels"
+    " with their intervals"
+)
 """What changed since version 2; records in which nothing changed are still read."""
 
 Kind = TypeVar("Kind")

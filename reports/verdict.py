@@ -1,7 +1,7 @@
 """A run's findings in sentences and bars: how many scenes look right, and what the others lack.
 
-A scene looks right at a tolerance if at most :data:`SHARE` of its pixels depart by more. The
-attribution of a study of cost says what it lacks.
+A scene looks right at a tolerance if at most 5 % of its pixels depart by more
+(:mod:`comparisons.departure.criterion`). The attribution of a study of cost says what it lacks.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.departure import criterion
 from comparisons.departure.metrics import LEADING
 from comparisons.hybrids.nearness import Nearest
 from heuristic.interpolation import Interpolation
@@ -23,12 +24,8 @@ from reports.terminal.words import nearest_sentence, seconds
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
 
-SHARE = 0.05
-"""Share of the pixels that may depart by more than the tolerance."""
-
-TOLERANCES = tuple(LEADING.visible)
-USUAL = 2.0
-"""The tolerance shown first: visible side by side."""
+TOLERANCES = (1.0, 2.0, 5.0)
+"""The tolerances that can be chosen."""
 
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
@@ -138,7 +135,7 @@ class Finding:
 
     def is_right(self, tolerance: float) -> bool:
         """Return whether the scene looks right at one of :data:`TOLERANCES`."""
-        return self.beyond[tolerance] <= SHARE
+        return self.beyond[tolerance] <= criterion.LIMIT
 
     @property
     def cause(self) -> str | None:
@@ -152,7 +149,7 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
     return Finding(
         scene=record.scene,
         mean=metric.mean,
-        beyond={limit: metric.visible[f"{limit:g}"] for limit in TOLERANCES},
+        beyond={limit: criterion.share_above(metric.visible, limit).value for limit in TOLERANCES},
         parts=_parts(metric.mean, cost) if cost else (),
         remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
         is_exact=metric.high <= EXACT,
@@ -186,7 +183,7 @@ def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
     return Remedy(best.method, best.seconds.value, is_judged)
 
 
-def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
+def sentences(findings: Sequence[Finding], tolerance: float = criterion.TOLERANCE) -> list[str]:
     """Return a run's findings, in one or two sentences."""
     right = sum(found.is_right(tolerance) for found in findings)
     if len(findings) == 1:
@@ -211,7 +208,7 @@ def sentences(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str
     return said
 
 
-def about(found: Finding, tolerance: float = USUAL) -> str:
+def about(found: Finding, tolerance: float = criterion.TOLERANCE) -> str:
     """Return one scene's finding: how much is wrong, mostly why, and a remedy."""
     if found.caution:
         return found.caution
@@ -235,7 +232,7 @@ def about(found: Finding, tolerance: float = USUAL) -> str:
     return " ".join(said)
 
 
-def advice(findings: Sequence[Finding], tolerance: float = USUAL) -> list[str]:
+def advice(findings: Sequence[Finding], tolerance: float = criterion.TOLERANCE) -> list[str]:
     """Return a line for each scene that does not look right: what it lacks, and a remedy."""
     if not any(found.remedies or found.nearest for found in findings):
         return [f"For causes and remedies, give the same command with {WITH_CAUSES}."]

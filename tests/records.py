@@ -5,7 +5,8 @@ import numpy as np
 
 from comparisons.comparison import Comparison, ComparisonRecord, Images
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import RATIO, drawn
+from comparisons.departure.metrics import RATIO, THRESHOLDS, drawn
+from comparisons.departure.noise import VisibleShare
 from comparisons.departure.statistics import Summary
 from reference.records import VERSION, plain
 from reports.page.scene_view import SceneView
@@ -16,24 +17,36 @@ def summary(mean):
     return msgspec.convert(metric(mean), Summary)
 
 
-def metric(mean, visible=("1", "2", "5")):
+def metric(mean, visible=THRESHOLDS):
     after = {"exposure": 1.25 + mean / 100, "mean": 0.71 * mean, "p50": 0.5 * mean}
     return {
         "mean": mean,
         "p50": 0.8 * mean,
         "p95": 2.1 * mean,
         "max": 3.3 * mean,
-        "visible": {limit: 0.0771 * mean / 13 / float(limit) for limit in visible},
-        "visible_between": {
-            limit: {"low": 0.0688 * mean / 13 / float(limit), "high": 0.0829 * mean / 13}
+        "visible": [
+            {
+                "threshold": limit,
+                "value": 0.0771 * mean / 13 / limit,
+                "low": 0.0688 * mean / 13 / limit,
+                "high": 0.0829 * mean / 13,
+            }
             for limit in visible
-        },
+        ],
         "debiased": 0.97 * mean,
         "low": 0.94 * mean,
         "high": 1.02 * mean,
         "noise_floor": 0.0123 * mean,
         "after_exposure": after | {"p95": 1.9 * mean, "max": 3.1 * mean},
     }
+
+
+def visible(shares):
+    """Return shares ``{threshold: share}`` without noise, as in a summary."""
+    return tuple(
+        VisibleShare(threshold=limit, value=share, low=share, high=share)
+        for limit, share in shares.items()
+    )
 
 
 def histogram(counts):

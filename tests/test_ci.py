@@ -17,7 +17,7 @@ from comparisons.check.measurement import HALVES, MeasuredScene, measurement
 from comparisons.check.moved import Check, Move, differences, moved
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import METRICS
-from comparisons.departure.noise import ShareInterval
+from comparisons.departure.noise import VisibleShare
 from reference.rendering.gbuffer import ObjectIds
 from reports.ci import checks, gates, summary
 from tests import records
@@ -37,8 +37,8 @@ SMALL = ("--spp", 4, "--resolution", "12x8")
 )
 def test_a_gate_fails_only_where_noise_is_no_reason():
     made = records.record()
-    between = {"2": ShareInterval(low=0.3, high=0.5)}
-    lead = structs.replace(made.metrics["dE2000"], low=0.3, high=0.5, visible_between=between)
+    share = VisibleShare(threshold=2.0, value=0.4, low=0.3, high=0.5)
+    lead = structs.replace(made.metrics["dE2000"], low=0.3, high=0.5, visible=(share,))
     record = structs.replace(made, metrics=made.metrics | {"dE2000": lead})
     states = {0.2: "failed", 0.3: "undetermined", 0.4: "undetermined", 0.5: "passed"}
     for bound, state in states.items():

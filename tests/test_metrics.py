@@ -345,8 +345,9 @@ def test_summary_is_of_the_mask(metric, images):
     np.testing.assert_array_equal(distance, values.astype(np.float32))
     mean = np.sqrt((values[mask] ** 2).mean()) if metric.linear else values[mask].mean()
     assert summary.mean == pytest.approx(mean)
-    shares = {f"{limit:g}": (values[mask] > limit).mean() for limit in metric.visible}
-    assert summary.visible == pytest.approx(shares)
+    for share in summary.visible:
+        assert share.low <= (values[mask] > share.threshold).mean() <= share.high
+    assert tuple(share.threshold for share in summary.visible) == metric.visible
     assert summary.p50 == pytest.approx(np.median(values[mask]))
     assert summary.p95 == pytest.approx(np.percentile(values[mask], 95))
     assert summary.max == pytest.approx(values[mask].max())

@@ -27,7 +27,7 @@ def of_record(mean, cost=None, **changes):
 
 @pytest.mark.parametrize(("share", "is_right"), [(0.0, True), (0.05, True), (0.0501, False)])
 def test_a_scene_is_right_if_at_most_a_twentieth_of_its_pixels_departs(share, is_right):
-    visible = {"1": 1.0, "2": share, "5": 0.0}
+    visible = records.visible({1.0: 1.0, 2.0: share, 5.0: 0.0})
     finding = of_record(3.0, visible=visible)
     assert finding.is_right(2.0) is is_right
     assert not finding.is_right(1.0)
@@ -57,7 +57,8 @@ def test_all_methods_are_judged_alike_also_the_kernel_itself():
         cost.points[0], error=structs.replace(cost.points[0].error, mean=1.5)
     )  # of the kernel that was judged
     cost = structs.replace(cost, points=(fast, *cost.points[1:]))
-    finding = of_record(10.0, cost, visible={"1": 1.0, "2": 0.12, "5": 0.0})
+    visible = records.visible({1.0: 1.0, 2.0: 0.12, 5.0: 0.0})
+    finding = of_record(10.0, cost, visible=visible)
     assert finding.remedies[2.0] == verdict.Remedy("Phong kernel", fast.seconds.value, True)
     assert verdict.about(finding).endswith("Its mean is within ΔE2000 2 all the same.")
     assert verdict.advice([finding])[0].endswith("mean within ΔE2000 2: as it is")

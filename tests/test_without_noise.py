@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from comparisons.departure import statistics
+from comparisons.departure import criterion, statistics
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import LEADING, METRICS, Pixelwise
-from comparisons.departure.noise import contrasts, debiased
+from comparisons.departure.noise import VisibleShare, contrasts, debiased
+from heuristic.errors import InputError
 from reports.terminal.words import NOTICEABLE, about_noise, may_be_none
 from tests import noisy
 
@@ -70,8 +71,8 @@ def test_shares_of_visible_pixels_are_within_their_intervals(rgb):
         _, found = without_noise(test, passes_of(GREY, 16, 0.05, rng))
         inside.append(
             [
-                share.low <= (departures > float(limit)).mean() <= share.high
-                for limit, share in found["visible_between"].items()
+                share.low <= (departures > share.threshold).mean() <= share.high
+                for share in found["visible"]
             ]
         )
     assert np.mean(inside, axis=0).min() >= 0.75
@@ -120,7 +121,8 @@ def test_every_metric_has_an_interval_around_the_truth(rgb, name):
 def test_without_noise_the_mean_is_its_own_interval(rgb):
     found = summary(1.2 * GREY, np.stack([GREY] * 4))
     assert found.low == found.debiased == found.high == found.mean > 1
-    assert found.visible_between["2"].low == found.visible["2"] == 1
+    assert all(share.low == share.value == share.high for share in found.visible)
+    assert found.visible[4].value == 1
     empty = summary(1.2 * GREY, np.stack([GREY] * 4), counted=np.zeros((32, 32), bool))
     assert empty.low == empty.high == 0
 
@@ -132,3 +134,26 @@ def test_contrasts_make_noise_as_large_as_that_of_the_mean():
         np.testing.assert_allclose(weights.sum(axis=1), 0, atol=1e-12)
         variances = weights @ np.diag(1 / np.array(sizes)) @ weights.T
         np.testing.assert_allclose(variances, np.eye(len(weights)) / sum(sizes), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (0.0, 0.05, "pass"),
+        (0.04, 0.0501, "undecided"),
+        (0.05, 0.9, "undecided"),
+        (0.051, 1, "fail"),
+    ],
+)
+def test_the_interval_of_the_share_decides(low, high, verdict):
+    shares = [VisibleShare(threshold=t, value=low, low=low, high=high) for t in (2.0, 2.25)]
+    assert criterion.decide(shares) == criterion.decide(shares, 2.25) == verdict
+
+
+@pytest.mark.parametrize("threshold", [0.75, 2.1, 10.25, np.nan])
+def test_only_thresholds_with_recorded_shares_are_allowed(threshold):
+    assert criterion.checked_threshold(2.25) == 2.25
+    with pytest.raises(InputError, match=r"give 1 to 10 in steps of 0\.25, such as 2"):
+        criterion.checked_threshold(threshold)
+    with pytest.raises(InputError, match=r"give one of none"):
+        criterion.decide((), 2.0)

@@ -71,6 +71,9 @@ RESERVED = frozenset(
 )  # fmt: skip
 """Names of layers and columns other than metrics."""
 
+THRESHOLDS = tuple(1.0 + step / 4 for step in range(37))
+"""Colour differences above which shares of pixels are counted: 1 to 10 in steps of 0.25."""
+
 Distances = Callable[[Array], NDArray]
 
 
@@ -84,9 +87,9 @@ class Metric:
 
     ``function(test, reference, viewing) -> (H, W)`` returns distances, ≥ 0 and finite, of linear
     images (H, W, 3). `Pixelwise` needs none. Summaries give the share of pixels above each
-    threshold in ``visible``. ``rounding`` is the difference that rounding of float32 renderings can
-    make in its mean. Its map is shown and saved if it is ``drawn``. The mean of a ``linear``
-    difference is a root mean square, and its best exposure minimises squares.
+    threshold in ``visible``, in rising order. ``rounding`` is the difference that rounding of
+    float32 renderings can make in its mean. Its map is shown and saved if it is ``drawn``. The mean
+    of a ``linear`` difference is a root mean square, and its best exposure minimises squares.
     """
 
     name: str
@@ -110,11 +113,6 @@ class Metric:
             )
         if not self.heading:
             object.__setattr__(self, "heading", f"{self.label}, mean")
-
-    @property
-    def thresholds(self) -> tuple[str, ...]:
-        """The thresholds of `visible`, as named in records."""
-        return tuple(f"{limit:g}" for limit in self.visible)
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
@@ -213,7 +211,7 @@ LEADING = METRICS.own(
         caution="It was fitted to small differences, up to about 5, of uniform patches: large "
         "values are ordered, but twice the value is not twice as far. Above white it sees nothing.",
         map_range=(0.0, 20.0),
-        visible=(1.0, 2.0, 5.0),
+        visible=THRESHOLDS,
         coordinates=lab,
         difference=ciede2000,
     )
@@ -229,7 +227,7 @@ METRICS.own(
         caution="It assumes an eye adapted to each pixel, and so overrates differences in deep "
         "shadow next to bright light. It depends on the luminance of white.",
         map_range=(0.0, 60.0),
-        visible=(1.0, 2.0, 5.0),
+        visible=THRESHOLDS,
         coordinates=itp,
         difference=euclidean,
     )
@@ -244,7 +242,7 @@ METRICS.own(
         caution="It assumes one adaptation over the whole image, from the viewing conditions. "
         "Above white it sees nothing.",
         map_range=(0.0, 20.0),
-        visible=(1.0, 2.0, 5.0),
+        visible=THRESHOLDS,
         coordinates=cam16ucs,
         difference=euclidean,
     )

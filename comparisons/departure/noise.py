@@ -30,7 +30,7 @@ pixels; the bias found there is applied to the whole image.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +41,7 @@ from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import Metric, Pixelwise
 from comparisons.intervals import jackknife_error, student
-from reference.records import Record, Share
+from reference.records import Positive, Record, Share
 from reference.rendering.sums import Grouped
 
 Array = NDArray[np.float64]
@@ -68,44 +68,71 @@ def without_noise(measured: ArrayLike, noisier: ArrayLike) -> Array:
     return np.sign(squares) * np.sqrt(np.abs(squares))
 
 
-class ShareInterval(Record):
-    """A 95 % interval of a share."""
+class VisibleShare(Record):
+    """The share of counted pixels above a threshold, without noise, and its 95 % interval."""
 
+    threshold: Positive
+    value: Share
     low: Share
     high: Share
 
 
-def exactly(mean: float, visible: Mapping[str, float]) -> dict[str, Any]:
-    """Return the fields of a summary without noise."""
-    shares = [(share, share) for share in visible.values()]
-    return _fields(mean, mean, mean, visible, shares)
+def exactly(metric: Metric, values: NDArray) -> dict[str, Any]:
+    """Return the fields of a summary of distances (N,) without noise."""
+    mean, shares = metric.mean(values), shares_above(values, metric.visible)
+    return _fields(metric, mean, mean, mean, np.array([shares] * 3))
 
 
 def roughly(metric: Metric, values: NDArray, noise: NDArray) -> dict[str, Any]:
     """Debias distances (N,), given those from noise alone, by the triangle inequality."""
     mean, floor = metric.mean(values), metric.mean(noise)
     shares = [
-        (float((values - noise > limit).mean()), float((values + noise > limit).mean()))
-        for limit in metric.visible
+        shares_above(distances, metric.visible)
+        for distances in (
+            np.sqrt(np.maximum(values**2 - noise**2, 0.0)),
+            values - noise,
+            values + noise,
+        )
     ]
     clean = max(float(without_noise(mean, np.hypot(mean, floor))), 0.0)
     half = MARGIN * floor
-    return _fields(clean, max(mean - half, 0.0), mean + half, metric.thresholds, shares)
+    return _fields(metric, clean, max(mean - half, 0.0), mean + half, np.array(shares))
 
 
-def _fields(
-    value: float,
-    low: float,
-    high: float,
-    thresholds: Iterable[str],
-    shares: Iterable[tuple[float, float]],
-) -> dict[str, Any]:
-    """Return the mean without noise, and 95 % intervals of it and of shares above thresholds."""
-    between = {
-        name: ShareInterval(low=low, high=high)
-        for name, (low, high) in zip(thresholds, shares, strict=True)
-    }
-    return {"debiased": value, "low": low, "high": high, "visible_between": between}
+def _fields(metric: Metric, value: float, low: float, high: float, shares: Array) -> dict[str, Any]:
+    """Return the mean without noise, its interval, and shares (3, T): values, low and high ends.
+
+    Shares never rise with the threshold: ends that do are moved outwards.
+    """
+    shares = np.clip(shares, 0.0, 1.0)
+    shares[1] = np.minimum.accumulate(shares[1])
+    shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
+    shares[0] = np.clip(np.minimum.accumulate(shares[0]), *shares[1:])
+    rows = np.column_stack([metric.visible, shares.T]).tolist()
+    visible = tuple(
+        VisibleShare(threshold=limit, value=share, low=least, high=most)
+        for limit, share, least, most in rows
+    )
+    return {"debiased": value, "low": low, "high": high, "visible": visible}
+
+
+def counts_above(
+    distances: NDArray, thresholds: Sequence[float], blocks: NDArray, number: int
+) -> Array:
+    """Return how many distances (N,) of each block are above each threshold, (number, T).
+
+    ``blocks`` (N,) are the blocks of the distances. Thresholds rise.
+    """
+    width = len(thresholds) + 1
+    passed = np.searchsorted(thresholds, distances)  # thresholds below each distance
+    counts = np.bincount(blocks * width + passed, minlength=number * width).reshape(number, width)
+    return counts[:, :0:-1].cumsum(axis=1)[:, ::-1].astype(float)
+
+
+def shares_above(distances: NDArray, thresholds: Sequence[float]) -> Array:
+    """Return the share of distances (N,) above each threshold, (T,); 0 of none."""
+    counts = counts_above(distances, thresholds, np.zeros(len(distances), int), 1)[0]
+    return counts / max(len(distances), 1)
 
 
 def debiased(
@@ -141,10 +168,10 @@ def debiased(
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(measured[1:] - added[1:], half[1:], np.abs(added[1:]))
-    return _fields(float(value), float(low), float(high), metric.thresholds, shares)
+    return _fields(metric, float(value), float(low), float(high), shares)
 
 
-def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]]:
+def _shares(found: Array, half: Array, added: Array) -> Array:
     """Join the intervals of two estimates of shares (2 n,), since neither is always right.
 
     Half of the noise's part in the first is added, as uncertainty of the extrapolation.
@@ -153,13 +180,13 @@ def _shares(found: Array, half: Array, added: Array) -> list[tuple[float, float]
     half = half + np.concatenate([added[:count] / 2.0, np.zeros(count)])
     low = (found - half).reshape(2, count).min(axis=0)
     high = (found + half).reshape(2, count).max(axis=0)
-    return list(zip(np.clip(low, 0.0, 1.0).tolist(), np.clip(high, 0.0, 1.0).tolist(), strict=True))
+    return np.array([found.reshape(2, count).mean(axis=0), low, high])
 
 
 def _numbers(metric: Metric, distances: NDArray) -> Array:
     """Return the mean (of a linear metric the mean square), and shares above thresholds, twice."""
     first = np.mean(distances**2) if metric.linear else distances.mean()
-    shares = [(distances > limit).mean() for limit in metric.visible]
+    shares = shares_above(distances, metric.visible)
     return np.array([first, *shares, *shares])
 
 
@@ -205,16 +232,14 @@ class _Extrapolated:
             added = before - (lower + upper) / 2.0
             gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
             noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
-        shares = [
-            grouped.by_block((np.array(noisy) > limit).mean(axis=0) - (plain > limit))
-            for limit in metric.visible
-        ]
+
+        def above(distances: Array) -> Array:
+            return counts_above(distances, metric.visible, grouped.blocks, grouped.sampled)
+
         kept = ratio(np.maximum(before - added, 0.0), before)[grouped.blocks]
-        shares += [
-            grouped.by_block((plain > limit) - 1.0 * (plain * kept > limit))
-            for limit in metric.visible
-        ]
-        added = np.column_stack([added, *shares])
+        once = above(plain)
+        more = np.mean([above(each) for each in noisy], axis=0) - once
+        added = np.column_stack([added, more, once - above(plain * kept)])
         raw = _numbers(metric, plain)
         return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
 

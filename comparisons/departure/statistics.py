@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
 from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
-from comparisons.departure.noise import ShareInterval, debiased, exactly, roughly
-from reference.records import Amount, Count, Positive, Record, Share
+from comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
+from reference.records import Amount, Count, Positive, Record
 from reference.rendering.sums import Grouped
 
 # Pixels measured at a time, to keep temporaries small.
@@ -42,10 +42,7 @@ class Summary(Record):
     p95: Amount
     max: Amount
     visible: Annotated[
-        dict[str, Share], Meta(description="Share of the pixels above each threshold.")
-    ]
-    visible_between: Annotated[
-        dict[str, ShareInterval], Meta(description="95 % intervals of these shares without noise.")
+        tuple[VisibleShare, ...], Meta(description="Shares of the pixels, by rising threshold.")
     ]
     debiased: Annotated[Amount, Meta(description="Mean without the reference's noise.")]
     low: Annotated[Amount, Meta(description="Lower end of the 95 % interval of `debiased`.")]
@@ -94,17 +91,14 @@ def summarise(
         after = _numbers(metric, exposed)
         if after["mean"] > numbers["mean"]:
             factor, after = 1.0, numbers
-    shares = (share(values > limit) for limit in metric.visible)
-    visible = dict(zip(metric.thresholds, shares, strict=True))
     clean = None
     if not noise_alone.any():
-        clean = exactly(numbers["mean"], visible)
+        clean = exactly(metric, values)
     elif isinstance(metric, Pixelwise) and grouped is not None:
         clean = debiased(metric, test, grouped, viewing, values)
     clean = clean or roughly(metric, values, noise_alone)
     summary = Summary(
         **numbers,
-        visible=visible,
         noise_floor=metric.mean(noise_alone),
         after_exposure=Exposed(exposure=factor, **after),
         **clean,

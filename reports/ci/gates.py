@@ -100,21 +100,21 @@ def evaluate(
     """Return the gates of each scene.
 
     ``mean`` bounds the mean of the leading metric, ``visible`` the share of pixels that depart by
-    more than :data:`reports.verdict.USUAL`; None is no bound.
+    more than :data:`comparisons.departure.criterion.TOLERANCE`; None is no bound.
     """
-    from comparisons.departure.metrics import LEADING  # loads the metrics
-    from reports.verdict import USUAL
+    from comparisons.departure import criterion  # loads the metrics
+    from comparisons.departure.metrics import LEADING
 
-    made, limit = [], f"{USUAL:g}"
+    made = []
     for record in records:
         found = record.metrics[LEADING.name]
         if mean is not None:
             numbers = mean, found.debiased, found.low, found.high
             made.append(Gate(record.scene, f"mean {LEADING.label}", *numbers, is_share=False))
         if visible is not None:
-            between = found.visible_between[limit]
-            numbers = visible, found.visible[limit], between.low, between.high
-            name = f"above {LEADING.label} {limit}"
+            share = criterion.share_above(found.visible)
+            numbers = visible, share.value, share.low, share.high
+            name = f"above {LEADING.label} {share.threshold:g}"
             made.append(Gate(record.scene, name, *numbers, is_share=True))
     return made
 

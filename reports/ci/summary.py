@@ -174,13 +174,14 @@ def of_comparison(views: Sequence[SceneView], gates: Sequence[Gate], page: str) 
 
     ``page`` is the address of the page, or its path.
     """
+    from comparisons.departure import criterion
     from reports import verdict
     from reports.ci.gates import HEADINGS, outcome
     from reports.terminal.tables import escaped, markdown
     from reports.terminal.words import number, percent
 
     found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
-    lead, usual = verdict.LEADING, verdict.USUAL
+    lead, usual = verdict.LEADING, criterion.TOLERANCE
     rows = [("Scene", "Mostly lacks", f"Mean {lead.label}", f"Pixels above {usual:g}")]
     rows += [
         (escaped(f.scene), escaped(f.cause or ""), number(f.mean), percent(f.beyond[usual]))

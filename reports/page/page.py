@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import structs
 
 from comparisons.comparison import ComparisonRecord
+from comparisons.departure import criterion
 from comparisons.departure.metrics import LEADING, METRICS
 from reference.records import plain
 from reports import glossary, verdict
@@ -140,8 +141,8 @@ def _verdict(scenes: Sequence[PageScene]) -> dict[str, Any]:
         "rows": rows,
         "about": {s.id: verdict.about(f) for s, f in zip(scenes, found, strict=True)},
         "tolerances": verdict.TOLERANCES,
-        "usual": verdict.USUAL,
-        "share": verdict.SHARE,
+        "usual": criterion.TOLERANCE,
+        "share": criterion.LIMIT,
         "top": ROOM * max((f.mean for f in found), default=1.0) or 1.0,
         "effects": {name: EFFECT_COLOURS[name] for name in names},
         "with_causes": verdict.WITH_CAUSES,

@@ -143,6 +143,11 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
     for key, value in record.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{key}.")
+        elif key == "visible":
+            for share in value:
+                name = f"visible.{share['threshold']:g}"
+                yield name, share["value"]
+                yield from ((f"{name}.{end}", share[end]) for end in ("low", "high"))
         else:
             yield prefix + key, value
 

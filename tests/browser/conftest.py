@@ -80,7 +80,7 @@ def noisy():
     }
     marks = rng.choice([0.0, 0.5, 1.0], (HEIGHT, WIDTH))
     found = comparison(NOISY, heuristic, reference, maps, marks)
-    beyond = {"1": 0.6, "2": 0.3, "5": 0.04}
+    beyond = records.visible({1.0: 0.6, 2.0: 0.3, 5.0: 0.04})
     metrics = found.record.metrics
     metrics = metrics | {"dE2000": structs.replace(metrics["dE2000"], visible=beyond)}
     record = structs.replace(found.record, metrics=metrics)

@@ -1,0 +1,55 @@
+"""One criterion: a scene passes if at most 5 % of its pixels differ visibly.
+
+The share of counted pixels whose difference is above a threshold t decides, without noise. Pixels
+that noise leaves undecided widen its interval, and so a scene may be undecided, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from comparisons.departure.metrics import THRESHOLDS
+from comparisons.departure.noise import VisibleShare
+from heuristic.errors import InputError
+
+LIMIT = 0.05
+"""Largest share of the pixels that may differ visibly."""
+
+TOLERANCE = 2.0
+"""ΔE2000: the threshold unless chosen; visible side by side."""
+
+Verdict = Literal["pass", "fail", "undecided"]
+
+
+def checked_threshold(threshold: float) -> float:
+    """Return a threshold that records hold shares for; any other raises `InputError`."""
+    if threshold not in THRESHOLDS:
+        raise InputError(
+            f"{threshold:g} is no threshold of visible differences: give {THRESHOLDS[0]:g} to"
+            f" {THRESHOLDS[-1]:g} in steps of {THRESHOLDS[1] - THRESHOLDS[0]:g}, such as"
+            f" {TOLERANCE:g}."
+        )
+    return threshold
+
+
+def share_above(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -> VisibleShare:
+    """Return the share of pixels above a threshold, from a summary's ``visible``."""
+    for share in visible:
+        if share.threshold == threshold:
+            return share
+    listed = ", ".join(f"{share.threshold:g}" for share in visible)
+    raise InputError(
+        f"no share of pixels above {threshold:g} is recorded: give one of {listed or 'none'}."
+    )
+
+
+def decide(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -> Verdict:
+    """Return whether at most `LIMIT` of the pixels are above a threshold, as far as noise allows.
+
+    ``pass`` if the interval ends at `LIMIT` or below it, ``fail`` if it begins above it.
+    """
+    share = share_above(visible, threshold)
+    if share.high <= LIMIT:
+        return "pass"
+    return "fail" if share.low > LIMIT else "undecided"
