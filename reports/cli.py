@@ -10,38 +10,97 @@ import signal
 import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 import click
+from click.shell_completion import get_completion_class
 
-import reports.commands
 from comparisons.processes import interruption
 from heuristic import llvm
 from heuristic.errors import FotismosError, InputError, suggestion
 from heuristic.program import program
 from heuristic.version import __version__
-from reports.commands.completion import VARIABLE
-from reports.terminal import verbosity
+from reports import jobs
+from reports.terminal.words import echo
+
+COMMANDS = {
+    "One scene": ("compare", "plan", "cost", "fit"),
+    "Many scenes": ("report", "study"),
+    "Baselines, shaders, other renderers": ("check", "audit", "export"),
+    "This installation": ("doctor", "scenes", "completion"),
+}
+"""The commands by groups of the help; most are a module of `reports.commands`."""
+
+COMPLETION = "_FOTISMOS_COMPLETE"
+"""Environment variable with which a shell requests completions."""
+
+
+@jobs.command()
+def scenes() -> None:
+    """List the built-in scenes, each with a sentence.
+
+    \b
+    Examples:
+      fotismos scenes
+      fotismos scenes | grep sphere
+    """  # noqa: D301 click reads the \b as: keep these lines
+    from comparisons.gallery.builtin import SCENES
+
+    width = max(map(len, SCENES))
+    for scene in SCENES.values():
+        click.echo(f"{scene.name:<{width}}  {scene.title}")
+
+
+@jobs.command()
+@click.argument("shell", type=click.Choice(("bash", "zsh", "fish")))
+@click.pass_context
+def completion(context: click.Context, shell: str) -> None:
+    """Print a script with which a shell completes commands, options and scenes.
+
+    \b
+    Examples, for this session or a shell's start file:
+      source <(fotismos completion bash)
+      fotismos completion fish | source
+    In bash, for the run script of a copy of the project, from its folder:
+      source <(./run completion bash); complete -o nosort -F _fotismos_completion ./run
+    """  # noqa: D301 click reads the \b as: keep these lines
+    made = get_completion_class(shell)
+    assert made is not None, "click knows these shells"
+    script = made(context.find_root().command, {}, "fotismos", COMPLETION)
+    # Not .source(), which starts a bash to look at its version.
+    click.echo(script.source_template % script.source_vars())
 
 
 class Commands(Mapping[str, click.Command]):
-    """The commands by their names: one per module of `reports.commands`, imported on demand."""
+    """The commands by their names; a module is imported when its command is looked up."""
 
     def __getitem__(self, name: str) -> click.Command:
         if name not in set(self):
             raise KeyError(name)
-        return getattr(import_module(f"reports.commands.{name}"), name)
+        own = {"scenes": scenes, "completion": completion}
+        return own.get(name) or getattr(import_module(f"reports.commands.{name}"), name)
 
     def __iter__(self) -> Iterator[str]:
-        return (module.name for module in iter_modules(reports.commands.__path__))
+        return (name for names in COMMANDS.values() for name in names)
 
     def __len__(self) -> int:
-        return sum(1 for _ in self)
+        return sum(map(len, COMMANDS.values()))
 
 
-class Group(click.Group):
-    """A group that suggests a command for a mistyped one."""
+class Group(jobs.Helped, click.Group):
+    """A group with commands in groups, which suggests one for a mistyped one."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Return the names in the order of the groups."""
+        return list(self.commands)
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, and the commands with their whole summaries."""
+        super().format_options(context, formatter)
+        for group, names in COMMANDS.items():
+            with formatter.section(group):
+                found = ((name, self.commands[name].get_short_help_str(1000)) for name in names)
+                formatter.write_dl(list(found))
 
     def resolve_command(self, context: click.Context, words: list[str]) -> Any:
         """Find the command that the first word names."""
@@ -75,17 +134,12 @@ def cli() -> None:
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
     llvm.require_libraries()
-    _require_environment()
-
-
-def _require_environment() -> None:
-    """Reject surroundings that break a command after its work is done."""
     try:
         os.getcwd()
     except OSError as error:
         raise InputError(f"the current folder: {error.strerror}. Enter one that exists.") from error
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    if not epoch.isdecimal():  # Matplotlib dates pictures by it
+    if not epoch.isdecimal():  # Matplotlib dates pictures by it, after all else is done
         raise InputError(
             f"SOURCE_DATE_EPOCH={epoch!r} is not a number of seconds. Unset the variable, or set"
             " it to one."
@@ -95,11 +149,7 @@ def _require_environment() -> None:
 def main() -> None:
     """Run the command line, and exit with its code."""
     try:
-        code = cli(
-            prog_name=shlex.join(program()),
-            complete_var=VARIABLE,
-            standalone_mode=False,
-        )
+        code = cli(prog_name=shlex.join(program()), complete_var=COMPLETION, standalone_mode=False)
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
         click.echo(
             "fotismos: interrupted; finished scenes are kept, and the same command resumes.",
@@ -110,14 +160,14 @@ def main() -> None:
         error.show()
         sys.exit(2)
     except FotismosError as error:
-        verbosity.echo(f"fotismos: error: {error}", err=True)
+        echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
     except BrokenPipeError:  # the reader of the output closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
     except OSError as error:  # standard output on a full disk, above all
         place = error.filename or "output"
-        verbosity.echo(f"fotismos: error: {place}: {error.strerror}.", err=True)
+        echo(f"fotismos: error: {place}: {error.strerror}.", err=True)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(2)
     else:

@@ -6,6 +6,7 @@ import gc
 import logging
 import math
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,7 +23,7 @@ from comparisons.options import Options
 from comparisons.processes.pool import Pool, cores
 from heuristic import llvm, program
 from heuristic.errors import InputError, suggestion
-from reports.terminal import verbosity
+from reports.terminal.words import echo, level
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Decorator: TypeAlias = Callable[[Any], Any]
@@ -77,6 +78,50 @@ def require_known(names: Iterable[str]) -> None:
             )
         builtin(name)
 
+
+# --- Help ------------------------------------------------------------------------------------
+
+RESULTS = "Results"
+GROUPS = {
+    "What is rendered": {*Options.__struct_fields__, "scripts"},
+    RESULTS: {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
+    "Bounds and CI": {"max_mean", "max_visible", "within", "junit", "summary", "link"},
+    "Processes": {"timeout", "workers", "scheduler"},
+}
+"""The groups of options in help; a command's own options come first."""
+
+
+class Helped(click.Command):
+    """A command whose help groups its options, and begins examples as the user began."""
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, one group after the other."""
+        rows: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(context):
+            shown = parameter.get_help_record(context)
+            if shown and isinstance(parameter, click.Option):
+                known = (group for group, names in GROUPS.items() if parameter.name in names)
+                rows.setdefault(next(known, "Options"), []).append(shown)
+        for group in ("Options", *GROUPS):
+            if group in rows:
+                with formatter.section(group):
+                    formatter.write_dl(rows[group])
+
+    def get_help(self, context: click.Context) -> str:
+        """Return the help, with commands as the user types them."""
+        return as_typed(super().get_help(context))
+
+
+def as_typed(text: str) -> str:
+    """Return a help text whose examples begin with the words that start the program."""
+    return re.sub(r"(?m)(^ +|[`(])fotismos (?=\w)", rf"\1{program.command()} ", text)
+
+
+command = partial(click.command, cls=Helped)
+"""The decorator of all commands."""
+
+
+# --- Options ---------------------------------------------------------------------------------
 
 scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
 scenes_argument = click.argument(
@@ -274,12 +319,12 @@ class Ready:
     @classmethod
     def among(cls, workers: int) -> Ready:
         """Return the preparation of one of this many processes of this machine."""
-        return cls(verbosity.level(), max(1, cores() // workers) if workers > 1 else None)
+        return cls(level(), max(1, cores() // workers) if workers > 1 else None)
 
     @classmethod
     def far_away(cls) -> Ready:
         """Return the preparation of a process on another machine."""
-        return cls(verbosity.level(), None, os.getcwd(), shlex.join(program.program()))
+        return cls(level(), None, os.getcwd(), shlex.join(program.program()))
 
     def __call__(self) -> None:
         """Get this process ready."""
@@ -298,7 +343,7 @@ class Ready:
         from reference.scene import messages
 
         # Unless verbose, a message is ignored: the record has the warnings that concern it.
-        messages.divert(partial(verbosity.echo, err=True) if self.level > 0 else lambda _: None)
+        messages.divert(partial(echo, err=True) if self.level > 0 else lambda _: None)
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up
@@ -333,7 +378,7 @@ def _within(folder: Path, with_scripts: bool) -> list[str]:
         note = f"{folder}: {names}: scripts are code, run only with --scripts"
         if not written:
             raise InputError(f"{note}. The folder has no other scene.")
-        verbosity.echo(f"fotismos: {note}.", err=True)
+        echo(f"fotismos: {note}.", err=True)
     return list(map(str, written))
 
 

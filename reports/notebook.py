@@ -44,7 +44,7 @@ from reports.ci import baselines, checks
 from reports.ci.checks import CheckRecord
 from reports.page import page
 from reports.run.scene import view_of
-from reports.terminal.tables import PlanReport, plan_report
+from reports.terminal.plan_lines import PlanReport, plan_report
 from reports.terminal.words import number
 
 HEIGHT = 900

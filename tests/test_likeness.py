@@ -14,7 +14,7 @@ from comparisons.options import Options
 from comparisons.pictures import likeness
 from comparisons.prepared import guarded
 from reference.records import read
-from reports.terminal import words
+from reports import verdict
 from tests.test_pictures import write
 
 SIZE = 96, 72
@@ -38,8 +38,8 @@ def test_the_nearest_says_what_is_there_and_what_is_not():
     assert (found.outcome, found.simulates, found.lacks) == ("named", A, B)
     assert (found.undecided, found.dE2000, found.next_dE2000) == ((), 0.5, 4)
     assert found.gap.value == 3.5
-    assert words.lacking(found) == "gloss"
-    assert words.nearest_sentence(found) == (
+    assert verdict.lacking(found) == "gloss"
+    assert verdict.nearest_sentence(found) == (
         "is nearest to textbook shading, with shadow, without gloss (mean ΔE2000 0.500; the next"
         " 4.00)"
     )
@@ -51,7 +51,7 @@ def test_what_is_not_told_apart_is_undecided():
         made = distances(noise, none=9, a=0.5, b=8, both=both) | {BOTH: np.full(5, both)}
         assert nearest(made).undecided == undecided
     plain = nearest(distances(none=0.5, a=0.52, b=8, both=9))
-    assert words.lacking(plain) == "gloss; perhaps shadow"
+    assert verdict.lacking(plain) == "gloss; perhaps shadow"
 
 
 def test_a_picture_that_no_rendering_is_near_is_not_explained():
@@ -60,9 +60,9 @@ def test_a_picture_that_no_rendering_is_near_is_not_explained():
         assert nearest(distances(none=9, a=a, b=8, both=both)).outcome == outcome
     itself = nearest(distances(none=9, a=8, b=8, both=3))
     assert itself.outcome == "unexplained"
-    assert "the reference itself, the nearest, is 3.00 away" in words.nearest_sentence(itself)
+    assert "the reference itself, the nearest, is 3.00 away" in verdict.nearest_sentence(itself)
     alike = nearest(distances(none=9, a=0.2, b=8, both=0.9))
-    assert words.lacking(alike) == "nothing visible"
+    assert verdict.lacking(alike) == "nothing visible"
 
 
 def test_a_picture_is_averaged_down_as_the_film_would(rgb):

@@ -17,7 +17,7 @@ import click
 from comparisons import atomic
 from heuristic import program
 from heuristic.errors import InputError, OutputError
-from reports.terminal.verbosity import visible
+from reports.terminal.words import visible
 
 if TYPE_CHECKING:
     from comparisons.check.moved import Move

@@ -1,13 +1,19 @@
 """``fotismos audit``: properties of a heuristic or a BSDF, before any scene."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.run import tasks
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+
+if TYPE_CHECKING:
+    from comparisons.audit.audit_record import Audit
+    from comparisons.audit.checks import Kind
 
 
 def _parameter(text: str) -> tuple[str, float | bool | str]:
@@ -21,7 +27,7 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
         return name, {"true": True, "false": False}.get(value, value)
 
 
-@click.command()
+@jobs.command()
 @click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
               help="What `compare --heuristic` takes.")  # fmt: skip
 @click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba, such as roughplastic.")
@@ -29,8 +35,8 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
               help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out", "audit/NAME")
 @jobs.timeout_option
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 @jobs.json_option
 def audit(
     heuristic: str | None,
@@ -69,12 +75,12 @@ def audit(
             folder = own(top / "audit")
             (place,) = assigned(folder, [_folder_of(name)])
             words = (kind, name, dict(parameters), command, folder / place)
-            record = pool.do(Task(name, tasks.audited, words))
+            record = pool.do(Task(name, audited, words))
     if as_json:
         click.echo(to_json(record), nl=False)
     else:
-        verbosity.tell(audit_lines.lines(record))
-        verbosity.tell_where(folder / place / PAGE)
+        tell(audit_lines.lines(record))
+        tell_where(folder / place / PAGE)
     if record.faults:
         click.get_current_context().exit(1)
 
@@ -87,3 +93,18 @@ def _folder_of(name: str) -> tuple[str, Path | None]:
         return name, None
     file, function = Path(place[0]), place[1]
     return "-".join(filter(None, (file.stem, function))), Path(name)
+
+
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, place: Path) -> Audit:
+    """Audit a heuristic or a BSDF, and write the audit's files."""
+    from comparisons.audit.checks import audit
+    from comparisons.case import RGB
+    from heuristic import plugins
+    from reference.scene.graph import set_variant
+    from reports.run import audit_files
+
+    set_variant(RGB)
+    plugins.register()
+    record = audit(kind, name, parameters, command)
+    audit_files.write(place, record)
+    return record

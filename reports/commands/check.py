@@ -10,10 +10,10 @@ from click.core import ParameterSource
 from heuristic.errors import InputError
 from reports import jobs
 from reports.ci import summary as summaries
-from reports.terminal import verbosity
+from reports.terminal.words import echo, is_quiet, quiet_option, tell, verbose_option
 
 
-@click.command()
+@jobs.command()
 @click.argument("baseline", type=click.Path(path_type=Path), metavar="BASELINE")
 @click.option("--update", is_flag=True, help="Write what moved to BASELINE, and print it.")
 @click.option(
@@ -44,8 +44,8 @@ from reports.terminal import verbosity
 @jobs.scheduler_option
 @jobs.rendering_options
 @jobs.scene_options
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 @click.pass_context
 def check(
     context: click.Context,
@@ -112,7 +112,7 @@ def check(
     place = str(folder / results.PAGE) if views else ""
     for made in found:
         if made.status == "error":
-            verbosity.echo(f"fotismos: error: {made.message}", err=True)
+            echo(f"fotismos: error: {made.message}", err=True)
     summaries.write_junit(junit, lambda: summaries.junit_of_checks(found))
     address = (link or place) if views else ""
     summaries.append(summary, lambda: summaries.of_checks(found, significance, address))
@@ -120,8 +120,8 @@ def check(
     if as_json:
         record = checks.Checks(passed=not code, significance=significance, checks=tuple(found))
         click.echo(to_json(record), nl=False)
-    elif not verbosity.is_quiet():
-        verbosity.tell(summaries.lines(found, significance))
+    elif not is_quiet():
+        tell(summaries.lines(found, significance))
         if place:
             click.echo(f"page: {place}")
     elif code:

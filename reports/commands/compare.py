@@ -12,13 +12,13 @@ from reports import jobs
 from reports.ci import gates
 from reports.ci import summary as summaries
 from reports.run import batch
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell, verbose_option
 
 if TYPE_CHECKING:
     from reports.page.scene_view import SceneView
 
 
-@click.command()
+@jobs.command()
 @jobs.scenes_argument
 @jobs.output_option("out")
 @jobs.figures_option
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 @jobs.rendering_options
 @jobs.option("image")
 @jobs.option("transfer")
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 @jobs.option("noise")
 @jobs.scene_options
 @click.option(
@@ -106,7 +106,7 @@ def compare(
         nonlocal failed
         found = gates.evaluate([view.record for view in views], max_mean, max_visible)
         if found:
-            verbosity.tell(gates.lines(found))
+            tell(gates.lines(found))
         failed = any(gate.state == gates.FAILED for gate in found)
         page = link or str(folder / "index.html")
         summaries.write_junit(junit, lambda: summaries.junit_of_gates(found))

@@ -1,26 +1,31 @@
 """``fotismos cost``: what each step of accuracy costs in time."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from comparisons.processes.pool import Task
 from heuristic.errors import InputError
 from reports import jobs
-from reports.run import tasks
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+
+if TYPE_CHECKING:
+    from comparisons.cost.cost_record import Cost
+    from comparisons.options import Options
 
 
-@click.command()
+@jobs.command()
 @jobs.scene_argument
 @jobs.output_option("out", "cost/SCENE")
 @jobs.figures_option
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option(
     "--at", type=jobs.resolution, metavar="WxH", help="Predict time and error at this size."
@@ -70,10 +75,38 @@ def cost(
             with progress.shown() as bar:
                 asked = (scene, jobs.request(rendering), rounds, at, is_measured)
                 words = (*asked, folder / place, for_print)
-                record = pool.do(Task(place, tasks.measured, words, bar.of(place)))
+                record = pool.do(Task(place, measured, words, bar.of(place)))
             tables.write_cost(folder / TABLES, place, record)
     if as_json:
         click.echo(to_json(record), nl=False)
         return
-    verbosity.tell(cost_tables.lines(record))
-    verbosity.tell_where(folder / place / PAGE)
+    tell(cost_tables.lines(record))
+    tell_where(folder / place / PAGE)
+
+
+def measured(
+    name: str,
+    request: Options,
+    rounds: int | None,
+    at: tuple[int, int] | None,
+    is_measured: bool,
+    place: Path,
+    figures: Path | None,
+    progress: Any,
+) -> Cost:
+    """Study what each step of accuracy costs, and write its files."""
+    from comparisons.case import open_case
+    from comparisons.cost.cost import cost
+    from comparisons.cost.measure import Effort
+    from reports.charts.figures import write_cost
+    from reports.run import cost_files
+
+    case = open_case(name, request)
+    effort = Effort() if rounds is None else Effort(rounds=rounds)
+    size = at and f"{at[0]}x{at[1]}"
+    words = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
+    study = cost(case.source, case.options, effort, progress, words, at, is_measured)
+    cost_files.write(place, study)
+    if figures is not None:
+        write_cost(figures, place.name, study.record)
+    return study.record

@@ -30,7 +30,7 @@ CHANGES = {
 """What another version than the pinned one changes; whether meshes work, ``doctor`` tries."""
 
 
-@click.command()
+@jobs.command()
 def doctor() -> None:
     """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
 

@@ -3,22 +3,20 @@
 from pathlib import Path
 from typing import Any
 
-import click
-
+from comparisons.options import Options
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.run import tasks
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell_where, verbose_option
 
 
-@click.command()
+@jobs.command()
 @jobs.scene_argument
 @jobs.output_option("out", "export/SCENE")
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     """Write a scene for another program to render, for `compare --image`.
 
@@ -39,5 +37,16 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
             folder = own(top / "export")
             (place,) = places(folder, [scene])
             words = (scene, jobs.request(rendering), folder / place)
-            pool.do(Task(place, tasks.exported, words))
-    verbosity.tell_where(folder / place)
+            pool.do(Task(place, exported, words))
+    tell_where(folder / place)
+
+
+def exported(name: str, request: Options, place: Path) -> None:
+    """Write the files that another program needs to render a scene."""
+    from comparisons.case import open_case
+    from comparisons.plain_scene import plain_scene
+    from reports.files import export_files
+
+    case = open_case(name, request)
+    scene = plain_scene(case.source, case.options)
+    export_files.write(place, scene, case.command(image="YOURS.exr"))

@@ -1,18 +1,24 @@
 """``fotismos fit``: the best heuristic parameters, and the error that remains."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.run import tasks
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+
+if TYPE_CHECKING:
+    from comparisons.fit.fit import FitOptions
+    from comparisons.fit.fit_record import FitRecord
+    from comparisons.options import Options
 
 
-@click.command()
+@jobs.command()
 @jobs.scenes_argument
 @jobs.output_option("out", "fit/SCENE")
 @click.option(
@@ -40,8 +46,8 @@ from reports.terminal import verbosity
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 def fit(
     scenes: tuple[str, ...],
     output: Path,
@@ -79,7 +85,7 @@ def fit(
             folders = places(folder, scenes)
             with progress.shown() as bar:
                 fits = [
-                    Task(place, tasks.fitted, (scene, *common, folder / place), bar.of(place))
+                    Task(place, fitted, (scene, *common, folder / place), bar.of(place))
                     for place, scene in folders.items()
                 ]
                 records = [outcome.result() for _, outcome in pool.each(fits)]
@@ -87,5 +93,24 @@ def fit(
         click.echo(json.dumps(plain(records), indent=2, ensure_ascii=False))
         return
     for record in records:
-        verbosity.tell(fit_files.lines(record))
-    verbosity.tell_where(folder)
+        tell(fit_files.lines(record))
+    tell_where(folder)
+
+
+def fitted(
+    name: str,
+    request: Options,
+    chosen: FitOptions,
+    words: dict[str, Any],
+    place: Path,
+    progress: Any,
+) -> FitRecord:
+    """Fit the heuristic to a scene, and write the fit's files; ``words`` are for its command."""
+    from comparisons.case import open_case
+    from comparisons.fit.fit import fit
+    from reports.run import fit_files
+
+    case = open_case(name, request)
+    result = fit(case.source, case.options, chosen, progress, case.command("fit", **words))
+    fit_files.write(place, result)
+    return result.record

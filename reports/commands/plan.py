@@ -1,17 +1,24 @@
 """``fotismos plan``: which effects a scene calls for."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.run import tasks
-from reports.terminal import verbosity
+from reports.terminal.words import tell, verbose_option
+
+if TYPE_CHECKING:
+    from comparisons.cost.front import Choice
+    from comparisons.options import Options
+    from comparisons.verification import Verification
+    from reports.terminal.plan_lines import PlanReport
 
 
-@click.command()
+@jobs.command()
 @jobs.scene_argument
 @jobs.json_option
 @click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
@@ -27,7 +34,7 @@ from reports.terminal import verbosity
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
-@verbosity.verbose_option
+@verbose_option
 def plan(
     scene: str,
     as_json: bool,
@@ -53,26 +60,60 @@ def plan(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
-        from reports.terminal import cost_tables, progress, tables
+        from reports.terminal import cost_tables, plan_lines, progress
 
         lines: Iterable[str]
         request, code = jobs.request(rendering), 0
         if within is not None:
             with progress.shown() as bar:
                 words = (scene, request, within, metric)
-                found = pool.do(Task(scene, tasks.chosen, words, bar.of(scene)))
+                found = pool.do(Task(scene, chosen, words, bar.of(scene)))
             lines, code = cost_tables.choice_lines(found), int(found.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                task = Task(scene, tasks.verified, (scene, request, None), bar.of(scene))
+                task = Task(scene, verified, (scene, request, None), bar.of(scene))
                 found = pool.do(task)
-            lines = tables.verification_lines([found])
+            lines = plan_lines.verification_lines([found])
         else:
-            found = pool.do(Task(scene, tasks.planned, (scene, request)))
-            lines = tables.plan_lines(found)
+            found = pool.do(Task(scene, planned, (scene, request)))
+            lines = plan_lines.plan_lines(found)
     if as_json:
         click.echo(to_json(found).rstrip())
     else:
-        verbosity.tell(lines)
+        tell(lines)
     if code:
         click.get_current_context().exit(code)
+
+
+def planned(name: str, request: Options) -> PlanReport:
+    """Return the plan of a scene."""
+    from comparisons.case import open_case
+    from comparisons.prepared import prepare
+    from reports.terminal.plan_lines import plan_report
+
+    case = open_case(name, request)
+    return plan_report(case.name, prepare(case.source, case.options), case.variant)
+
+
+def verified(
+    name: str, request: Options, level: float | None, progress: Any = None
+) -> Verification:
+    """Compare the plan of a scene with everything simulated.
+
+    ``level`` is the chance that a right plan is marked; None takes the default.
+    """
+    from comparisons.case import open_case
+    from comparisons.verification import LEVEL, verify
+
+    case = open_case(name, request)
+    usual = LEVEL if level is None else level
+    return verify(case.source, case.options, progress, usual)
+
+
+def chosen(name: str, request: Options, within: float, metric: str, progress: Any) -> Choice:
+    """Measure the ladder of a scene, and name the cheapest method within an error."""
+    from comparisons.case import open_case
+    from comparisons.cost.front import choose
+
+    case = open_case(name, request)
+    return choose(case.source, within, case.options, None, metric, progress)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.run import batch, tasks
-from reports.terminal import verbosity
+from reports.commands.plan import verified
+from reports.run import batch
+from reports.terminal.words import quiet_option, verbose_option
 
 if TYPE_CHECKING:
+    from comparisons.hard.hard_cases import HardCases
     from comparisons.options import Options
 
 VERIFIED_AT = (64, 64)
@@ -31,7 +34,7 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 """``--quick`` verifies one scene in four, from each group."""
 
 
-@click.command()
+@jobs.command()
 @jobs.output_option("out/report")
 @jobs.figures_option
 @jobs.fresh_option
@@ -39,8 +42,8 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @jobs.workers_option
 @jobs.scheduler_option
 @jobs.rendering_options
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @jobs.open_option
 def report(
@@ -86,9 +89,9 @@ def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Furt
     small = request.changed(resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
     verified = [  # the last scenes trace paths, which take longest
-        Task(name, tasks.timed, (tasks.verified, name, small, level)) for name in reversed(names)
+        Task(name, timed, (verified, name, small, level)) for name in reversed(names)
     ]
-    cases = Task(HARD, tasks.timed, (tasks.hard_cases,))
+    cases = Task(HARD, timed, (hard_cases,))
     shown = partial(_shown, names)
     return batch.Further("verification and hard cases", [cases, *verified], shown)
 
@@ -96,3 +99,21 @@ def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Furt
 def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
     """Return the page's content of the results of tasks."""
     return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}
+
+
+def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+    """Return what a task returns, and the seconds that it took."""
+    begin = perf_counter()
+    return function(*arguments), perf_counter() - begin
+
+
+def hard_cases() -> HardCases:
+    """Evaluate the hard cases."""
+    from comparisons.case import RGB
+    from comparisons.hard.hard_cases import collect
+    from heuristic import plugins
+    from reference.scene.graph import set_variant
+
+    set_variant(RGB)
+    plugins.register()
+    return collect()

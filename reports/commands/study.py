@@ -6,17 +6,17 @@ from pathlib import Path
 import click
 
 from reports import jobs
-from reports.terminal import verbosity
+from reports.terminal.words import quiet_option, tell, verbose_option
 
 
-@click.command()
+@jobs.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
 @jobs.output_option("out", "study/NAME")
 @jobs.workers_option
 @jobs.scheduler_option
 @jobs.timeout_option
-@verbosity.quiet_option
-@verbosity.verbose_option
+@quiet_option
+@verbose_option
 def study(
     file: Path, output: Path, workers: int | None, scheduler: str | None, timeout: float
 ) -> None:
@@ -49,6 +49,6 @@ def study(
         with jobs.pool(timeout, tasks, workers, scheduler) as pool, progress.shown("points") as bar:
             outcome = running.run(chosen, folder, pool, bar.of(chosen.name), blocks)
         places = study_files.write(chosen, outcome, folder)
-    verbosity.tell([*study_files.summary(chosen, outcome), ""])
+    tell([*study_files.summary(chosen, outcome), ""])
     for path in places:
         click.echo(os.fsencode(path))

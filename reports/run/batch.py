@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from comparisons.processes.pool import Pool, Task
 from heuristic.errors import FotismosError, InstallationError, OutputError
 from reports import jobs
-from reports.terminal import verbosity
+from reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
     from comparisons.options import Options
@@ -221,7 +221,7 @@ def _compare(
             batch.views[task.name] = view
             for stage, seconds in spent.items():
                 batch.stages[stage] += seconds
-            verbosity.remark([*tables.details(view.record), *tables.shape_lines(view.record)])
+            remark([*tables.details(view.record), *tables.shape_lines(view.record)])
         finally:
             bar.over(task.progress)
         batch.grow_page()
@@ -262,8 +262,8 @@ def _write(
     if errors:
         raise errors[0]
     if views:
-        verbosity.tell(_summary(views))
-    verbosity.tell_where(folder / results.PAGE)
+        tell(_summary(views))
+    tell_where(folder / results.PAGE)
 
 
 def _summary(views: Sequence[SceneView]) -> Iterable[str]:

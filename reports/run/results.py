@@ -18,14 +18,12 @@ from contextlib import contextmanager, suppress
 from datetime import datetime
 from itertools import chain
 from pathlib import Path
-from pkgutil import iter_modules
 from time import perf_counter
 from typing import Annotated
 
 from filelock import FileLock, Timeout
 from msgspec import Meta
 
-import reports.commands
 from comparisons import atomic
 from comparisons.case import file_of, name_of
 from heuristic.errors import InputError, OutputError
@@ -37,9 +35,10 @@ MARK, LOCK = ".fotismos", ".fotismos-lock"
 
 PAGE, RUN, TABLES, FIGURES = "index.html", "run.json", "tables", "figures"
 
-RESERVED = {PAGE, RUN, TABLES, FIGURES, "assets", "departures"} | {
-    module.name for module in iter_modules(reports.commands.__path__)
-}
+RESERVED = {
+    PAGE, RUN, TABLES, FIGURES, "assets", "audit", "check", "cost", "departures", "details.html",
+    "export", "fit", "study",
+}  # fmt: skip
 """Names that no scene's folder may have."""
 
 LONGEST = 100

@@ -16,7 +16,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from reports.terminal import verbosity
+from reports.terminal.words import level, visible
 
 SPEED_OVER_S = 600.0
 """Seconds over which the speed is averaged to estimate the time left: scenes differ."""
@@ -39,9 +39,7 @@ class Bar:
 
     def of(self, scene: str) -> Callable[[str, int, int], None]:
         """Return the callback ``(stage, done, total)`` for one scene."""
-        task = self._progress.add_task(
-            verbosity.visible(scene), total=None, unit=self._unit, is_whole=False
-        )
+        task = self._progress.add_task(visible(scene), total=None, unit=self._unit, is_whole=False)
         return partial(self._update, task)
 
     def begin(self, stage: str, count: int, weight: float) -> None:
@@ -89,6 +87,6 @@ def shown(unit: str = "passes", total: float | None = None) -> Iterator[Bar]:
         console=console,
         transient=True,
         speed_estimate_period=SPEED_OVER_S,
-        disable=not console.is_terminal or verbosity.level() < 0,
+        disable=not console.is_terminal or level() < 0,
     ) as progress:
         yield Bar(progress, unit, total)

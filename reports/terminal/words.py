@@ -1,17 +1,99 @@
-"""Numbers and sentences, the same on a terminal and on every page."""
+"""What is printed, and how: amount, safety, numbers.
+
+Results go to standard output, everything else to standard error. Numbers are the same on a terminal
+and on every page.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import os
+import re
+import unicodedata
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.statistics import Summary
-from comparisons.hybrids.nearness import Nearest, Renderings
+import click
 
-#: A departure of this size, in the leading metric, can be seen.
+if TYPE_CHECKING:  # loads the metrics, and `--help` needs none
+    from comparisons.departure.statistics import Summary
+
 NOTICEABLE = 1.0
+"""A departure of this size, in the leading metric, can be seen."""
+
+LEVEL = "fotismos.verbosity"
+"""Key of the level in click's context: -1 quiet, 0 normal, 1 verbose."""
+
+
+def _remember(context: click.Context, parameter: click.Parameter, is_set: bool) -> None:
+    if is_set:
+        context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
+
+
+def _option(letter: str, name: str, help: str) -> Callable[[Any], Any]:
+    return click.option(
+        letter, name, is_flag=True, expose_value=False, callback=_remember, help=help
+    )
+
+
+quiet_option = _option("-q", "--quiet", "Print only where the results are, no progress or tables.")
+verbose_option = _option(
+    "-v",
+    "--verbose",
+    "Also print the simulation, the pairing of lights, warnings, and times.",
+)
+
+
+def level() -> int:
+    """Return -1 for a quiet command, 1 for a verbose one, else 0."""
+    context = click.get_current_context(silent=True)
+    return context.meta.get(LEVEL, 0) if context else 0
+
+
+def is_quiet() -> bool:
+    """Return whether the command is quiet."""
+    return level() < 0
+
+
+def visible(text: str) -> str:
+    """Return a line that no terminal or CI service takes for a command.
+
+    Control characters, which names from a scene may have, are shown as escapes. GitHub reads lines
+    that begin with ``::``, Azure and TeamCity ``##name[``.
+    """
+    shown = "".join(
+        c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text
+    )
+    return re.sub(r"##(?=\w*\[)", "# #", re.sub(r"^(\s*)::", r"\1\\::", shown))
+
+
+def echo(text: str, err: bool = False) -> None:
+    """Print text, each line as :func:`visible` returns it."""
+    click.echo("\n".join(map(visible, text.split("\n"))), err=err)
+
+
+def tell(lines: Iterable[str]) -> None:
+    """Print lines of a result, unless the command is quiet."""
+    if not is_quiet():
+        for line in lines:
+            click.echo(visible(line))
+
+
+def tell_where(path: Path) -> None:
+    """Print where the results are; a quiet command prints nothing else."""
+    name = os.fsencode(path)  # unchanged, even if it is not in UTF-8
+    click.echo(name if is_quiet() else b"\n" + name)
+
+
+def remark(lines: Iterable[str]) -> None:
+    """Print lines on standard error, if the command is verbose."""
+    if level() > 0:
+        for line in lines:
+            click.echo(visible(line), err=True)
+
+
+# --- Numbers ---------------------------------------------------------------------------------
 
 
 def number(value: float | None) -> str:
@@ -68,69 +150,3 @@ def may_be_none(metric: Summary) -> bool:
 
 def _minus(digits: str) -> str:
     return digits.replace("-", "−")
-
-
-def nearest_lines(record: ComparisonRecord) -> Iterator[str]:
-    """Yield what a picture seems to lack, as a whole and where it departs most; or nothing."""
-    picture = record.picture
-    if not picture or not picture.nearest or not picture.renderings:
-        return
-    yield f"As a whole, the picture {nearest_sentence(picture.nearest)}."
-    for region in record.regions[:1]:
-        if region.nearest:
-            yield (
-                f"Where it departs most ({percent(region.share)} of the error), it"
-                f" {nearest_sentence(region.nearest)}."
-            )
-    yield caution(picture.renderings)
-
-
-def nearest_sentence(nearest: Nearest) -> str:
-    """Return what a picture is nearest to, as the rest of a sentence about it."""
-    away, reference = (difference(value) for value in (nearest.dE2000, nearest.reference_dE2000))
-    if nearest.outcome == "alike":
-        return f"hardly differs from the reference (mean {LEADING.label} {reference})"
-    rendering = _rendering(nearest)
-    if nearest.outcome == "unexplained":
-        return (
-            f"is near none of the renderings: {rendering}, the nearest, is {away} away, the"
-            f" reference {reference}"
-        )
-    following = f"; the next {difference(nearest.next_dE2000)}" if nearest.gap else ""
-    return f"is nearest to {rendering} (mean {LEADING.label} {away}{following})"
-
-
-def lacking(nearest: Nearest | None) -> str:
-    """Return the effects that a part of a picture seems to lack, in a few words."""
-    if nearest is None:
-        return "unknown"
-    if nearest.outcome != "named":
-        return {"alike": "nothing visible", "unexplained": "unexplained"}[nearest.outcome]
-    perhaps = f"perhaps {', '.join(nearest.undecided)}" if nearest.undecided else ""
-    return "; ".join(filter(None, (", ".join(nearest.lacks), perhaps))) or "nothing"
-
-
-def caution(renderings: Renderings) -> str:
-    """Return what a nearest rendering is, and what it is not."""
-    width, height = renderings.resolution
-    return (
-        f"Nearest of {renderings.count} renderings between textbook shading and the reference, at"
-        f" {width} x {height} pixels. This is not an attribution: distances do not add up, and"
-        " other mistakes can look like a missing effect."
-    )
-
-
-def _rendering(nearest: Nearest) -> str:
-    """Name the nearest renderings."""
-    if not nearest.lacks and not nearest.undecided:
-        return "the reference itself"
-    parts = ["textbook shading"]
-    for word, effects in (
-        ("with", nearest.simulates),
-        ("without", nearest.lacks),
-        ("with or without", nearest.undecided),
-    ):
-        if effects:
-            listed = " and ".join(filter(None, (", ".join(effects[:-1]), effects[-1])))
-            parts.append(f"{word} {listed}")
-    return ", ".join(parts)

@@ -1,0 +1,122 @@
+"""The plan of a scene, as ``fotismos plan`` prints it, and its verification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from msgspec.structs import asdict
+
+from comparisons.prepared import Prepared
+from comparisons.record import plan_record
+from reference.planning.effects import Decision, labelled
+from reference.planning.plan import Plan
+from reference.records import VERSION, Amount, Record
+from reports.terminal.tables import printed
+
+if TYPE_CHECKING:
+    from comparisons.verification import Verification
+
+
+class PlannedEffect(Record):
+    """Whether a scene calls for an effect, why, and what simulates it on either side."""
+
+    name: str
+    called_for: bool
+    rule: str
+    evidence: str
+    heuristic: str
+    reference: str
+    cost: str
+
+
+class PlanReport(Plan, kw_only=True):
+    """The output of ``fotismos plan --json``."""
+
+    scene: str
+    variant: str
+    shading: str
+    effects: tuple[PlannedEffect, ...]  # type: ignore[assignment]
+    planning_s: Amount
+    record_version: int = VERSION
+
+
+def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
+    """Return the plan of a prepared comparison."""
+    made = plan_record(ready, ready.reference.spp * ready.passes, ready.passes)
+    return PlanReport(
+        scene=scene,
+        variant=variant,
+        shading=ready.pair.shading,
+        planning_s=ready.planning_seconds,
+        **asdict(made) | {"effects": tuple(map(_planned, made.effects))},
+    )
+
+
+def _planned(decision: Decision) -> PlannedEffect:
+    effect = labelled(decision.name)
+    rule, _, evidence = decision.rule.partition(": ")
+    return PlannedEffect(
+        name=effect.label,
+        called_for=decision.called_for,
+        rule=rule,
+        evidence=evidence,
+        heuristic=effect.heuristic,
+        reference=effect.reference,
+        cost=effect.cost,
+    )
+
+
+def plan_lines(plan: PlanReport) -> Iterator[str]:
+    """Yield the lines of a plan: the table of effects, then the simulation."""
+    yield from printed(_effects(plan))
+    yield ""
+    if plan.rules:
+        yield from printed(_rules(plan))
+        yield ""
+    depth = "no limit" if plan.max_depth < 0 else plan.max_depth
+    rays = "" if plan.shadows else ", no shadow rays"
+    rays += ", environment from a table" if plan.tabulated_environment else ""
+    reads = ", ".join(plan.heuristic_reads) or "nothing"
+    yield f"heuristic     {plan.shading}, which reads {reads}"
+    yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
+    yield f"variant       {plan.variant}"
+    yield f"integrator    {plan.integrator}{rays}"
+    yield f"depth         {depth}"
+    yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
+    yield f"planning      {plan.planning_s * 1e3:.0f} ms"
+
+
+def verification_lines(results: Sequence[Verification]) -> Iterator[str]:
+    """Yield a table of verifications: differences, noise, and time at equal noise."""
+    yield from printed(_verifications(results))
+    yield "significant: pixels that differ by more than both sides' noise"
+    yield "kernel: largest difference from omitting terms from the kernel"
+    yield "faster: how many times sooner the plan reaches the same noise; 95 % intervals"
+
+
+def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "effect", "called for", "rule", "evidence", "cost"
+    for effect in plan.effects:
+        called = "yes" if effect.called_for else "no"
+        yield effect.name, called, effect.rule, effect.evidence, effect.cost
+
+
+def _rules(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "pruning rule", "applies", "premise not known to hold", "evidence"
+    for rule in plan.rules:
+        yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
+
+
+def _verifications(results: Sequence[Verification]) -> Iterator[Sequence[str]]:
+    yield "scene", "planned", "significant", "of pixels", "kernel", "faster", "planning"
+    for result in results:
+        yield (
+            result.scene,
+            result.planned,
+            f"{result.significant}",
+            f"{result.pixels}",
+            f"{result.heuristic_largest:.1e}",
+            f"{result.gain.value:.3g} x ({result.gain.low:.3g} to {result.gain.high:.3g})",
+            f"{result.planning_s * 1e3:.0f} ms of {result.saved_s:.3g} s saved",
+        )
