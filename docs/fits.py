@@ -34,7 +34,7 @@ def _scene_rows(records: Sequence[FitRecord]) -> Iterator[Cells]:
     errors = ("parameter error (loss)", "model error (loss)")
     yield "scene", "best form", *labels, *errors, "seconds"
     for record in records:
-        best, seconds = record.nearest, record.time.rendering_s + record.time.fitting_s
+        best, seconds = record.nearest, sum(record.time.values())
         departures = [best.departure[name] for name in drawn()]
         cells = [f"{d.before:.3f} → {d.after:.3f} ({d.noise_floor:.3f})" for d in departures]
         parts = three_decimals(best.parameter_error), three_decimals(best.loss)

@@ -167,13 +167,12 @@ def fit(
     scene: Scene,
     name: str | None = None,
     loss: str = "perceptual",
-    intensities: bool = False,
     **options: Any,
 ) -> FitRecord:
     """Return the best heuristic parameters, and the error that remains; see :func:`compare`."""
     case = open_case(scene, Options.of(options), name)
-    chosen = FitOptions(loss=loss, intensities=intensities)
-    return fit_parameters(case.source, case.options, chosen, None, case.command("fit")).record
+    command = case.command("fit")
+    return fit_parameters(case.source, case.options, FitOptions(loss), None, command).record
 
 
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:

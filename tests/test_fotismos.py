@@ -27,7 +27,7 @@ small = {"resolution": (12, 8), "spp": 4}
 print(fotismos.plan("fig-8-9", **small).integrator)
 print(fotismos.compare(mi.cornell_box(), "box", **small).comparison.record.scene)
 print(fotismos.declare(fotismos.Heuristic(name="grey", shade=lambda point: 0.5)).name)
-print(fotismos.fit("fig-8-9", intensities=False, resolution=(12, 8), spp=4).scene)
+print(fotismos.fit("fig-8-9", resolution=(12, 8), spp=4).scene)
 print(fotismos.check(BASELINE).status)
 """
 

@@ -9,7 +9,7 @@ declares.
 """
 
 from dataclasses import dataclass
-from math import exp, isfinite, log, sqrt
+from math import log
 from time import perf_counter
 from typing import Any
 
@@ -20,29 +20,18 @@ from numpy.typing import NDArray
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import drawn
 from comparisons.departure.statistics import noise_floor
-from comparisons.fit import model, surface
+from comparisons.fit import model
 from comparisons.fit.fit_record import (
     FitDeparture,
     FitRecord,
-    FittedLight,
     FittedMaterial,
-    FittedParameter,
-    FitTimes,
     FormFit,
-    LossName,
+    parameter_record,
+    phong_record,
+    physical_materials,
 )
-from comparisons.fit.model import FitParameter, OwnModel, PhongModel
-from comparisons.fit.search import (
-    AT_BOUND,
-    COVERAGE,
-    LOSSES,
-    Certainty,
-    Objective,
-    SearchStart,
-    bounded_minimum,
-    identify,
-    search,
-)
+from comparisons.fit.model import OwnModel, PhongModel, Surface
+from comparisons.fit.search import COVERAGE, LOSSES, Objective, bounded_minimum, identify, search
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from comparisons.record import versions, warnings
@@ -50,7 +39,6 @@ from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG, Heuristic, named
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
-from heuristic.terms import normalisation
 from reference.records import Pixels
 from reference.rendering.passes import Progress, pass_seed, passes
 from reference.rendering.renderer import variant
@@ -75,16 +63,25 @@ REACH = 4.0
 
 
 @dataclass(frozen=True)
+class Fit:
+    """A fit: its record, linear images (H, W, 3), and maps (H, W) of the best form, by metric."""
+
+    record: FitRecord
+    before: NDArray
+    reference: NDArray
+    after: NDArray
+    maps: dict[str, NDArray]
+
+
+@dataclass(frozen=True)
 class FitOptions:
     """Choices of a fit besides the rendering.
 
-    ``loss`` is a name in :data:`comparisons.fit.search.LOSSES`; ``forms`` are forms of the lobe;
-    with ``intensities``, those of the lights are fitted too, each by one factor.
+    ``loss`` is a name in :data:`comparisons.fit.search.LOSSES`; ``forms`` are forms of the lobe.
     """
 
     loss: str = "perceptual"
     forms: tuple[str, ...] = FORMS
-    intensities: bool = False
 
     def __post_init__(self):
         if self.loss not in LOSSES:
@@ -102,25 +99,11 @@ class RenderedHalves:
     before: NDArray
     reference: Estimate
     difference: Estimate
-    counted: NDArray[np.bool_]
 
-
-@dataclass(frozen=True)
-class FitImages:
-    """Linear images (H, W, 3), and residual maps (H, W) after the fit, by metric."""
-
-    before: NDArray
-    reference: NDArray
-    after: NDArray
-    maps: dict[str, NDArray]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A fit: its record, and the images of the best form."""
-
-    record: FitRecord
-    images: FitImages
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """The pixels that a fit counts."""
+        return self.ready.counted
 
 
 def fit(
@@ -140,11 +123,11 @@ def fit(
     chosen = chosen or FitOptions()
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
-    rendered = _render(guarded(source.edited(filter_by_box), options), options, progress)
+    rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
     rendering = perf_counter() - begin
     if heuristic is PHONG:
         with variant(VARIANT):
-            seen = surface.see(rendered.ready.heuristic, rendered.seeds)
+            seen = model.see(rendered.ready.heuristic, rendered.seeds)
             fits = [_form_fit(rendered, seen, form, chosen, options) for form in chosen.forms]
     else:
         fits = [_own_fit(rendered, heuristic, chosen, options)]
@@ -159,17 +142,16 @@ def fit(
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
-        loss=LossName(name=chosen.loss, unit=LOSSES[chosen.loss].unit),
-        intensities=chosen.intensities,
+        loss={"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
         pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
-        fits=tuple(one for one, _ in fits),
+        fits=tuple(one for one, _, _ in fits),
         best=best,
         warnings=tuple(warnings(ready)),
         versions=versions(),
-        time=FitTimes(rendering_s=rendering, fitting_s=perf_counter() - begin - rendering),
+        time={"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
         command=command,
     )
-    return Fit(record, fits[best][1])
+    return Fit(record, rendered.before, rendered.reference.mean, *fits[best][1:])
 
 
 def _completed(options: Options) -> Options:
@@ -203,7 +185,7 @@ def filter_by_box(graph: Graph) -> None:
         graph.attach(film, "rfilter", box)
 
 
-def _render(ready: Prepared, options: Options, progress: Progress | None) -> RenderedHalves:
+def render(ready: Prepared, options: Options, progress: Progress | None = None) -> RenderedHalves:
     """Render the passes of both halves in turn."""
     if ready.heuristic.variant != VARIANT:
         raise InputError(
@@ -216,29 +198,29 @@ def _render(ready: Prepared, options: Options, progress: Progress | None) -> Ren
         add_difference(sums, one.images)
     before, reference, difference = (total.estimate() for total in sums)
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
-    return RenderedHalves(ready, seeds, before.mean, reference, difference, ready.counted)
+    return RenderedHalves(ready, seeds, before.mean, reference, difference)
+
+
+FormResult = tuple[FormFit, NDArray, dict[str, NDArray]]
+"""The record of a form's fit, its image, and the maps of what it leaves."""
 
 
 def _form_fit(
-    rendered: RenderedHalves,
-    whole: surface.Surface,
-    form: str,
-    chosen: FitOptions,
-    options: Options,
-) -> tuple[FormFit, FitImages]:
+    rendered: RenderedHalves, whole: Surface, form: str, chosen: FitOptions, options: Options
+) -> FormResult:
     """Fit one form of the lobe."""
     loss, counted = LOSSES[chosen.loss], rendered.counted
     seen = whole.within(counted.ravel())
-    fitted = model.parameters(seen, form, loss.sees_colour, chosen.intensities)
+    fitted = model.phong_parameters(seen, form)
     phong = PhongModel(seen, form, fitted)
     objective = Objective(phong, rendered.reference.mean[counted], loss, options.viewing)
     x, least, searches = search(objective, form_starts(objective))
     reached = [len(np.unique(samples["pixel"])) for samples in seen.samples]
-    pixels = [counted.sum() if p.name == "intensity" else reached[p.owner] for p in fitted]
     error = rendered.difference.standard_error[counted]
-    certainties, covariance = identify(objective, x, np.array(pixels), error)
+    pixels = np.array([reached[parameter.owner] for parameter in fitted])
+    certainties, covariance = identify(objective, x, pixels, error)
     records = [
-        _phong_record(phong, place, x, certainties, covariance) for place in range(len(fitted))
+        phong_record(phong, place, x, certainties, covariance) for place in range(len(fitted))
     ]
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
@@ -247,17 +229,14 @@ def _form_fit(
             reference=physical.get(name),
             pixels=reached[owner],
             parameters=tuple(
-                one
-                for one, parameter in zip(records, fitted, strict=True)
-                if parameter.owner == owner and parameter.name != "intensity"
+                one for one, p in zip(records, fitted, strict=True) if p.owner == owner
             ),
         )
         for owner, name in enumerate(seen.names)
     )
-    lights = _lights(rendered.ready, fitted, records) if chosen.intensities else ()
     after = PhongModel(whole, form, fitted).image(x).reshape(rendered.before.shape)
-    parts: dict[str, Any] = {"materials": materials, "lights": lights}
-    return _judged(rendered, objective, least, searches, after, form=form, **parts)
+    parts: dict[str, Any] = {"form": form, "materials": materials, "convergence": searches}
+    return _judged(rendered, objective, least, after, **parts)
 
 
 def form_starts(objective: Objective) -> list[tuple[float | None, NDArray]]:
@@ -283,7 +262,7 @@ def form_starts(objective: Objective) -> list[tuple[float | None, NDArray]]:
 
 def _own_fit(
     rendered: RenderedHalves, heuristic: Heuristic, chosen: FitOptions, options: Options
-) -> tuple[FormFit, FitImages]:
+) -> FormResult:
     """Fit the parameters that a heuristic declares, from places within their bounds."""
     advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
     if not heuristic.traced:
@@ -310,7 +289,7 @@ def _own_fit(
     certainties, covariance = identify(objective, best, pixels, error)
     spread = COVERAGE * np.sqrt(np.diag(covariance))
     records = tuple(
-        _record(
+        parameter_record(
             parameter,
             certainties[i],
             (parameter.paired, x, x - spread[i], x + spread[i]),
@@ -319,31 +298,21 @@ def _own_fit(
         )
         for i, (parameter, x) in enumerate(zip(own.parameters, best.tolist(), strict=True))
     )
-    after, name = own.whole(best), rendered.ready.pair.shading
-    return _judged(rendered, objective, least, searches, after, form=name, own=records)
+    parts = {"form": rendered.ready.pair.shading, "own": records, "convergence": searches}
+    return _judged(rendered, objective, least, own.whole(best), **parts)
 
 
 def _judged(
-    rendered: RenderedHalves,
-    objective: Objective,
-    loss: float,
-    starts: tuple[SearchStart, ...],
-    after: NDArray,
-    **parts: Any,
-) -> tuple[FormFit, FitImages]:
-    """Return the record of a fit, with its departures by metric, and its images."""
+    rendered: RenderedHalves, objective: Objective, loss: float, after: NDArray, **parts: Any
+) -> FormResult:
+    """Return the record of a fit, with its departures by metric."""
     before, reference, counted = rendered.before, rendered.reference.mean, rendered.counted
     by_metric, maps = departures(
         before, after, reference, counted, rendered.difference.noise, objective.viewing
     )
-    record = FormFit(
-        loss=loss,
-        parameter_error=objective.value_of(before[counted]) - loss,
-        departure=by_metric,
-        convergence=starts,
-        **parts,
-    )
-    return record, FitImages(before, reference, after, maps)
+    error = objective.value_of(before[counted]) - loss
+    record = FormFit(loss=loss, parameter_error=error, departure=by_metric, **parts)
+    return record, after, maps
 
 
 def departures(
@@ -366,104 +335,3 @@ def departures(
             noise_floor=noise_floor(metric, reference, noise, counted, viewing),
         )
     return by_metric, maps
-
-
-def _lights(
-    ready: Prepared, fitted: tuple[FitParameter, ...], records: list[FittedParameter]
-) -> tuple[FittedLight, ...]:
-    """Return the factors on the intensities of lights, relative to the first."""
-    # Those that the kernel knows, in its order.
-    emitters = ready.heuristic.scene.emitters()
-    names = [emitter.id() for emitter in emitters if hasattr(emitter, "light")]
-    if not names:
-        return ()
-    reason = "only its products with k_d and k_s show; other lights are relative to it"
-    parameter = FitParameter("intensity", 0, 1.0, 1.0, 1.0)
-    first = _record(parameter, Certainty(reason, (), False), (1.0,) * 4, (1.0, 1.0), [])
-    own = [(0, first), *((p.owner, r) for p, r in zip(fitted, records, strict=True)
-                         if p.name == "intensity")]  # fmt: skip
-    return tuple(
-        FittedLight(light=names[owner], **{k: getattr(one, k) for k in one.__struct_fields__})
-        for owner, one in own
-    )
-
-
-def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
-    """Return the plain parameters of each named BSDF of the physical half."""
-    materials: dict[str, dict[str, Any]] = {}
-    for index in graph.nodes(mi.ObjectType.BSDF):
-        label = graph.label(index)
-        for _, child in graph.children(index, mi.ObjectType.BSDF):
-            index = child  # inside twosided
-        materials[label] = {"plugin": graph.plugin(index)}
-        for key, value in graph.props(index).items():
-            if isinstance(value, bool | int | float | str):
-                materials[label][key] = value
-            elif isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
-                colour = [float(component) for component in value]
-                materials[label][key] = colour[0] if len(set(colour)) == 1 else colour
-    return materials
-
-
-def _phong_record(
-    phong: PhongModel,
-    place: int,
-    x: NDArray,
-    certainties: list[Certainty],
-    covariance: NDArray,
-) -> FittedParameter:
-    """Return one parameter in the chapters' units; ``k_s`` as its material has it."""
-    parameter, certainty = phong.parameters[place], certainties[place]
-    albedo, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
-    raw: tuple[float, ...] = (parameter.paired, albedo, albedo - spread, albedo + spread)
-    limits: tuple[float, ...] = (parameter.low, parameter.high)
-    if parameter.name == "k_s" and not phong.surface.materials[parameter.owner].normalised:
-        at_n, step = phong.place_of_exponent(parameter.owner), 1e-5
-        per_albedo, below, above = (
-            normalisation(phong.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
-        )
-        slopes = np.zeros(len(x))
-        slopes[[place, at_n]] = per_albedo, albedo * (above - below) / (2 * step)
-        spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
-        paired = parameter.paired * normalisation(phong.form, exp(phong.parameters[at_n].paired))
-        fitted = albedo * per_albedo
-        raw, limits = (paired, fitted, fitted - spread, fitted + spread), (0.0, per_albedo)
-        if not certainty.reason and certainties[at_n].reason and albedo > AT_BOUND:
-            reason = "follows from its albedo and n, which is not identifiable"
-            certainty = Certainty(reason, (), certainty.at_bound)
-    elif not parameter.is_linear:
-        raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
-    partners = []
-    for other in certainty.partners:
-        one = phong.parameters[other]
-        names = phong.surface.names
-        owner = f"light {one.owner + 1}" if one.name == "intensity" else names[one.owner]
-        partners.append(f"{one.name}{one.channel and ' ' + one.channel} of {owner}")
-    return _record(parameter, certainty, raw, limits, partners)
-
-
-def _record(
-    parameter: FitParameter,
-    certainty: Certainty,
-    values: tuple[float, ...],
-    limits: tuple[float, ...],
-    partners: list[str],
-) -> FittedParameter:
-    """Return a parameter of which these are the paired and fitted value, and the interval."""
-    paired, fitted, below, above = map(float, values)
-    low, high = map(float, limits)
-    has_interval = not (certainty.reason or certainty.at_bound)
-    return FittedParameter(
-        name=parameter.name,
-        channel=parameter.channel,
-        is_factor=parameter.is_factor or parameter.name == "intensity",
-        paired=paired,
-        fitted=None if certainty.reason else fitted,
-        stopped_at=fitted,
-        interval=(max(below, low), min(above, high)) if has_interval else None,
-        bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
-        at_bound=certainty.at_bound,
-        identifiable=not certainty.reason,
-        reason=certainty.reason,
-        partners=tuple(partners),
-    )

@@ -1,10 +1,19 @@
-"""The record of a fit, ``fit.json``."""
+"""The record of a fit, ``fit.json``, and the parameters in it, in the chapters' units."""
 
-from typing import Any, Literal
+from math import exp, isfinite, sqrt
+from typing import Annotated, Any, Literal
+
+import mitsuba as mi
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
-from comparisons.fit.search import SearchStart
+from comparisons.fit.model import FitParameter, PhongModel
+from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty, SearchStart
+from heuristic.terms import normalisation
 from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
+from reference.scene.graph import Graph
 
 
 class FitDeparture(Record):
@@ -21,16 +30,14 @@ class FitDeparture(Record):
 
 
 class FittedParameter(Record, kw_only=True):
-    """A parameter as the chapters name it.
+    """A parameter as the chapters name it, or of a heuristic's own.
 
     Attributes
     ----------
-    name
-        ``k_a``, ``k_d``, ``k_s``, ``n`` or ``intensity``, or a name that a heuristic declares.
     channel
         Of a coefficient with one number per channel; otherwise empty.
     is_factor
-        Whether the numbers are factors: on a texture, or on a paired intensity.
+        Whether the numbers are factors on a texture.
     paired
         Value by the pairing table.
     fitted
@@ -59,12 +66,6 @@ class FittedParameter(Record, kw_only=True):
     identifiable: bool
     reason: str
     partners: tuple[str, ...] = ()
-
-
-class FittedLight(FittedParameter, kw_only=True):
-    """The factor on the intensity of a light."""
-
-    light: str
 
 
 class FittedMaterial(Record):
@@ -98,8 +99,6 @@ class FormFit(Record, kw_only=True):
         The paired image's loss less the model error: what better parameters remove.
     departure
         By metric.
-    lights
-        Factors on intensities; empty if they were not fitted.
     convergence
         All searches.
     own
@@ -111,35 +110,12 @@ class FormFit(Record, kw_only=True):
     parameter_error: float
     departure: dict[str, FitDeparture]
     materials: tuple[FittedMaterial, ...] = ()
-    lights: tuple[FittedLight, ...] = ()
     convergence: tuple[SearchStart, ...]
     own: tuple[FittedParameter, ...] = ()
 
 
-class LossName(Record):
-    """The loss that was minimised."""
-
-    name: str
-    unit: str
-
-
-class FitTimes(Record):
-    """Seconds."""
-
-    rendering_s: Amount
-    fitting_s: Amount
-
-
 class FitRecord(Record, kw_only=True):
-    """The heuristic parameters nearest to one scene's reference, and the remaining error.
-
-    Attributes
-    ----------
-    best
-        Index in fits of the form with the least loss.
-    command
-        Repeats the fit.
-    """
+    """The heuristic parameters nearest to one scene's reference, and the remaining error."""
 
     record_version: int = VERSION
     scene: str
@@ -150,17 +126,99 @@ class FitRecord(Record, kw_only=True):
     passes: Size
     viewing: Viewing
     pairing: str
-    loss: LossName
-    intensities: bool
+    loss: Annotated[dict[str, str], Meta(description="Name and unit of what was minimised.")]
     pixels: Pixels
     fits: tuple[FormFit, ...]
-    best: Count
+    best: Annotated[Count, Meta(description="Index of the form with the least loss.")]
     warnings: tuple[str, ...]
     versions: Versions
-    time: FitTimes
+    time: dict[str, Amount]
     command: str
 
     @property
     def nearest(self) -> FormFit:
         """The fit of the form with the least loss."""
         return self.fits[self.best]
+
+
+# --- Parameters ---------------------------------------------------------------------------------
+
+
+def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
+    """Return the plain parameters of each named BSDF of the physical half."""
+    materials: dict[str, dict[str, Any]] = {}
+    for index in graph.nodes(mi.ObjectType.BSDF):
+        label = graph.label(index)
+        for _, child in graph.children(index, mi.ObjectType.BSDF):
+            index = child  # inside twosided
+        materials[label] = {"plugin": graph.plugin(index)}
+        for key, value in graph.props(index).items():
+            if isinstance(value, bool | int | float | str):
+                materials[label][key] = value
+            elif isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
+                colour = [float(component) for component in value]
+                materials[label][key] = colour[0] if len(set(colour)) == 1 else colour
+    return materials
+
+
+def phong_record(
+    phong: PhongModel,
+    place: int,
+    x: NDArray,
+    certainties: list[Certainty],
+    covariance: NDArray,
+) -> FittedParameter:
+    """Return one parameter in the chapters' units; ``k_s`` as its material has it."""
+    parameter, certainty = phong.parameters[place], certainties[place]
+    albedo, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
+    raw: tuple[float, ...] = (parameter.paired, albedo, albedo - spread, albedo + spread)
+    limits: tuple[float, ...] = (parameter.low, parameter.high)
+    if parameter.name == "k_s" and not phong.surface.materials[parameter.owner].normalised:
+        at_n, step = phong.place_of_exponent(parameter.owner), 1e-5
+        per_albedo, below, above = (
+            normalisation(phong.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
+        )
+        slopes = np.zeros(len(x))
+        slopes[[place, at_n]] = per_albedo, albedo * (above - below) / (2 * step)
+        spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
+        paired = parameter.paired * normalisation(phong.form, exp(phong.parameters[at_n].paired))
+        fitted = albedo * per_albedo
+        raw, limits = (paired, fitted, fitted - spread, fitted + spread), (0.0, per_albedo)
+        if not certainty.reason and certainties[at_n].reason and albedo > AT_BOUND:
+            reason = "follows from its albedo and n, which is not identifiable"
+            certainty = Certainty(reason, (), certainty.at_bound)
+    elif parameter.name == "n":
+        raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
+    partners = []
+    for other in certainty.partners:
+        one = phong.parameters[other]
+        name = f"{one.name} {one.channel}".strip()
+        partners.append(f"{name} of {phong.surface.names[one.owner]}")
+    return parameter_record(parameter, certainty, raw, limits, partners)
+
+
+def parameter_record(
+    parameter: FitParameter,
+    certainty: Certainty,
+    values: tuple[float, ...],
+    limits: tuple[float, ...],
+    partners: list[str],
+) -> FittedParameter:
+    """Return a parameter of which these are the paired and fitted value, and the interval."""
+    paired, fitted, below, above = map(float, values)
+    low, high = map(float, limits)
+    has_interval = not (certainty.reason or certainty.at_bound)
+    return FittedParameter(
+        name=parameter.name,
+        channel=parameter.channel,
+        is_factor=parameter.is_factor,
+        paired=paired,
+        fitted=None if certainty.reason else fitted,
+        stopped_at=fitted,
+        interval=(max(below, low), min(above, high)) if has_interval else None,
+        bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
+        at_bound=certainty.at_bound,
+        identifiable=not certainty.reason,
+        reason=certainty.reason,
+        partners=tuple(partners),
+    )

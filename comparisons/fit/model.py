@@ -10,22 +10,23 @@ Parameter      Number in the vector                    Bounds              A nat
                ``k_s`` over
                :func:`heuristic.terms.normalisation`
 ``n``          ``ln n``                                :data:`EXPONENTS`   a factor e
-an intensity   ``ln`` of a factor on the paired one    :data:`FACTORS`     a factor e
 =============  ======================================  ==================  ================
 
 An image shows the lobe's albedo for any ``n``, so the two are nearly independent in the search. A
 coefficient is one number if it is grey in the scene, and three if it has a colour. With a texture
-it is a factor on it. If the loss sees luminance alone, it is its largest component, with the others
-in proportion.
+it is a factor on it.
 
 The model (8.10) is linear in its coefficients: an image is a sum of coefficients times *bases*,
 images of the ambient, diffuse and specular term alone. The kernel renders them with coefficients of
 1; Dr.Jit differentiates the specular one by ``n`` in forward mode. So one call of the kernel per
 material gives an image with its whole Jacobian.
+
+Geometry does not change while parameters are fitted. So the *surface* that the camera sees is
+rendered once, sample by sample, with the reference's rays (the same sampler, seeds and film).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import log
 from typing import Any
@@ -35,18 +36,19 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.fit.surface import COEFFICIENTS, Surface
 from heuristic.convention import Colour
+from heuristic.errors import InputError
 from heuristic.heuristics import Heuristic
 from heuristic.kernel import shade
 from heuristic.materials import Material
+from heuristic.plugins.phong import SceneMaterials
 from reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
 from reference.rendering.renderer import Renderer, variant
 
+COEFFICIENTS = ("k_a", "k_d", "k_s")
+
 EXPONENTS = (0.5, 4096.0)
 """Below, a lobe is as broad as the hemisphere; above, it is narrower than a pixel's view of it."""
-
-FACTORS = (1 / 64, 64.0)
 
 LARGEST_FACTOR = 4.0
 """On a texture, whose values are unknown here."""
@@ -59,9 +61,9 @@ class FitParameter:
     Attributes
     ----------
     name
-        ``k_a``, ``k_d``, ``k_s``, ``n`` or ``intensity``, or a name that a heuristic declares.
+        ``k_a``, ``k_d``, ``k_s`` or ``n``, or a name that a heuristic declares.
     owner
-        Index of the material, or of the light.
+        Index of the material.
     paired, low, high
         Value by the pairing table, and bounds, as in the vector.
     tint
@@ -81,65 +83,6 @@ class FitParameter:
     channel: Any = ""
     is_factor: bool = False
 
-    @property
-    def is_linear(self) -> bool:
-        """Whether the image is linear in it."""
-        return self.name in COEFFICIENTS
-
-
-def parameters(
-    surface: Surface, form: str, sees_colour: bool = True, intensities: bool = False
-) -> tuple[FitParameter, ...]:
-    """Return the parameters that a fit of one form has on a surface, material by material.
-
-    If ``intensities`` are fitted, the first light keeps its own: only the products of intensities
-    with ``k_d`` and ``k_s`` show.
-    """
-    fitted: list[FitParameter] = []
-    for owner, material in enumerate(surface.materials):
-        phong = Phong(material.k_d, material.k_s, material.n, material.form, material.normalised)
-        paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": tuple(specular_albedo(phong))}
-        if ambient_of(surface, intensities) is None:
-            del paired["k_a"]
-        for name, colour in paired.items():
-            if name in surface.samples[owner]:
-                value = float(colour[0])
-                fitted.append(FitParameter(name, owner, value, 0.0, LARGEST_FACTOR, is_factor=True))
-            else:
-                fitted += _coefficients(name, owner, colour, sees_colour)
-        n = exponent_of(alpha_of(material.n, material.form), form)
-        low, high = EXPONENTS
-        fitted.append(FitParameter("n", owner, log(min(max(n, low), high)), log(low), log(high)))
-    if intensities:
-        low, high = map(log, FACTORS)
-        others = range(1, len(surface.lights))
-        fitted += [FitParameter("intensity", light, 0.0, low, high) for light in others]
-    return tuple(fitted)
-
-
-def _coefficients(name: str, owner: int, paired: Colour, sees_colour: bool) -> list[FitParameter]:
-    """Return the parameters of one coefficient without a texture."""
-    largest = float(max(paired))
-    if np.ptp(paired) <= 1e-6 * largest:
-        return [FitParameter(name, owner, largest, 0.0, 1.0)]
-    if not sees_colour:
-        return [FitParameter(name, owner, largest, 0.0, 1.0, tuple(np.divide(paired, largest)))]
-    return [
-        FitParameter(name, owner, float(paired[i]), 0.0, 1.0, tuple(np.eye(3)[i]), channel)
-        for i, channel in enumerate("RGB")
-    ]
-
-
-def ambient_of(surface: Surface, intensities: bool) -> Colour | None:
-    """Return ``I_a``, None if there is none to fit.
-
-    If intensities are fitted and the scene has no ambient light, it is 1: the image shows only
-    ``I_a k_a``.
-    """
-    if isinstance(surface.ambient, int):
-        return 1.0 if intensities else None
-    return surface.ambient
-
 
 def start(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
     """Return the paired values as a vector, moved into the bounds."""
@@ -149,6 +92,218 @@ def start(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
 def bounds(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
     """Return the lower and upper bounds as two vectors."""
     return np.array([[p.low for p in parameters], [p.high for p in parameters]])
+
+
+# --- The surface -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Surface:
+    """All of an image of the heuristic half but its parameters.
+
+    Attributes
+    ----------
+    names, materials
+        The paired materials, in plain numbers; a coefficient that varies over the surface is 1, a
+        factor on its texture.
+    samples
+        Of each material, those that see it from the side that is shaded, as arrays (..., S):
+        ``position``, ``normal``, ``view``; ``pixel``, the index in reading order; coefficients that
+        have a texture; and ``light 0``, …, the visibility of each light if some can be hidden.
+    lights, ambient
+        See :func:`heuristic.shade`.
+    fixed
+        (N, 3), the light that no parameter changes: emission (8.1) and background.
+    samples_per_pixel
+        Over all passes; a pixel is their mean (box filter).
+    """
+
+    names: tuple[str, ...]
+    materials: tuple[Material, ...]
+    samples: tuple[dict[str, NDArray], ...]
+    lights: tuple[Any, ...]
+    ambient: Colour
+    fixed: NDArray[np.float64]
+    samples_per_pixel: int
+
+    def within(self, counted: NDArray[np.bool_]) -> "Surface":
+        """Return the part of the surface in a mask (N) of pixels, renumbered from 0."""
+        places = np.cumsum(counted) - 1
+        samples = []
+        for part in self.samples:
+            some = {key: values[..., counted[part["pixel"]]] for key, values in part.items()}
+            samples.append(some | {"pixel": places[some["pixel"]]})
+        return replace(self, samples=tuple(samples), fixed=self.fixed[counted])
+
+    def pixels(self, owner: int, values: Colour) -> NDArray[np.float64]:
+        """Return the image (N, 3) of one value for each sample of a material."""
+        pixel, count = self.samples[owner]["pixel"], len(self.fixed)
+        rgb = np.broadcast_to(np.atleast_2d(np.array(values, np.float64)), (3, len(pixel)))
+        sums = [np.bincount(pixel, channel, count) for channel in rgb]
+        return np.stack(sums, axis=1) / self.samples_per_pixel
+
+
+def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
+    """Return the surface that passes of a heuristic half with these seeds see.
+
+    The half has Phong shading and a box filter.
+    """
+    with variant(renderer.variant):
+        shading, scene = renderer.integrator, renderer.scene
+        bsdfs = SceneMaterials(scene, prune=False).bsdfs
+        names = _names(scene, bsdfs)
+        _require_fittable(names, bsdfs)
+        eye = _eye(shading)
+        eyes = Renderer(scene, eye, renderer.spp, "heuristic samples")
+        fixed: Any = 0.0
+        passes, samples_per_pixel = [], 0
+        for seed in seeds:
+            image = np.array(eyes.render(seed), np.float64)
+            fixed = fixed + image / len(seeds)
+            seen = {key: np.array(values) for key, values in eye.seen.items()}
+            spp = len(seen["facing"]) // image[..., 0].size
+            passes.append(seen | {"pixel": np.arange(len(seen["facing"])) // spp})
+            samples_per_pixel += spp
+        eye.seen = None
+        whole = {key: np.concatenate([one[key] for one in passes], axis=-1) for key in passes[0]}
+        facing, material = whole.pop("facing"), whole.pop("material")
+        samples = []
+        for owner, bsdf in enumerate(bsdfs):
+            without = set(COEFFICIENTS) - set(_textured(bsdf))
+            own = facing & (material == owner)
+            samples.append({k: v[..., own] for k, v in whole.items() if k not in without})
+        point = dr.zeros(mi.SurfaceInteraction3f)
+        return Surface(
+            names=tuple(names),
+            materials=tuple(map(_described, bsdfs)),
+            samples=tuple(samples),
+            lights=tuple(shading.lights(scene, point, True)),
+            ambient=shading.ambient_at(point, True),
+            fixed=np.reshape(fixed, (-1, 3)),
+            samples_per_pixel=samples_per_pixel,
+        )
+
+
+def _require_fittable(names, bsdfs):
+    """Reject transparent materials, since a sample has one surface, and varying exponents."""
+    clear = [name for name, bsdf in zip(names, bsdfs, strict=True) if bsdf.is_clear]
+    if clear:
+        raise InputError(
+            f"{', '.join(clear)}: a fit needs opaque materials; glass, masks and `null` let light"
+            " pass. Replace them."
+        )
+    varying = [n for n, bsdf in zip(names, bsdfs, strict=True) if isinstance(bsdf.n, mi.Texture)]
+    if varying:
+        raise InputError(
+            f"{', '.join(varying)}: n varies over the surface, and a fit has one n per material."
+            " Give its roughness as a number."
+        )
+
+
+def _eye(shading):
+    """Make an integrator that keeps the points that ``shading`` would shade, and shows emission."""
+
+    class Eye(type(shading)):
+        def shaded(self, scene, si, view, normal, active):
+            materials = self.known(scene).materials
+            number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
+            seen = {
+                "position": mi.Vector3f(si.p),
+                "normal": mi.Vector3f(normal),
+                "view": mi.Vector3f(view),
+                "facing": active & (self.twosided(scene, si, active) | (si.wi.z > 0)),
+                "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
+            }
+            for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
+                seen[name] = _read(materials, number, name, si, active)
+            if shading.occlusion:
+                test = shading.visibility(scene, si, active)
+
+                def keep(toward, distance):
+                    seen[f"light {len(seen) - before}"] = visible = test(toward, distance)
+                    return visible
+
+                before, place = len(seen), mi.Vector3f(si.p)
+                lights = shading.lights(scene, si, active)
+                shade(place, place, place, Material(k_d=1), lights, 0, keep)
+            dr.schedule(seen)
+            self.seen = seen
+            return _read(materials, number, "k_i", si, active)
+
+    props = mi.Properties("heuristic")
+    props["hide_emitters"] = shading.hide_emitters
+    return Eye(props)
+
+
+def _read(materials, number, name, si, active):
+    """Return one coefficient of the material at each sample, as the scene gives it."""
+
+    def reader(bsdf):
+        return lambda si, active: mi.Color3f(getattr(bsdf, name).eval(si, active))
+
+    readers = [reader(bsdf) for bsdf in materials.bsdfs]
+    if len(readers) == 1:
+        return readers[0](si, active)
+    return dr.switch(number, readers, si, active)
+
+
+def _textured(bsdf):
+    return [name for name in COEFFICIENTS if getattr(bsdf, name).is_spatially_varying()]
+
+
+def _described(bsdf):
+    """Return a ``phong`` as a material of plain numbers; a coefficient with a texture is 1."""
+
+    def plain(values):
+        # The scene's numbers are the shortest decimals of single precision.
+        return tuple(float(str(np.float32(value))) for value in np.ravel(values))
+
+    point, coefficients = dr.zeros(mi.SurfaceInteraction3f), dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
+    for name in set(COEFFICIENTS) - set(_textured(bsdf)):
+        coefficients[name] = plain(mi.Color3f(getattr(bsdf, name).eval(point)))
+    return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
+
+
+def _names(scene, bsdfs):
+    """Return a name for each material: its id, the id of its first shape, or a number.
+
+    Shapes of an instanced group are not among the scene's.
+    """
+    shapes = {}
+    for shape in scene.shapes():
+        shapes.setdefault(shape.bsdf(), shape.id())
+    return [
+        bsdf.id() or (f"material of {shapes[bsdf]}" if bsdf in shapes else f"material {number}")
+        for number, bsdf in enumerate(bsdfs, start=1)
+    ]
+
+
+# --- Phong's model -----------------------------------------------------------------------------
+
+
+def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
+    """Return the parameters that a fit of one form has on a surface, material by material."""
+    fitted: list[FitParameter] = []
+    low, high = EXPONENTS
+    for owner, material in enumerate(surface.materials):
+        phong = Phong(material.k_d, material.k_s, material.n, material.form, material.normalised)
+        paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": tuple(specular_albedo(phong))}
+        if isinstance(surface.ambient, int):  # no ambient light
+            del paired["k_a"]
+        for name, colour in paired.items():
+            if name in surface.samples[owner]:
+                value = float(colour[0])
+                fitted.append(FitParameter(name, owner, value, 0.0, LARGEST_FACTOR, is_factor=True))
+            elif np.ptp(colour) <= 1e-6 * max(colour):
+                fitted.append(FitParameter(name, owner, float(max(colour)), 0.0, 1.0))
+            else:
+                fitted += [
+                    FitParameter(name, owner, float(value), 0.0, 1.0, tuple(tint), channel)
+                    for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True)
+                ]
+        n = exponent_of(alpha_of(material.n, material.form), form)
+        fitted.append(FitParameter("n", owner, log(min(max(n, low), high)), log(low), log(high)))
+    return tuple(fitted)
 
 
 class PhongModel:
@@ -165,15 +320,9 @@ class PhongModel:
         vector: Any = None,
     ) -> None:
         self.surface, self.form, self.parameters = surface, form, parameters
-        self.linear = np.array([parameter.is_linear for parameter in parameters], bool)
+        self.linear = np.array([parameter.name in COEFFICIENTS for parameter in parameters], bool)
         self._vector = vector or mi.Vector3f
-        # Lights by number, those of one factor together.
-        numbers = list(range(len(surface.lights)))
-        self._groups = [numbers] if numbers else []
-        if any(parameter.name == "intensity" for parameter in parameters):
-            self._groups = [[number] for number in numbers]
-        self._ambient, self._diffuse = cache(self._ambient_basis), cache(self._diffuse_bases)
-        self._points = cache(self._point)
+        self._basis, self._points = cache(self._rendered_basis), cache(self._point)
         self._lobes: dict[int, tuple[float, NDArray, NDArray]] = {}
         self._last: tuple[bytes, NDArray] | None = None
 
@@ -199,84 +348,57 @@ class PhongModel:
 
     def place_of_exponent(self, owner: int) -> int:
         """Return the index of a material's ``n``."""
-        ((place, _),) = (
-            (i, p) for i, p in enumerate(self.parameters) if (p.name, p.owner) == ("n", owner)
-        )
-        return place
+        return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
     def _columns(self, x):
         result = np.empty((len(x), *self.surface.fixed.shape))
-        factors = np.ones(len(self._groups))
-        for number, parameter in zip(x, self.parameters, strict=True):
-            if parameter.name == "intensity":
-                factors[parameter.owner] = np.exp(number)
-        diffuse, albedo = self.coefficients(x, "k_d"), self.coefficients(x, "k_s")
-        exponents = {owner: float(np.exp(x[self.place_of_exponent(owner)])) for owner in albedo}
-        lobes = {owner: self._lobe(owner, n) for owner, n in exponents.items()}
+        albedo = self.coefficients(x, "k_s")
         for place, parameter in enumerate(self.parameters):
-            owner = parameter.owner
-            if parameter.name == "k_a":
-                column = self._ambient(owner) * parameter.tint
-            elif parameter.name == "k_d":
-                column = self._diffuse(owner) @ factors * parameter.tint
-            elif parameter.name == "k_s":
-                column = lobes[owner][1] @ factors * parameter.tint
-            elif parameter.name == "n":
-                column = lobes[owner][2] @ factors * albedo[owner]
-            else:
-                column = factors[owner] * sum(
-                    self._diffuse(material)[..., owner] * diffuse[material]
-                    + lobes[material][1][..., owner] * albedo[material]
-                    for material in albedo
-                )
-            result[place] = column
+            owner, name = parameter.owner, parameter.name
+            if name in ("k_a", "k_d"):
+                result[place] = self._basis(owner, name) * parameter.tint
+                continue
+            basis, slope = self._lobe(owner, float(np.exp(x[self.place_of_exponent(owner)])))
+            result[place] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
         return result
 
-    def _ambient_basis(self, owner):
-        """Return the ambient basis of a material, (N, 3)."""
-        return self._basis(owner, "k_a", [], ambient_of(self.surface, intensities=True))
-
-    def _diffuse_bases(self, owner):
-        """Return the diffuse bases of a material, (N, 3, groups of lights)."""
-        return self._stacked([self._basis(owner, "k_d", group) for group in self._groups])
+    def _rendered_basis(self, owner, name):
+        """Return the ambient or the diffuse basis of a material, (N, 3)."""
+        if name == "k_a":
+            value = self._shaded(owner, name, (), self.surface.ambient)
+        else:
+            value = self._shaded(owner, name, self.surface.lights)
+        return (
+            np.zeros_like(self.surface.fixed)
+            if value is None
+            else self.surface.pixels(owner, value)
+        )
 
     def _lobe(self, owner, n):
-        """Return ``n``, the specular bases of a material, and their derivatives by ``ln n``."""
+        """Return the specular basis of a material, and its derivative by ``ln n``."""
         if owner not in self._lobes or self._lobes[owner][0] != n:
-            pairs = [self._specular(owner, n, group) for group in self._groups]
-            bases, derivatives = zip(*pairs, strict=True) if pairs else ((), ())
-            self._lobes[owner] = n, self._stacked(bases), self._stacked(derivatives)
-        return self._lobes[owner]
+            basis = slope = np.zeros_like(self.surface.fixed)
+            exponent = dr.opaque(dr.value_t(self._vector), n)
+            dr.enable_grad(exponent)
+            lobe = {"n": exponent, "form": self.form, "normalised": True}
+            value = self._shaded(owner, "k_s", self.surface.lights, **lobe)
+            if value is not None:
+                dr.forward_from(exponent)
+                parts = value, dr.grad(value)
+                dr.eval(*parts)
+                basis, slope = (self.surface.pixels(owner, dr.detach(part)) for part in parts)
+            self._lobes[owner] = n, basis, n * slope
+        return self._lobes[owner][1:]
 
-    def _specular(self, owner, n, group):
-        exponent = dr.opaque(dr.value_t(self._vector), n)
-        dr.enable_grad(exponent)
-        lobe = {"n": exponent, "form": self.form, "normalised": True}
-        value = self._shaded(owner, "k_s", group, **lobe)
-        if value is None:
-            return (np.zeros_like(self.surface.fixed),) * 2
-        dr.forward_from(exponent)
-        slope = dr.grad(value)
-        dr.eval(value, slope)
-        basis, derivative = (self.surface.pixels(owner, dr.detach(part)) for part in (value, slope))
-        return basis, n * derivative
-
-    def _basis(self, owner, name, group, ambient=0):
-        value = self._shaded(owner, name, group, ambient)
-        if value is None:
-            return np.zeros_like(self.surface.fixed)
-        return self.surface.pixels(owner, value)
-
-    def _shaded(self, owner, name, group, ambient=0, **lobe):
-        """Call the kernel with one coefficient of 1; None if no sample sees the material."""
-        if not len(self.surface.samples[owner]["pixel"]):
+    def _shaded(self, owner, name, lights, ambient=0, **lobe):
+        """Call the kernel with one coefficient of 1; None if no sample or light shows it."""
+        if not len(self.surface.samples[owner]["pixel"]) or not (lights or name == "k_a"):
             return None
         *place, textures, visible = self._points(owner)
         material = Material(**{name: textures.get(name, 1.0)}, **lobe)
-        lights = [self.surface.lights[number] for number in group]
-        masks = iter([visible[number] for number in group] if visible else ())
+        masks = iter(visible)
         test = (lambda toward, distance: next(masks)) if visible else None
-        return shade(*place, material, lights, ambient, test)
+        return shade(*place, material, list(lights), ambient, test)
 
     def _point(self, owner):
         """Return the kernel's arrays of a material: place, textures, and masks of the lights."""
@@ -286,8 +408,8 @@ class PhongModel:
         lights = (f"light {number}" for number in range(len(self.surface.lights)))
         return *place, textures, [mi.Bool(samples[key]) for key in lights if key in samples]
 
-    def _stacked(self, bases):
-        return np.stack(bases, axis=-1) if bases else np.zeros((*self.surface.fixed.shape, 0))
+
+# --- A heuristic's own parameters --------------------------------------------------------------
 
 
 class OwnModel:

@@ -2,14 +2,12 @@
 
 The losses of a fit are means over pixels of a distance between two images:
 
-=================  =====================================================================  =========
-Loss               Distance of two pixels                                                 Unit
-=================  =====================================================================  =========
-``perceptual``     Euclidean in CAM16-UCS                                                 ΔE
-``linear``         its square, in linear RGB; 1 is display white                          white
-``log-luminance``  square of the ratio of luminances, each with                           stops
-                   :data:`comparisons.departure.metrics.LOG2_EPSILON` added, in stops
-=================  =====================================================================  =========
+==============  =================================================  =========
+Loss            Distance of two pixels                             Unit
+==============  =================================================  =========
+``perceptual``  Euclidean in CAM16-UCS                             ΔE
+``linear``      its square, in linear RGB; 1 is display white      white
+==============  =================================================  =========
 
 ``perceptual`` is the default: departures are reported as mean colour differences, and of the
 metrics only CAM16-UCS is a plain Euclidean distance that is also close to ΔE2000. Unlike the
@@ -47,8 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from comparisons.departure.colour import Viewing, cam16ucs_unclipped, luminance
-from comparisons.departure.metrics import LOG2_EPSILON
+from comparisons.departure.colour import Viewing, cam16ucs_unclipped
 from comparisons.fit.model import bounds
 from reference.records import Amount, Count, Record
 
@@ -96,8 +93,6 @@ class Loss:
         ``(rgb (N, 3), viewing) -> (N, K, 3)``, of the coordinates by R, G and B.
     threshold
         Root mean square change of the coordinates below which nothing shows.
-    sees_colour
-        Whether it distinguishes colours of equal luminance.
     rounding
         ``c`` above; infinite for squares.
     """
@@ -107,18 +102,7 @@ class Loss:
     coordinates: Callable[[NDArray, Viewing], NDArray]
     derivative: Callable[[NDArray, Viewing], NDArray]
     threshold: float
-    sees_colour: bool = True
     rounding: float = inf
-
-
-def _log(rgb, viewing):
-    return np.log2(np.maximum(luminance(rgb), 0) + LOG2_EPSILON)[:, None]
-
-
-def _log_derivative(rgb, viewing):
-    weights = luminance(np.eye(3))
-    lifted = np.maximum(luminance(rgb), 0) + LOG2_EPSILON
-    return (weights / (lifted[:, None] * np.log(2)))[:, None, :]
 
 
 def _perceptual_derivative(rgb, viewing):
@@ -136,7 +120,6 @@ LOSSES = {
              rounding=0.1),
         Loss("linear", "white", lambda rgb, _: rgb,
              lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)), 5e-4),
-        Loss("log-luminance", "stops", _log, _log_derivative, 5e-3, sees_colour=False),
     )
 }  # fmt: skip
 

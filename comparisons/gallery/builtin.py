@@ -47,13 +47,7 @@ class BuiltIn:
 
 
 def builtin(name: str) -> BuiltIn:
-    """Return the built-in scene with a name.
-
-    Raises
-    ------
-    InputError
-        If there is none; the message lists the names.
-    """
+    """Return the built-in scene with a name."""
     if name not in SCENES:
         raise InputError(
             f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)}. Built-in"

@@ -11,8 +11,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.gallery.builtin import VIEWER_C
-
 HIGHLIGHT = (0.45, -0.3, 0.0)
 """Where the light of figure 6.14 is mirrored to the viewer: inside one of the two triangles."""
 
@@ -120,7 +118,7 @@ def lambert_sphere() -> dict[str, Any]:
     return {
         "type": "scene",
         "integrator": {"type": "path"},
-        "sensor": _camera(VIEWER_C),
+        "sensor": _camera((-3, 0, 1)),
         "sphere": _sphere(type="diffuse", reflectance={"type": "rgb", "value": (0.7, 0.45, 0.2)}),
         "light": {"type": "point", "position": (-4.24, -1, 3), "intensity": 60.0},
     }

@@ -1,7 +1,8 @@
 """Hard cases: where the textbook's formulas, and samplers, break, and by how much.
 
 A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
-the naive one does not. Tests demand both of every case; the report prints them.
+the naive one does not. Tests demand both of every case; the report prints them. For the kernel the
+naive evaluation is the textbook's formula in single precision.
 
 The samplers are on long paths inside a bright sphere of radius 1 and diffuse reflectance ρ, with a
 point light of intensity I at its centre. There the radiance is the same everywhere, because each
@@ -14,15 +15,20 @@ each other, the mean of an image is wrong, however many passes are taken: no sta
 it. Naively the sampler is Mitsuba's; ours is :mod:`reference.rendering.sampler`.
 """
 
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike
+from drjit.llvm import Array3f, Float
+from numpy.typing import ArrayLike, NDArray
 
-from comparisons.hard import kernel_cases
-from comparisons.hard.textbook import HardCase
+import heuristic
+from comparisons.hard import textbook
+from comparisons.hard.textbook import NAIVE, Setting, unit
 from reference.rendering.renderer import Renderer
 from reference.rendering.sampler import SAMPLER, register
 
@@ -31,11 +37,24 @@ ABSENT = 1e-3
 
 
 @dataclass(frozen=True)
+class HardCase:
+    """A case: ``naive``, ``ours`` and ``exact`` return arrays of one shape."""
+
+    name: str
+    group: str
+    difficulty: str
+    bound: float
+    naive: Callable[[], ArrayLike]
+    ours: Callable[[], ArrayLike]
+    exact: Callable[[], ArrayLike]
+    setting: Setting | None = None
+
+
+@dataclass(frozen=True)
 class HardOutcome:
     """The errors of a case; infinite for a NaN, an infinity, or light where there is none."""
 
     name: str
-    group: str
     difficulty: str
     bound: float
     naive_error: float
@@ -64,7 +83,7 @@ def evaluate(case: HardCase) -> HardOutcome:
     with np.errstate(all="ignore"):  # cases provoke NaN and infinities
         exact = np.asarray(case.exact(), np.longdouble)
         errors = error(case.naive(), exact), error(case.ours(), exact)
-    return HardOutcome(case.name, case.group, case.difficulty, case.bound, *errors)
+    return HardOutcome(case.name, case.difficulty, case.bound, *errors)
 
 
 def error(values: ArrayLike, exact: np.ndarray) -> float:
@@ -79,6 +98,98 @@ def error(values: ArrayLike, exact: np.ndarray) -> float:
     if not scale.all():
         return np.inf if difference.any() else 0.0
     return float((difference / scale).max())
+
+
+# --- The kernel ---------------------------------------------------------------------------------
+
+POINTS = 2001
+
+
+def by_kernel(setting: Setting) -> NDArray[np.float32]:
+    """Evaluate :func:`heuristic.shade` at a setting, in single precision: an array (N,)."""
+    s = setting.rounded()
+    count = max(np.size(getattr(s, name)) // 3 for name in ("position", "normal", "view", "light"))
+    count = max(count, np.size(s.n), np.size(s.intensity))
+
+    def vector(value: Any) -> Array3f:
+        return Array3f(np.ascontiguousarray(np.broadcast_to(value, (count, 3)).T))
+
+    light = vector(s.light)
+    intensity = Float(np.broadcast_to(s.intensity, count).copy())
+    k0, k1, k2 = map(float, s.attenuation)
+    lamp: heuristic.PointLight | heuristic.SpotLight
+    if s.direction is None:
+        lamp = heuristic.PointLight(light, intensity, (k0, k1, k2))
+    else:
+        axis = tuple(map(float, s.direction))
+        lamp = heuristic.SpotLight(
+            light, axis, intensity, float(s.cutoff), float(s.m), (k0, k1, k2)
+        )
+    n = Float(np.broadcast_to(s.n, count).copy())
+    material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=n)
+    arrays = (vector(s.position), vector(s.normal), vector(s.view))
+    dr.eval(arrays, n, light, intensity)
+    value = heuristic.shade(*arrays, material, [lamp])
+    return np.array(value + dr.zeros(Float, count))
+
+
+def _case(name: str, group: str, bound: float, setting: Setting, words: str) -> HardCase:
+    setting = setting.rounded()
+    return HardCase(
+        name, group, words, bound, partial(textbook.shade, setting, NAIVE),
+        partial(by_kernel, setting), partial(textbook.shade_exactly, setting), setting,
+    )  # fmt: skip
+
+
+LIGHT, NORMAL = (1.0, 2.0, 4.0), (0.1, 0.2, 0.9)
+
+
+def _about_mirror(angle: NDArray) -> NDArray:
+    """Return views at angles from the mirror image of :data:`LIGHT` about :data:`NORMAL`."""
+    light, normal = (unit(np.array(v, np.float32).astype(float)) for v in (LIGHT, NORMAL))
+    mirror = 2 * (light @ normal) * normal - light
+    side = unit(np.cross(mirror, (0.3, 0.5, -0.8)))
+    return np.cos(angle)[:, None] * mirror + np.sin(angle)[:, None] * side
+
+
+def _highlight(n: float, **changes: Any) -> Setting:
+    """Return a setting across a highlight, from its middle to a thousandth of its peak."""
+    view = _about_mirror(np.linspace(0, np.sqrt(2 * np.log(1e3) / n), POINTS))
+    return replace(Setting(normal=NORMAL, light=LIGHT, view=view, k_s=1.0, n=n), **changes)
+
+
+def _mirror_directions() -> Setting:
+    """Return views in the mirror direction of a light, to single precision."""
+    normal = np.random.default_rng(2).normal(size=(POINTS, 3)).astype(np.float32).astype(float)
+    normal[:, 2] = np.abs(normal[:, 2]) + 0.1
+    up = unit(normal)
+    return Setting(
+        normal=normal, light=(0, 0, 1), view=2 * up[:, 2:] * up - (0, 0, 1), k_s=1.0, n=1e7
+    )
+
+
+def _grazing() -> Setting:
+    """Return lights and views a little above surfaces of all directions, facing each other."""
+    rng = np.random.default_rng(1)
+    normal, other = rng.normal(size=(2, POINTS, 3)).astype(np.float32).astype(float)
+    along = unit(np.cross(unit(normal), other))
+    height = np.logspace(-8, -6, POINTS)[:, None] * unit(normal)
+    return Setting(normal=normal, light=along + height, view=height - along, k_s=1.0, n=100.5)
+
+
+def _under_spot(angle: NDArray, **changes: Any) -> Setting:
+    """Return points of a plane at angles from the axis of a spot above it."""
+    place = np.stack([2 * np.tan(angle), 0 * angle, 0 * angle], axis=1)
+    return replace(_SPOT, position=place, normal=(0.0, 0.0, 1.0), **changes)
+
+
+_FLAT = Setting(k_d=1.0)
+_SPOT = Setting(k_d=1.0, light=(0.0, 0.0, 2.0), direction=(0.0, 0.0, -1.0))
+
+_AGAINST = np.array([(3, 5, -4), (3, -5, -4), (7, 0, -1), (-1, 0, -7)])
+_RAYS = (_AGAINST * np.arange(1, 51)[:, None, None]).reshape(-1, 3).astype(float)
+_ON_CONE = Setting(k_d=1.0, cutoff=135.0, direction=(-3.0, 0.0, 4.0), light=-_RAYS, normal=-_RAYS)
+"""Integers at exactly 135 degrees from an axis: as far against it as across it."""
 
 
 # --- Samplers ----------------------------------------------------------------------------------
@@ -127,7 +238,71 @@ def _sampler(name: str, count: int) -> HardCase:
     )  # fmt: skip
 
 
+# --- Rows --------------------------------------------------------------------------------------
+
 CASES = (
-    *kernel_cases.CASES,
-    *(_sampler(*each) for each in (("multijitter", 4), ("multijitter", 16), ("ldsampler", 16))),
-)
+    _case("exponent 0 at the lobe's end", "Exponents", 2e-4,
+          Setting(k_s=1.0, n=0.0, view=(1.0, 0.0, 0.0)),
+          "R·V is 0, and so is n: a power gives 0⁰ = 1, where the lobe has ended."),
+    _case("exponent 1/2, R·V just above 0", "Exponents", 2e-4,
+          replace(_highlight(1e6), n=0.5,
+                  view=_about_mirror(np.pi / 2 - np.logspace(-6.5, -2, POINTS))),
+          "The scalar product cancels to a few digits, whose root is still visible."),
+    _case("exponent 1e-3, R·V just above 0", "Exponents", 2e-4,
+          replace(_highlight(1e6), n=1e-3,
+                  view=_about_mirror(np.pi / 2 + np.linspace(-3e-7, 3e-7, POINTS))),
+          "The lobe is almost even and ends abruptly; only the sign of R·V matters."),
+    _case("exponent 1e5", "Exponents", 2e-4, _highlight(1e5),
+          "The power multiplies the rounding of R·V near 1 by n."),
+    _case("exponent 1e6", "Exponents", 2e-4, _highlight(1e6),
+          "The same; even rounding N, L and V turns the highlight visibly."),
+    _case("exponent 123456.78", "Exponents", 2e-4, _highlight(123456.78),
+          "A large exponent that is not an integer."),
+    _case("exponent 1e7 in the mirror direction", "Exponents", 2e-4, _mirror_directions(),
+          "R·V rounds to just over 1 or just under, and the power makes it 3.3 or 0.3."),
+    _case("a light on the surface", "Geometry", 2e-4, replace(_FLAT, light=(0.0, 0.0, 0.0)),
+          "d = 0: no direction, and 0 / 0."),
+    _case("a light at a distance of 1e-20", "Geometry", 1e-6,
+          replace(_FLAT, light=(0.6e-20, 0.0, 0.8e-20)), "d² vanishes: 1e-40 is subnormal."),
+    _case("a light at a distance of 1e20", "Geometry", 1e-6,
+          replace(_FLAT, light=(0.6e20, 0.0, 0.8e20)), "d² is 1e40, beyond single precision."),
+    _case("a viewer on the surface", "Geometry", 2e-4,
+          Setting(k_s=1.0, n=9.5, view=(0.0, 0.0, 0.0)), "No view direction: 0 / 0."),
+    _case("grazing light and view", "Geometry", 2e-4, _grazing(),
+          "Within 1e-8 to 1e-6 radians of the surface, rounding decides which side they are on."),
+    _case("normals of length 1e-30", "Geometry", 1e-5,
+          replace(_FLAT, normal=(0.6e-30, 0.0, 0.8e-30)), "Their square vanishes."),
+    _case("normals of length 1e30", "Geometry", 1e-5,
+          replace(_FLAT, normal=(0.6e30, 0.0, 0.8e30)),
+          "Their square is beyond single precision."),
+    _case("a normal of zero", "Geometry", 1e-5, replace(_FLAT, normal=(0.0, 0.0, 0.0)),
+          "Interpolated normals can cancel: 0 / 0."),
+    _case("a scene of size 1e-6, n = 1e5", "Geometry", 2e-4,
+          _highlight(1e5, light=(1e-6, 2e-6, 4e-6)), "A sharp highlight in a tiny scene."),
+    _case("a scene of size 1e6, n = 1e5", "Geometry", 2e-4,
+          _highlight(1e5, light=(1e6, 2e6, 4e6)), "A sharp highlight in a huge scene."),
+    _case("far from the origin, n = 1e5", "Geometry", 2e-4,
+          _highlight(1e5, position=(1e6, 1e6, 1e6), light=(1e6 + 1, 1e6 + 2, 1e6 + 4)),
+          "Light and point 1e6 away: their difference is exact, all else rounds."),
+    _case("intensity 1e-30 at a distance of 1e-20", "Lights", 1e-6,
+          replace(_FLAT, light=(0.0, 0.0, 1e-20), intensity=1e-30, attenuation=(0.0, 0.0, 1.0)),
+          "1/d² overflows, and the intensity brings it back to 1e10."),
+    _case("intensity 1e30 at a distance of 1e20", "Lights", 1e-6,
+          replace(_FLAT, light=(0.0, 0.0, 1e20), intensity=1e30, attenuation=(0.0, 0.0, 1.0)),
+          "1/d² vanishes, and the intensity brings it back to 1e-10."),
+    _case("a spot with m = 1e5", "Lights", 1e-3,
+          _under_spot(np.linspace(0, 0.01, POINTS), m=1e5, cutoff=30.0),
+          "The power multiplies the rounding of the cosine by m."),
+    _case("a cutoff of 1e-4 degrees", "Lights", 1e-5,
+          _under_spot(np.deg2rad(1e-4) * np.array([0, 0.2, 0.5, 0.8, 1.2, 2, 10, 50, 150]),
+                      cutoff=1e-4),
+          "The cosine of the cutoff rounds to 1, as do the cosines of points far outside."),
+    _case("a cutoff of 179.99 degrees", "Lights", 1e-5,
+          replace(_SPOT, direction=(0.0, 0.0, 1.0), cutoff=179.99,
+                  position=[(2 * np.deg2rad(0.01) * f, 0, 0) for f in (0, 0.3, 0.8, 1.2, 3)]),
+          "The cosine rounds to -1, and the dark needle behind the light disappears."),
+    replace(_case("a point exactly on the cone", "Lights", 1e-6, _ON_CONE,
+                  "6.2 says ≥: coordinates on the cone are lit, however they round."),
+            exact=lambda: np.ones(len(_RAYS))),
+    _sampler("multijitter", 4), _sampler("multijitter", 16), _sampler("ldsampler", 16),
+)  # fmt: skip

@@ -1,17 +1,18 @@
-"""The textbook's reflection as printed, in NumPy of any precision, and rows of hard cases.
+"""The textbook's reflection as printed, in NumPy of any precision.
+
+It shares nothing with the kernel.
 
 Vectors are (..., 3), numbers (..., 1). Hard cases evaluate it in single precision, the naive form
 that they break, and in extended precision (:data:`EXACT`; on machines without it, double), which is
-exact enough to judge by, since the inputs are of single precision. It shares nothing with the
-kernel. The diagnosis of shaders changes it by one mistake after another.
+exact enough to judge by, since the inputs are of single precision. The diagnosis of shaders changes
+it by one mistake after another.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 NAIVE, EXACT = np.float32, np.longdouble
 
@@ -72,20 +73,6 @@ class Setting:
             name: np.float32(value) for name, value in vars(self).items() if value is not None
         }
         return replace(self, **single)
-
-
-@dataclass(frozen=True)
-class HardCase:
-    """A case: ``naive``, ``ours`` and ``exact`` return arrays of one shape."""
-
-    name: str
-    group: str
-    difficulty: str
-    bound: float
-    naive: Callable[[], ArrayLike]
-    ours: Callable[[], ArrayLike]
-    exact: Callable[[], ArrayLike]
-    setting: Setting | None = None
 
 
 def shade(setting: Setting, dtype: Any) -> NDArray:

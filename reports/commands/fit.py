@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     "--loss",
     default="perceptual",
     show_default=True,
-    type=click.Choice(["perceptual", "linear", "log-luminance"]),
+    type=click.Choice(["perceptual", "linear"]),
     help="Loss to minimise: the mean colour difference in CAM16-UCS, or the mean square of the"
-    " difference in linear RGB or of the ratio of luminances.",
+    " difference in linear RGB.",
 )
 @click.option(
     "--form",
@@ -35,12 +35,6 @@ if TYPE_CHECKING:
     show_default=True,
     type=click.Choice(["phong", "blinn", "all"]),
     help="Form of the lobe, with and without normalisation.",
-)
-@click.option(
-    "--intensities",
-    is_flag=True,
-    help="Fit the lights' intensities, too, relative to the first; and ambient light, if the scene"
-    " has none.",
 )
 @jobs.json_option
 @jobs.timeout_option
@@ -51,6 +45,7 @@ if TYPE_CHECKING:
 def fit(
     scenes: tuple[str, ...],
     output: Path,
+    loss: str,
     form: str,
     as_json: bool,
     timeout: float,
@@ -65,7 +60,7 @@ def fit(
     \b
     Examples:
       fotismos fit fig-8-9
-      fotismos fit my_scene.xml --loss linear --form phong --intensities
+      fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     with jobs.pool(timeout) as pool:
@@ -77,9 +72,8 @@ def fit(
         from reports.run.results import hold, own, places
         from reports.terminal import progress
 
-        fitting = {key: words.pop(key) for key in ("loss", "intensities")}
-        chosen = FitOptions(forms=FORMS if form == "all" else (form,), **fitting)
-        common = (jobs.request(words), chosen, fitting | {"form": form})
+        chosen = FitOptions(loss, FORMS if form == "all" else (form,))
+        common = (jobs.request(words), chosen, {"loss": loss, "form": form})
         with hold(output, jobs.command_line()) as top:
             folder = own(top / "fit")
             folders = places(folder, scenes)

@@ -1,4 +1,4 @@
-"""Fits as tables for a terminal and in Markdown, and the files of one fit."""
+"""The files of one fit, and fits as tables for a terminal and in Markdown."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
@@ -39,17 +39,15 @@ def picture(fit: Fit) -> bytes:
 
     The pictures are tone-mapped; the map has the metric's fixed range.
     """
-    exposure = fit.record.viewing.exposure
-    high, residual = LEADING.map_range[1], fit.images.maps[LEADING.name]
+    exposure, high = fit.record.viewing.exposure, LEADING.map_range[1]
     tiles = {
-        "paired": images.tonemap(fit.images.before, exposure),
-        "reference": images.tonemap(fit.images.reference, exposure),
-        f"fitted ({fit.record.nearest.form})": images.tonemap(fit.images.after, exposure),
-        f"{LEADING.label} left, 0 to {high:g}": images.error_map(residual, high),
+        "paired": images.tonemap(fit.before, exposure),
+        "reference": images.tonemap(fit.reference, exposure),
+        f"fitted ({fit.record.nearest.form})": images.tonemap(fit.after, exposure),
+        f"{LEADING.label} left, 0 to {high:g}": images.error_map(fit.maps[LEADING.name], high),
     }
-    width, height = next(iter(tiles.values())).size
-    factor = max(1, -(-SMALLEST_TILE // min(width, height)))
-    width, height = width * factor, height * factor
+    factor = max(1, -(-SMALLEST_TILE // min(fit.before.shape[:2])))
+    height, width = (side * factor for side in fit.before.shape[:2])
     sheet = Image.new("RGB", (4 * width + 5 * GAP, height + CAPTION + 2 * GAP), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.truetype(FONT, 14)
     for place, (caption, tile) in enumerate(tiles.items()):
@@ -65,7 +63,7 @@ def picture(fit: Fit) -> bytes:
 def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
     best = record.nearest
-    yield f"{record.scene}: {record.loss.name} loss, {best.form} comes nearest"
+    yield f"{record.scene}: {record.loss['name']} loss, {best.form} comes nearest"
     yield ""
     yield from tables.printed(_departures(record))
     yield ""
@@ -77,15 +75,15 @@ def lines(record: FitRecord) -> Iterator[str]:
 
 
 def _departures(record: FitRecord) -> Iterator[Cells]:
-    def row(name: str, form: FormFit, field: str, loss: str = "") -> Cells:
-        means = (getattr(form.departure[metric], field) for metric in drawn())
-        return name, *map(three_decimals, means), loss
+    def row(name: str, form: FormFit, field: str, loss: float | str = "") -> Cells:
+        means = (three_decimals(getattr(form.departure[metric], field)) for metric in drawn())
+        return name, *means, loss if isinstance(loss, str) else f"{loss:.4g}"
 
     yield "mean of", *(metric.label for metric in drawn().values()), "loss"
     nearest, first = record.nearest, record.fits[0]
-    yield row("paired", first, "before", f"{nearest.loss + nearest.parameter_error:.4g}")
+    yield row("paired", first, "before", nearest.loss + nearest.parameter_error)
     for fit in record.fits:
-        yield row(fit.form, fit, "after", f"{fit.loss:.4g}")
+        yield row(fit.form, fit, "after", fit.loss)
     yield row("noise floor", first, "noise_floor")
     blank = [""] * len(drawn())
     yield "parameter error", *blank, f"{nearest.parameter_error:.4g}"
@@ -93,30 +91,21 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
 
 
 def _parameters(fit: FormFit) -> Iterator[Cells]:
-    yield "material or light", "parameter", "paired", "fitted", "95 %, by noise", ""
-    for material in fit.materials:
-        for parameter in material.parameters:
-            yield material.name, *_parameter_cells(parameter)
-    for parameter in fit.own:
-        yield fit.form, *_parameter_cells(parameter)
-    for light in fit.lights:
-        yield light.light, *_parameter_cells(light)
-
-
-def _parameter_cells(parameter: FittedParameter) -> Cells:
-    interval = parameter.interval
-    note = "at its bound" if parameter.at_bound else ""
-    if parameter.reason:
-        partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
-        note = f"not identifiable: {parameter.reason}{partners}"
-    factor = " (factor)" if parameter.is_factor else ""
-    return (
-        f"{parameter.name} {parameter.channel}".strip() + factor,
-        f"{parameter.paired:.4g}",
-        value_of(parameter),
-        f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
-        note,
-    )
+    yield "material", "parameter", "paired", "fitted", "95 %, by noise", ""
+    owned = [(each.name, parameter) for each in fit.materials for parameter in each.parameters]
+    for owner, parameter in [*owned, *((fit.form, parameter) for parameter in fit.own)]:
+        interval, note = parameter.interval, "at its bound" if parameter.at_bound else ""
+        if parameter.reason:
+            partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
+            note = f"not identifiable: {parameter.reason}{partners}"
+        yield (
+            owner,
+            f"{parameter.name} {parameter.channel}".strip() + " (factor)" * parameter.is_factor,
+            f"{parameter.paired:.4g}",
+            value_of(parameter),
+            f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
+            note,
+        )
 
 
 def value_of(parameter: FittedParameter) -> str:
@@ -134,7 +123,7 @@ def described(reference: Mapping[str, Any]) -> str:
 
     names = ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
     words = [f"{name} {number(reference[name])}" for name in names if name in reference]
-    return " ".join([reference["plugin"], ", ".join(words)]).strip()
+    return f"{reference['plugin']} {', '.join(words)}".strip()
 
 
 def three_decimals(value: float) -> str:
