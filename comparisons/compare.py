@@ -31,7 +31,7 @@ from comparisons.prepared import Prepared, guarded, require_light
 from heuristic import heuristics
 from reference.records import Pixels
 from reference.rendering.gbuffer import GBuffer, image_size
-from reference.rendering.passes import Progress, passes
+from reference.rendering.renderer import Progress, passes
 from reference.rendering.sums import (
     DEVIATION,
     MEAN,
@@ -40,8 +40,7 @@ from reference.rendering.sums import (
     DifferenceSums,
     add_difference,
 )
-from reference.scene import messages
-from reference.scene.source import Source
+from reference.scene.source import Source, collect_messages, count_messages
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
@@ -85,9 +84,9 @@ def compare(
         When a rendering holds a NaN or an infinity.
     """
     printed: list[str] = []
-    with messages.collected(printed):
+    with collect_messages(printed):
         comparison = _compare(source, options or Options(), progress, command)
-    lines = messages.counted([*source.messages, *printed])
+    lines = count_messages([*source.messages, *printed])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
     return replace(comparison, record=made)
 

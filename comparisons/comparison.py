@@ -14,6 +14,7 @@ from comparisons.hybrids.nearness import Nearest, Renderings
 from comparisons.pixel_terms import TermGrid
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
+from reference.pairing.prepare import Override
 from reference.planning.plan import Plan
 from reference.records import (
     VERSION,
@@ -28,7 +29,6 @@ from reference.records import (
     Versions,
 )
 from reference.rendering.renderer import Times
-from reference.scene.prepare import Override
 
 
 class Significant(Record):

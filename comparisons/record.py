@@ -15,10 +15,10 @@ from comparisons.processes.pool import cores
 from heuristic import __version__
 from heuristic.heuristics import named
 from reference.pairing.halves import Pair
+from reference.pairing.prepare import Override
 from reference.planning.plan import Plan
 from reference.planning.rules import SAMPLED_AS_HIT, loses_light
 from reference.records import Machine
-from reference.scene.prepare import Override
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
 

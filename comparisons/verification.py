@@ -15,8 +15,7 @@ from comparisons.prepared import prepare
 from reference.planning.plan import Plan
 from reference.records import VERSION, Estimated, Record
 from reference.rendering.gbuffer import gbuffer, image_size
-from reference.rendering.passes import Progress, Stream, pass_seed, passes
-from reference.rendering.renderer import Renderer
+from reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
 from reference.rendering.sampler import with_sampler
 from reference.rendering.sums import Accumulator, DifferenceSums
 from reference.scene.source import Source

@@ -4,8 +4,6 @@ from heuristic import llvm  # isort: skip  it finds LLVM before Mitsuba loads Dr
 
 import mitsuba as mi
 
-from reference import switching  # noqa: F401  before a variant is chosen
-
 if mi.variant() is None:
     llvm.check()
     mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen

@@ -340,10 +340,11 @@ class Ready:
                 ) from error
         llvm.check()
         llvm.use_threads(self.threads)
-        from reference.scene import messages
 
         # Unless verbose, a message is ignored: the record has the warnings that concern it.
-        messages.divert(partial(echo, err=True) if self.level > 0 else lambda _: None)
+        from reference.scene.source import divert_messages
+
+        divert_messages(partial(echo, err=True) if self.level > 0 else lambda _: None)
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
         import comparisons.compare  # noqa: F401  part of start-up

@@ -2,8 +2,8 @@
 
 import mitsuba as mi
 
+from reference.pairing.probe import AlbedoTable
 from reference.planning.rules import PruningRule, RuleResult
-from reference.rendering.direct import AlbedoTable
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
 TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}

@@ -17,7 +17,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.passes import pass_seed
+from reference.rendering.renderer import pass_seed
 from reference.rendering.sums import DifferenceSums
 from reference.scene.source import Source
 from tests.test_physics import look_at

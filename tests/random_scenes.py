@@ -25,7 +25,7 @@ import numpy as np
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic.errors import FotismosError
-from reference.rendering.passes import pass_seed
+from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import octahedron
 

@@ -24,7 +24,7 @@ from comparisons.prepared import guarded, prepare
 from heuristic.errors import InputError
 from heuristic.interpolation import Interpolation
 from reference.planning.effects import EFFECTS, OCCLUSION, labelled
-from reference.rendering.passes import Stream, passes
+from reference.rendering.renderer import Stream, passes
 from reference.rendering.sums import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source

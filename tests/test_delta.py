@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reference.rendering.passes import Stream, pass_seed
-from reference.rendering.renderer import Renderer
+from reference.rendering.renderer import Renderer, Stream, pass_seed
 from reference.rendering.sums import Accumulator
 from tests.test_physics import look_at
 

@@ -9,7 +9,7 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.planning.facts import Facts
 from reference.planning.rules import LIGHT_BY_LIGHT
-from reference.rendering.passes import pass_seed
+from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
 

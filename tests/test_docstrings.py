@@ -9,7 +9,7 @@ import pytest
 import heuristic
 from comparisons.departure import metrics
 from heuristic import terms
-from reference.pairing import factors
+from reference.pairing import albedo, factors
 from tests.programs import ROOT
 
 ROOMS = ("heuristic", "reference", "comparisons", "reports")
@@ -37,7 +37,7 @@ SHOWN_BY_EXAMPLE = (
     *(terms.diffuse, terms.specular, terms.attenuation, terms.clamped_attenuation),
     *(terms.normalisation, terms.spot_falloff),
     *(factors.alpha_of, factors.exponent_of, factors.specular_albedo),
-    *(factors.to_roughplastic, factors.to_phong),
+    *(albedo.to_roughplastic, albedo.to_phong),
     *(metrics.delta_e_2000, metrics.log2_luminance_ratio),
 )
 

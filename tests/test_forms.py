@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.planning.shapes import Form, geometry
+from reference.planning.facts import Form, geometry
 
 pytestmark = pytest.mark.usefixtures("rgb")
 

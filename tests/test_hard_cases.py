@@ -12,8 +12,8 @@ from comparisons.departure.metrics import delta_e_2000
 from comparisons.hard import hard_cases
 from comparisons.hard.hard_cases import CASES, error
 from heuristic import vectors
-from reference.pairing.albedo import SMALLEST_IOR
-from reference.pairing.factors import Convention, Phong, to_roughplastic
+from reference.pairing.albedo import SMALLEST_IOR, to_roughplastic
+from reference.pairing.factors import Convention, Phong
 from reports.page import page
 from tests import conftest
 

@@ -25,7 +25,7 @@ from heuristic.interpolation import (
 from heuristic.normals import WEIGHTINGS
 from reference import Source
 from reference.pairing.halves import pair
-from reference.scene import messages
+from reference.scene.source import collect_messages
 from tests import oracle
 from tests.test_normals import rows, uv_sphere
 
@@ -372,7 +372,7 @@ def test_what_cannot_be_made_into_triangles_is_refused(rgb):
     with pytest.raises(InputError, match=r"'blob'.*SDFGrid.*phong interpolation"):
         meshes.to_mesh(mi.load_dict({"type": "sdfgrid", "id": "blob", "grid": grid}))
     sheared = mi.ScalarTransform4f().rotate((1, 2, 3), 40)  # an axis of another length than 1
-    with messages.collected(said := []):
+    with collect_messages(said := []):
         shape = mi.load_dict({"type": "cylinder", "id": "tube", "to_world": sheared})
     assert "shearing" in " ".join(said)
     with pytest.raises(InputError, match=r"'tube'.*to_world"):

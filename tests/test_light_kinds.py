@@ -2,14 +2,11 @@
 
 import mitsuba as mi
 import numpy as np
-import pytest
 
 from heuristic.lights import PLUGINS
 from reference import Source
-from reference.pairing import lights, nearest
+from reference.pairing import emitters, lights
 from reference.pairing.factors import Replacements
-from reference.pairing.nearest import NearestPhong, rule
-from reference.planning.shapes import ShapeFacts
 
 PHYSICAL = [plugin for kind in lights.KINDS for plugin in kind.plugins]
 NEEDED = {"projector": {"irradiance": 1.0}}
@@ -45,20 +42,7 @@ def test_every_light_of_the_heuristic_has_a_physical_form(rgb):
         assert kind.model is PLUGINS[plugin]
         falls_off = {"k0": 0.0, "k2": 1.0} if kind.has("attenuation") else {}
         replaced = Replacements()
-        lights.to_physical(graph_of(plugin, **falls_off), None, replaced)
+        emitters.to_physical(graph_of(plugin, **falls_off), None, replaced)
         (record,) = replaced.emitters
         assert record.given == plugin
         assert record.derived in kind.plugins
-
-
-@pytest.mark.parametrize(("reflectances", "opaque"), [({"reflectance": 0.5}, True), (None, False)])
-def test_a_rule_for_a_material_is_all_that_planning_asks_for(
-    rgb, monkeypatch, reflectances, opaque
-):
-    monkeypatch.delitem(nearest.RULES, "diffuse")
-    rule("diffuse", reflectances=reflectances)(lambda context, index: NearestPhong(k_d=0.1))
-    bsdf = {"type": "diffuse"}
-    graph = Source("a test", {"type": "scene", "ball": {"type": "sphere", "bsdf": bsdf}}).parse()
-    (shape,) = graph.instantiate().shapes()
-    facts = ShapeFacts.of(graph, graph.nodes(mi.ObjectType.Shape)[0], shape)
-    assert facts.opaque is opaque

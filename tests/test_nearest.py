@@ -14,7 +14,8 @@ from heuristic.errors import InputError
 from reference import Convention, Source
 from reference.pairing import albedo, halves, nearest, partners, probe
 from reference.pairing.albedo import RoughPlastic
-from reference.pairing.nearest import Context
+from reference.pairing.bsdfs import Context
+from reference.pairing.nearest import rule_of
 from reference.pairing.probe import beam, mean_radiance
 from reference.scene.graph import Reference
 from tests.test_physics import look_at
@@ -59,7 +60,7 @@ def ball(bsdf):
 
 def material(bsdf, convention=Convention.MATCHED):
     graph, index = ball(bsdf)
-    return Context(graph, convention).nearest(index)
+    return Context(graph, convention, rule_of).nearest(index)
 
 
 def raw(values):
@@ -254,7 +255,9 @@ def test_the_base_of_a_plastic_follows_from_two_albedos(rgb):
     for nonlinear in (False, True):
         plastic = {"type": "roughplastic", "alpha": 0.3, "nonlinear": nonlinear}
         graph, index = ball(plastic | {"diffuse_reflectance": tint})
-        found = at(graph, Context(graph, Convention.MATCHED).nearest(index).k_d, (0.1, 0.1))
+        found = at(
+            graph, Context(graph, Convention.MATCHED, rule_of).nearest(index).k_d, (0.1, 0.1)
+        )
         known = RoughPlastic((0.65,) * 3, 0.3, ior, air, nonlinear=nonlinear)
         assert found == pytest.approx(albedo.of_roughplastic(known).diffuse[0], rel=1e-4)
 
@@ -272,7 +275,7 @@ def test_a_textured_plastic_is_paired_by_name_at_each_point(rgb):
     given = {"type": "roughplastic", "alpha": 0.2, "specular_reflectance": 0.7}
     for reflectance in ("diffuse_reflectance", "specular_reflectance"):
         graph, index = ball(given | {reflectance: GREY_CHECKS})
-        textured = Context(graph, Convention.LITERAL).nearest(index)
+        textured = Context(graph, Convention.LITERAL, rule_of).nearest(index)
         for level, uv in ((0.2, (0.1, 0.1)), (0.8, (0.1, 0.6))):
             plain = material(given | {reflectance: level}, Convention.LITERAL)
             for name in ("k_a", "k_d", "k_s", "n"):

@@ -5,9 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from reference.planning.facts import Facts, LightFacts
+from reference.planning.facts import ROUNDING, Facts, Form, LightFacts, ShapeFacts
 from reference.planning.rules import FAR, facing_pair, occluder
-from reference.planning.shapes import ROUNDING, Form, ShapeFacts
 
 
 def corners(shape):

@@ -102,7 +102,7 @@ def monte_carlo_albedo(plastic, size=400, batches=6):
 def test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to(rgb):
     """``k_d`` and ``2 k_s / (n + 2)``, within 5 standard errors of an independent quadrature."""
     for phong in REACHABLE:
-        plastic, misses = factors.to_roughplastic(phong, MATCHED)
+        plastic, misses = albedo.to_roughplastic(phong, MATCHED)
         assert not misses
         mean, error = monte_carlo_albedo(plastic)
         wanted = np.array([phong.k_d, 2 * np.array(phong.k_s) / (phong.n + 2)])
@@ -142,8 +142,8 @@ def test_the_albedo_of_the_lobe():
 
 def test_there_and_back_gives_the_same_phong(rgb):
     for phong in REACHABLE:
-        plastic, _ = factors.to_roughplastic(phong, MATCHED)
-        back = factors.to_phong(plastic, MATCHED)
+        plastic, _ = albedo.to_roughplastic(phong, MATCHED)
+        back = albedo.to_phong(plastic, MATCHED)
         np.testing.assert_allclose(back.k_d, phong.k_d, rtol=2e-5)
         np.testing.assert_allclose(back.k_s, phong.k_s, rtol=2e-5)
         assert back.n == pytest.approx(phong.n, rel=1e-9)
@@ -178,12 +178,12 @@ def test_a_matched_highlight_is_wider_by_what_the_documents_say(rgb):
     """In percent at half the height; Blinn's is as wide."""
     wider = {3: 35, 5: 18, 9: 9, 15: 5, 30: 2.6, 100: 0.8, 400: 0.3}
     for n, percent in wider.items():
-        plastic, _ = factors.to_roughplastic(Phong((0.1,) * 3, (0.2,) * 3, n), MATCHED)
+        plastic, _ = albedo.to_roughplastic(Phong((0.1,) * 3, (0.2,) * 3, n), MATCHED)
         own = np.degrees(np.arccos(0.5 ** (1 / n)))
         assert 100 * (half_width(plastic) / own - 1) == pytest.approx(percent, abs=0.6, rel=0.02)
     phong = Phong((0.1,) * 3, (2.0,) * 3, 400, form="blinn")
     own = 2 * np.degrees(np.arccos(0.5 ** (1 / 400)))
-    assert half_width(factors.to_roughplastic(phong, MATCHED)[0]) == pytest.approx(own, rel=0.02)
+    assert half_width(albedo.to_roughplastic(phong, MATCHED)[0]) == pytest.approx(own, rel=0.02)
 
 
 def test_an_index_that_no_real_plastic_has_is_named(rgb):
@@ -199,7 +199,7 @@ def test_an_index_that_no_real_plastic_has_is_named(rgb):
 def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb):
     """A smooth surface reflects ``((ior - 1) / (ior + 1))^2``, here ``2 k_s / (n + 2)``."""
     for k_s in (1e-6, 1e-8, 1e-12):
-        plastic, misses = factors.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
+        plastic, misses = albedo.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
         reflected = ((plastic.int_ior - 1) / (plastic.int_ior + 1)) ** 2
         faintest = 2.5e-9
         assert reflected == pytest.approx(max(2 * k_s / 102, faintest), rel=0.05)
@@ -208,7 +208,7 @@ def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb):
 
 def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
     """And what it reaches instead is what the record says, by the independent quadrature."""
-    plastic, misses = factors.to_roughplastic(UNREACHABLE, MATCHED)
+    plastic, misses = albedo.to_roughplastic(UNREACHABLE, MATCHED)
     assert misses
     mean, error = monte_carlo_albedo(plastic)
     wanted = {"diffuse": 0.5, "specular": 0.28}
@@ -222,7 +222,7 @@ def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
 
 def test_the_nearest_plastic_is_taken_where_none_reaches(rgb):
     """No index of refraction and reflectance come nearer, in the sum of squares of both parts."""
-    plastic, _ = factors.to_roughplastic(UNREACHABLE, MATCHED)
+    plastic, _ = albedo.to_roughplastic(UNREACHABLE, MATCHED)
     wanted = np.array([0.5, 0.28])
 
     def distance(int_ior, rho):
@@ -236,15 +236,15 @@ def test_the_nearest_plastic_is_taken_where_none_reaches(rgb):
 
 def test_the_literal_convention_goes_by_name(rgb):
     """And limits a reflectance to 1, which it says."""
-    plastic, misses = factors.to_roughplastic(UNREACHABLE, LITERAL)
+    plastic, misses = albedo.to_roughplastic(UNREACHABLE, LITERAL)
     assert not misses
     assert plastic == albedo.RoughPlastic((0.5,) * 3, pytest.approx(sqrt(2 / 5)), 1.5)
-    back = factors.to_phong(
+    back = albedo.to_phong(
         albedo.RoughPlastic((0.1, 0.2, 0.3), 0.2, 1.9, specular_reflectance=(0.5, 0.6, 0.7)),
         LITERAL,
     )
     assert back == Phong((0.1, 0.2, 0.3), (0.5, 0.6, 0.7), pytest.approx(48))
-    plastic, misses = factors.to_roughplastic(Phong((1.5, 0.5, 0.5), (0.1,) * 3, 9.0), LITERAL)
+    plastic, misses = albedo.to_roughplastic(Phong((1.5, 0.5, 0.5), (0.1,) * 3, 9.0), LITERAL)
     assert plastic.diffuse_reflectance == (1.0, 0.5, 0.5)
     assert [(miss.wanted, miss.reached) for miss in misses] == [(1.5, 1.0)]
 

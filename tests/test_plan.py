@@ -9,11 +9,11 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from comparisons.verification import verify
+from reference.pairing.probe import AlbedoTable
 from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, TRANSMISSION
 from reference.planning.facts import Facts
 from reference.planning.plan import wants_spectra
 from reference.planning.rules import Boxes
-from reference.rendering.direct import AlbedoTable
 from reference.scene.source import Source
 from tests import misplanned
 from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly

@@ -9,7 +9,7 @@ from comparisons.compare import compare
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.planning.effects import NO_SECOND_REFLECTION, NO_SHADOWS
-from reference.planning.facts import Facts
+from reference.planning.facts import Facts, Form
 from reference.planning.rules import (
     CONVEX,
     FEW,
@@ -22,8 +22,7 @@ from reference.planning.rules import (
     TABULATED_ENVIRONMENT,
     loses_light,
 )
-from reference.planning.shapes import Form
-from reference.rendering.passes import pass_seed
+from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import (
     DIFFUSE,

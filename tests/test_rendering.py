@@ -11,7 +11,8 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic.errors import NonFiniteError
 from reference.pairing import halves
-from reference.rendering import passes, renderer, sums
+from reference.rendering import renderer, sums
+from reference.rendering.renderer import pass_seed
 from tests import checks
 from tests.test_physics import look_at
 
@@ -98,9 +99,9 @@ def test_another_seed_gives_other_camera_rays(rgb):
 
 def test_no_two_runs_have_a_pass_in_common():
     """Seeds of runs next to each other, of 64 passes each and of every stream."""
-    streams = list(passes.Stream)
+    streams = list(renderer.Stream)
     seeds = [
-        passes.pass_seed(seed, number, stream)
+        pass_seed(seed, number, stream)
         for seed in range(50)
         for number in range(64)
         for stream in streams
@@ -120,10 +121,7 @@ def test_means_vary_as_those_of_independent_passes_must(rgb):
     renderer = prepare(SCENES["cornell-box"].source(), options).reference
     renderer.spp = 4
     images = np.array(
-        [
-            [renderer.render(passes.pass_seed(seed, number)) for number in range(4)]
-            for seed in range(120)
-        ],
+        [[renderer.render(pass_seed(seed, number)) for number in range(4)] for seed in range(120)],
         float,
     )
     # A few bright pixels would outweigh all others.
@@ -277,3 +275,31 @@ def test_times_are_of_all_passes(rgb):
     assert 0 < times.median_s < times.total_s
     assert times.first_s < times.total_s
     assert 0 <= times.compile_s <= times.total_s
+
+
+def test_switching_the_variant_transforms_the_same_code_once():
+    def counted(number):
+        while number < 3:
+            number += 1
+        return number
+
+    first, again = dr.syntax(counted), dr.syntax(counted)
+    assert first.__code__ is again.__code__ is not counted.__code__
+    assert again(mi.Int(1)) == first(mi.Int(1)) == 3
+
+
+@pytest.mark.thorough
+def test_integrators_in_python_render_as_their_counterparts_after_switching(rgb):
+    names = ("llvm_ad_spectral", "llvm_ad_mono", "llvm_ad_rgb")
+    for name in (*names, *names):
+        mi.set_variant(name)
+        box = mi.cornell_box()
+        box["sensor"]["film"] |= {"width": 32, "height": 32}
+        scene = mi.load_dict(box)
+        means = [
+            np.mean(
+                mi.render(scene, integrator=mi.load_dict({"type": kind, "max_depth": 4}), spp=64)
+            )
+            for kind in ("prb", "prb_basic", "path")
+        ]
+        assert means[:2] == pytest.approx([means[2]] * 2, rel=0.02)

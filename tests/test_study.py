@@ -15,7 +15,7 @@ from scipy.special import erf
 from comparisons.processes.pool import Pool
 from comparisons.study import dataset, design, rendered, running, surface
 from heuristic.errors import InputError
-from reference.pairing import factors
+from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reports.charts import study_charts
 from tests import dask_cluster
@@ -278,11 +278,11 @@ def test_a_row_names_the_material_that_pairing_derived(finished):
     """Of either side: by the factors for the values of the row."""
     (row,) = of_part(finished[2], "sphere")
     phong = factors.Phong((0.3,) * 3, (0.4,) * 3, 20.0)
-    plastic, _ = factors.to_roughplastic(phong, factors.Convention.MATCHED)
+    plastic, _ = albedo.to_roughplastic(phong, factors.Convention.MATCHED)
     assert row["reflectance"] == pytest.approx(plastic.diffuse_reflectance[0], rel=1e-3)
     assert (row["alpha"], row["int_ior"]) == pytest.approx((plastic.alpha, plastic.int_ior))
     row, _ = of_part(finished[2], "enclosure")
-    phong = factors.to_phong(RoughPlastic((0.5,) * 3, 0.3, 1.5), factors.Convention.MATCHED)
+    phong = albedo.to_phong(RoughPlastic((0.5,) * 3, 0.3, 1.5), factors.Convention.MATCHED)
     derived = phong.n, phong.k_d[0], phong.k_s[0]
     assert (row["n"], row["k_d"], row["k_s"]) == pytest.approx(derived, rel=1e-3)
 

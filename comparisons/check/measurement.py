@@ -22,9 +22,9 @@ from comparisons.departure.statistics import noise_floor
 from comparisons.intervals import jackknife_error
 from comparisons.options import Options
 from comparisons.prepared import guarded, require_light
+from reference.pairing.prepare import film_size
 from reference.records import Amount, Record
-from reference.rendering.passes import Progress, passes
-from reference.scene.prepare import film_size
+from reference.rendering.renderer import Progress, passes
 from reference.scene.source import Source
 
 PASSES = 16

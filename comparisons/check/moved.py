@@ -29,7 +29,7 @@ from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.records import Amount, Record, Share
 from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.scene.source import Source
 
 LEVEL = 0.01

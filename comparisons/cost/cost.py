@@ -18,7 +18,7 @@ from comparisons.options import Options
 from reference.planning.plan import Guard
 from reference.records import Pixels
 from reference.rendering.gbuffer import image_size
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.scene.source import Source
 
 

@@ -20,7 +20,7 @@ from comparisons.options import Options
 from heuristic.errors import unknown
 from reference.records import VERSION, Positive, Record, Resolution
 from reference.rendering.gbuffer import image_size
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.scene.source import Source
 
 ERRORS = (5.0, 2.0, 1.0, 0.5)

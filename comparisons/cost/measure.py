@@ -26,11 +26,10 @@ from comparisons.hybrids.attribution import ErrorMeter, MeanError
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError
+from reference.pairing.prepare import film_size
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.passes import Progress, Stream, passes
-from reference.rendering.renderer import Renderer
+from reference.rendering.renderer import Progress, Renderer, Stream, passes
 from reference.rendering.sums import MEAN, Accumulator, Estimate
-from reference.scene.prepare import film_size
 from reference.scene.source import Source
 
 Size = tuple[int, int]

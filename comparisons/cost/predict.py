@@ -30,8 +30,7 @@ from comparisons.cost.measure import DETERMINISTIC_SPP, Effort, Size, measure, m
 from comparisons.cost.methods import Ladder
 from comparisons.hybrids.attribution import MeanError
 from heuristic.errors import InputError
-from reference.rendering.passes import Progress
-from reference.rendering.renderer import LARGEST_PASS, require_memory
+from reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 
 LARGEST_FITTED = 256**2
 """Pixels of the largest fitted size, if the requested one has at least four times as many."""

@@ -27,7 +27,7 @@ irradiance, and counts from :data:`WEDGE_LOST` on.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
@@ -36,11 +36,12 @@ import numpy as np
 from comparisons.departure.blocks import bands
 from heuristic.convention import Scene, Shape
 from heuristic.plugins.textures import SMALLEST_ALPHA
-from reference.pairing.albedo import RoughPlastic, of_roughplastic
-from reference.pairing.nearest import white_roughplastic
 from reference.records import Count, Record
 from reference.scene.graph import Graph
 from reference.scene.values import number
+
+if TYPE_CHECKING:
+    from reference.pairing.albedo import RoughPlastic
 
 LOST = 0.05
 """Smooth ``roughplastic`` already loses 0.03, since its diffuse part is an approximation."""
@@ -219,7 +220,12 @@ def of_scene(
 
 def _read_plastics(graph: Graph, si: Any, alpha: np.ndarray, albedo: np.ndarray) -> None:
     """Fill in alpha and albedo (N) where surfaces (N) show a ``roughplastic`` of the graph."""
-    plastics = {i: white_roughplastic(graph, i) for i in graph.nodes(mi.ObjectType.BSDF)}
+    nodes = graph.nodes(mi.ObjectType.BSDF)
+    if "roughplastic" not in map(graph.plugin, nodes):
+        return
+    from reference.pairing.nearest import white_roughplastic  # loaded late: only for plastics
+
+    plastics = {i: white_roughplastic(graph, i) for i in nodes}
     furnaces = {i: plastic for i, plastic in plastics.items() if plastic is not None}
     if not furnaces:
         return
@@ -238,7 +244,7 @@ def _read_plastics(graph: Graph, si: Any, alpha: np.ndarray, albedo: np.ndarray)
 
 
 def _of_material(
-    graph: Graph, index: int, si: Any, plastics: Mapping[int, RoughPlastic]
+    graph: Graph, index: int, si: Any, plastics: "Mapping[int, RoughPlastic]"
 ) -> tuple[Any, Any]:
     """Return the least alpha and the furnace's albedo of a BSDF at surfaces, also nested."""
     if index in plastics:
@@ -275,7 +281,9 @@ def _share(graph: Graph, index: int, key: str, si: Any) -> np.ndarray:
 
 
 @lru_cache
-def _furnace(plastic: RoughPlastic) -> float:
+def _furnace(plastic: "RoughPlastic") -> float:
+    from reference.pairing.albedo import of_roughplastic  # loaded late: see _read_plastics
+
     albedo = of_roughplastic(plastic)
     return float((albedo.diffuse + albedo.specular).mean())
 

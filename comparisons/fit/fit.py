@@ -40,8 +40,7 @@ from heuristic.heuristics import PHONG, Heuristic, named
 from heuristic.interpolation import Interpolation
 from heuristic.materials import FORMS
 from reference.records import Pixels
-from reference.rendering.passes import Progress, pass_seed, passes
-from reference.rendering.renderer import variant
+from reference.rendering.renderer import Progress, pass_seed, passes, variant
 from reference.rendering.sums import Accumulator, Estimate, add_difference
 from reference.scene.graph import Graph, properties
 from reference.scene.source import Source

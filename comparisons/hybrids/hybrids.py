@@ -39,8 +39,7 @@ from reference.planning.effects import (
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.plan import Plan, physical_integrator
 from reference.rendering.gbuffer import image_size, resize
-from reference.rendering.passes import Stream, passes
-from reference.rendering.renderer import Renderer, variant
+from reference.rendering.renderer import Renderer, Stream, passes, variant
 from reference.rendering.sampler import with_sampler
 from reference.scene.graph import Graph, properties
 from reference.scene.source import Source

@@ -20,7 +20,7 @@ from comparisons.options import Options
 from comparisons.pictures import picture_files
 from comparisons.prepared import guarded
 from reference.planning.effects import Effect
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.rendering.sums import Estimate
 from reference.scene.source import Source
 

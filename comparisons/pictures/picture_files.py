@@ -15,8 +15,8 @@ import numpy as np
 from comparisons.departure.colour import from_srgb
 from comparisons.options import Options
 from heuristic.errors import InputError, NonFiniteError, suggestion, unknown
+from reference.pairing.prepare import film_size
 from reference.rendering.renderer import Renderer, Times
-from reference.scene.prepare import film_size
 from reference.scene.source import Source
 
 TRANSFERS = ("linear", "srgb")

@@ -17,8 +17,7 @@ from heuristic.errors import InputError
 from reference.pairing.halves import Pair
 from reference.planning.effects import EFFECTS
 from reference.planning.plan import Plan, physical_integrator
-from reference.rendering.passes import passes
-from reference.rendering.renderer import Renderer
+from reference.rendering.renderer import Renderer, passes
 from reference.rendering.sums import Accumulator
 from reference.scene.graph import Graph
 from reference.scene.source import Source

@@ -25,7 +25,7 @@ from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
 from reference.rendering import direct
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.scene.graph import set_variant
 from reference.scene.source import digest
 

@@ -20,8 +20,7 @@ from comparisons.study.dataset import Row, largest_miss, measure, measure_each
 from comparisons.study.scenes import Point
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
-from reference.pairing import factors
-from reference.pairing.albedo import RoughPlastic
+from reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
 from reference.pairing.factors import Convention, Miss, Phong
 
 HEIGHTS, AZIMUTHS = 240, 120
@@ -68,13 +67,13 @@ def _of_phong(phong: Phong, convention: Convention) -> StudyMaterial:
     if not any(phong.k_s):
         # Pairing makes it plain diffuse, not roughplastic.
         return StudyMaterial(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
-    plastic, misses = factors.to_roughplastic(phong, convention)
+    plastic, misses = to_roughplastic(phong, convention)
     return StudyMaterial(phong, plastic, misses)
 
 
 @lru_cache(maxsize=256)
 def _of_plastic(plastic: RoughPlastic, convention: Convention) -> StudyMaterial:
-    return StudyMaterial(factors.to_phong(plastic, convention), plastic, ())
+    return StudyMaterial(to_phong(plastic, convention), plastic, ())
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:

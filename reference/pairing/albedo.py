@@ -1,4 +1,4 @@
-"""Albedos of Mitsuba's plastics at normal incidence, by the plugins' own formulas.
+"""Albedos of Mitsuba's plastics at normal incidence, and the phong of the same albedo.
 
 The directional-hemispherical albedo is ``a = 2 pi int_0^(pi/2) f(theta) cos(theta) sin(theta)
 d(theta)``. At normal incidence the half vector stands at ``theta / 2`` and the lobe has the width
@@ -27,10 +27,21 @@ both signs, and Beckmann's slopes along x and y are independent.
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import exp, log, sqrt
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+from heuristic.terms import normalisation
+from reference.pairing.factors import (
+    Convention,
+    Miss,
+    Phong,
+    alpha_of,
+    exponent_of,
+    specular_albedo,
+)
 
 NODES = 96
 
@@ -52,6 +63,9 @@ SMALLEST_IOR = exp(1e-4)
 1."""
 LARGEST_IOR = 10.0
 """No dielectric comes near it; a larger specular albedo is recorded as missed."""
+
+MATCHING_TOLERANCE = 1e-5
+"""Relative tolerance; a larger mismatch is recorded as a miss."""
 
 STEP = 1.02
 """Ratio of logarithms of the IOR between neighbours that are compared."""
@@ -80,8 +94,7 @@ class RoughPlastic:
         return self.distribution, float(np.float32(self.alpha)), eta
 
 
-@dataclass(frozen=True)
-class Albedo:
+class Albedo(NamedTuple):
     """The two parts of the albedo at normal incidence, one value per channel."""
 
     diffuse: np.ndarray
@@ -156,7 +169,7 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
         return LARGEST_IOR
     if albedo <= reached(log(SMALLEST_IOR)):
         return SMALLEST_IOR
-    from scipy.optimize import root_scalar  # above, it would be a tenth of a command's start
+    from scipy.optimize import root_scalar  # loaded late: a tenth of a command's start
 
     root = min(sqrt(albedo), 0.8)
     guess = log((1 + root) / (1 - root))
@@ -196,7 +209,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
     # If the slope rises even at the smallest IOR, that one is nearest; if it never rises, the
     # highest is: there is no minimum in between.
     if low < high and not is_rising:
-        from scipy.optimize import brentq  # see ior_of_lobe
+        from scipy.optimize import brentq  # loaded late: see ior_of_lobe
 
         low = brentq(slope, low, high, xtol=1e-4)
     return exp(exp(low))
@@ -238,63 +251,119 @@ def coat(distribution: str, alpha: float, eta: float) -> tuple[np.ndarray, float
 
 def _sums(distribution: str, alpha: float, eta: float, size: int, is_refracted: bool) -> np.ndarray:
     """Return the sums over rules of ``size`` by ``size`` nodes, (64,)."""
-    rule, width = _rule(mi.variant(), size), dr.opaque(mi.Float, alpha)
+    incident, first, second, normal, weight = _rule(mi.variant(), size)
+    width = dr.opaque(mi.Float, alpha)
     if distribution == "beckmann":
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, width)
         # The middle of the second axis has a slope of 0 along y.
         every = dr.arange(mi.UInt32, ROWS * size) * (size // 2)
-        middle = mi.Point2f(dr.gather(mi.Float, rule.first, every), 0.5)
-        facet, _ = facets.sample(dr.gather(mi.Vector3f, rule.incident, every), middle)
+        middle = mi.Point2f(dr.gather(mi.Float, first, every), 0.5)
+        facet, _ = facets.sample(dr.gather(mi.Vector3f, incident, every), middle)
         slope = facet.x / facet.z
         dr.eval(slope)
-        slope = dr.gather(
-            mi.Float, slope, dr.arange(mi.UInt32, dr.width(rule.weight)) // (size // 2)
-        )
-        facet = dr.normalize(mi.Vector3f(slope, width * rule.normal, 1))
+        slope = dr.gather(mi.Float, slope, dr.arange(mi.UInt32, dr.width(weight)) // (size // 2))
+        facet = dr.normalize(mi.Vector3f(slope, width * normal, 1))
     else:
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, width)
-        facet, _ = facets.sample(rule.incident, mi.Point2f(rule.second, rule.first))
-    cosine = dr.dot(rule.incident, facet)
+        facet, _ = facets.sample(incident, mi.Point2f(second, first))
+    cosine = dr.dot(incident, facet)
     reflected, inside, _, inverse = mi.fresnel(cosine, dr.opaque(mi.Float, eta))
     if is_refracted:
-        leaving, share = mi.refract(rule.incident, facet, inside, inverse), 1 - reflected
+        leaving, share = mi.refract(incident, facet, inside, inverse), 1 - reflected
     else:
-        leaving, share = mi.reflect(rule.incident, facet), reflected
+        leaving, share = mi.reflect(incident, facet), reflected
     leaves = (leaving.z < 0) if is_refracted else (leaving.z > 0)
     value = dr.select(leaves & (share > 0), share * facets.smith_g1(leaving, facet), 0)
-    return np.array(dr.block_sum(value * rule.weight, size * size // 2), float)
-
-
-@dataclass(frozen=True)
-class Quadrature:
-    """A rule at all cosines: directions of light, nodes in (0, 1), and weights.
-
-    The second axis has only its upper half; ``normal`` are Beckmann's slopes there, for a roughness
-    of 1.
-    """
-
-    incident: mi.Vector3f
-    first: mi.Float
-    second: mi.Float
-    normal: mi.Float
-    weight: mi.Float
+    return np.array(dr.block_sum(value * weight, size * size // 2), float)
 
 
 @cache
-def _rule(variant: str, size: int) -> Quadrature:
-    """Return the :class:`Quadrature` with the arrays of a variant."""
-    from scipy.special import erfinv  # see ior_of_lobe
+def _rule(variant: str, size: int) -> tuple:
+    """Return a rule at all cosines, as arrays of a variant.
+
+    Directions of light, two nodes in (0, 1), Beckmann's slopes along the second axis for a
+    roughness of 1, and weights. The second axis has only its upper half.
+    """
+    from scipy.special import erfinv  # loaded late: see ior_of_lobe
 
     points, weights = _legendre(size)
     row, i, j = np.indices((ROWS, size, size // 2)).reshape(3, -1)
     j += size // 2
     place = np.asarray(points, np.float32) * np.float32(0.5) + np.float32(0.5)
-    found = Quadrature(
+    rule = (
         mi.Vector3f(mi.Float(SINES[row]), 0, mi.Float(COSINES[row])),
         mi.Float(place[i]),
         mi.Float(place[j]),
         mi.Float(erfinv(points)[j]),
         mi.Float(weights[i] * weights[j] / 2),
     )
-    dr.eval(found.incident, found.first, found.second, found.normal, found.weight)
-    return found
+    dr.eval(rule)
+    return rule
+
+
+@lru_cache(maxsize=KEPT)
+def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, tuple[Miss, ...]]:
+    """Return the :class:`RoughPlastic` that corresponds to a :class:`Phong`, and its misses.
+
+    It uses the current variant of Mitsuba, whose plugin determines the albedo:
+
+    >>> grey = (0.5, 0.5, 0.5)
+    >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
+    >>> misses, round(plastic.alpha, 9)
+    ((), 0.2)
+    >>> _, misses = to_roughplastic(Phong(grey, (0.7, 0.7, 0.7), 3), Convention.MATCHED)
+    >>> [miss.what for miss in misses]
+    ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
+    """
+    if convention is Convention.LITERAL:
+        red, green, blue = (min(component, 1.0) for component in phong.k_d)
+        misses = tuple(
+            Miss(what="diffuse reflectance", wanted=component, reached=1.0)
+            for component in dict.fromkeys(phong.k_d)
+            if component > 1
+        )
+        return RoughPlastic((red, green, blue), alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
+
+    diffuse, specular = np.array(phong.k_d), specular_albedo(phong)
+    strength = max(phong.k_s)
+    red, green, blue = (k_s / strength for k_s in phong.k_s)
+    white = RoughPlastic(
+        (1.0, 1.0, 1.0),
+        alpha_of(phong.n, phong.form),
+        LITERAL_IOR,
+        specular_reflectance=(red, green, blue),
+    )
+    white = replace(white, int_ior=ior_of_lobe(white, max(specular)))
+    if any(diffuse > of_roughplastic(white).diffuse):
+        white = replace(white, int_ior=nearest_ior(white, Albedo(diffuse, specular)))
+    passed = of_roughplastic(white).diffuse
+    red, green, blue = np.minimum(diffuse / passed, 1).tolist()  # it is linear in rho
+    plastic = replace(white, diffuse_reflectance=(red, green, blue))
+    missed = {}
+    for part, targets in (("diffuse", diffuse), ("specular", specular)):
+        for target, value in zip(targets, getattr(of_roughplastic(plastic), part), strict=True):
+            if abs(value - target) > MATCHING_TOLERANCE * max(target, 1e-3):
+                what = f"{part} albedo at normal incidence"
+                missed[part, target] = Miss(what=what, wanted=float(target), reached=float(value))
+    return plastic, tuple(missed.values())
+
+
+@lru_cache(maxsize=KEPT)
+def to_phong(plastic: RoughPlastic, convention: Convention) -> Phong:
+    """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`; nothing is missed.
+
+    By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
+
+    >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
+    >>> phong = to_phong(plastic, Convention.LITERAL)
+    >>> phong.k_d, phong.n
+    ((0.5, 0.4, 0.3), 6.0)
+    """
+    if convention is Convention.LITERAL:
+        n = exponent_of(plastic.alpha, "blinn")
+        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n)
+    n = exponent_of(plastic.alpha)
+    reflected = of_roughplastic(plastic)
+    k_s = reflected.specular * normalisation("phong", n)
+    (red, green, blue), lobe = reflected.diffuse.tolist(), k_s.tolist()
+    return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n)

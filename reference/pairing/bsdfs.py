@@ -1,16 +1,45 @@
-"""Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing."""
+"""Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing.
 
-from dataclasses import asdict
+Towards the heuristic half there is one rule per plugin, which returns the nearest ``phong``. The
+rules here are exact, or combine those of nested BSDFs; those of other BSDFs, which have a lobe, let
+light through or must be measured, are in :mod:`reference.pairing.nearest`. Values are those of
+:mod:`reference.scene.values`.
+"""
 
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import drjit as dr
 import mitsuba as mi
 
-from reference.pairing import factors
-from reference.pairing.factors import Convention, Phong, Replacements
-from reference.pairing.nearest import WRAPPERS, Context
+from heuristic.errors import InputError
+from heuristic.materials import COEFFICIENTS
+from heuristic.terms import normalisation
+from reference.pairing.factors import Convention, Miss, Phong, Replacements
 from reference.scene import values
-from reference.scene.graph import Graph, properties
+from reference.scene.graph import Graph, Reference, properties
 
-BSDF = mi.ObjectType.BSDF
+BSDF, TEXTURE = mi.ObjectType.BSDF, mi.ObjectType.Texture
+
+REFLECTANCES: dict[str, dict[str, float]] = {
+    "phong": {"k_d": 0.0, "k_s": 0.0},
+    "diffuse": {"reflectance": 0.5},
+    "roughplastic": {"diffuse_reflectance": 0.5, "specular_reflectance": 1.0},
+    "plastic": {"diffuse_reflectance": 0.5, "specular_reflectance": 1.0},
+    "conductor": {"specular_reflectance": 1.0},
+    "roughconductor": {"specular_reflectance": 1.0},
+    "principled": {},
+}
+"""Plugins known only to reflect, on the side of the normal, and parameters with their defaults: it
+reflects nothing if all are 0, and without any it may always reflect."""
+
+TRANSMITTANCES = {"principled": {"spec_trans": 0.0}}
+"""Parameters with which one of these transmits, unless they are 0."""
+
+WRAPPERS = ("twosided", "mask", "blendbsdf", "normalmap", "bumpmap")
+"""Plugins that are made of other BSDFs."""
+
 COLOURS = {
     "diffuse": ("reflectance",),
     "roughplastic": ("diffuse_reflectance", "specular_reflectance"),
@@ -19,9 +48,15 @@ COLOURS = {
 }
 """Colours that pairing reads; they are checked before."""
 
-
 PLASTICS = (1.3, 1.8)
 """Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
+
+
+def may_differ_from_0(props: mi.Properties, defaults: Mapping[str, float]) -> bool:
+    """Return whether any of some parameters, given with defaults, may be other than 0."""
+    return any(
+        values.may_be_nonzero(props.get(name, default)) for name, default in defaults.items()
+    )
 
 
 def give_default(graph: Graph) -> None:
@@ -39,17 +74,98 @@ def check(graph: Graph) -> None:
         values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
 
 
-def to_heuristic(graph: Graph, convention: Convention, replaced: Replacements) -> None:
-    """Replace the BSDFs of all shapes by the nearest ``phong`` (:mod:`reference.pairing.nearest`).
+@dataclass(frozen=True)
+class NearestPhong:
+    """The phong material that replaces a BSDF; with values as in :mod:`reference.scene.values`.
+
+    ``lost`` are pairs of something that the heuristic model has no form for, and the rule for the
+    rest.
+    """
+
+    k_i: Any = 0.0
+    k_a: Any = 0.0
+    k_d: Any = 0.0
+    k_s: Any = 0.0
+    n: Any = 1.0
+    form: str = "phong"
+    normalised: bool = False
+    twosided: bool = False
+    transmittance: Any = 0.0
+    tilt: Any = None
+    lost: tuple[tuple[str, str], ...] = ()
+
+    def properties(self) -> mi.Properties:
+        """Return the properties of the node ``phong``, without defaults."""
+        props = properties("phong")
+        for name in (*COEFFICIENTS, "n", "transmittance"):
+            value = getattr(self, name)
+            if name in ("k_d", "n") or not values.is_zero(value):
+                props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
+        for name, default in (("normalised", False), ("twosided", False), ("form", "phong")):
+            if getattr(self, name) != default:
+                props[name] = getattr(self, name)
+        if self.tilt is not None:
+            props["tilt"] = self.tilt
+        return props
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the coefficients for records: numbers, or the word ``texture``."""
+        found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
+        if not values.is_zero(self.transmittance):
+            found["transmittance"] = self.transmittance
+        return {
+            name: "texture" if values.plain(value) is None else values.plain(value)
+            for name, value in found.items()
+        }
+
+
+@dataclass
+class Context:
+    """A graph that rules read and add nodes to, and the materials ``done`` so far, by node.
+
+    ``rule_of(plugin)`` returns the rule of a BSDF that is not in :data:`RULES`.
+    """
+
+    graph: Graph
+    convention: Convention
+    rule_of: Callable[[str], "Rule"] | None = None
+    done: dict[int, NearestPhong] = field(default_factory=dict)
+
+    def nearest(self, index: int) -> NearestPhong:
+        """Return the :class:`NearestPhong` of a BSDF node."""
+        if index not in self.done:
+            plugin = self.plugin(index)
+            rule = RULES.get(plugin) or (self.rule_of and self.rule_of(plugin))
+            assert rule, f"a rule for {plugin}"
+            self.done[index] = rule(self, index)
+        return self.done[index]
+
+    def value(self, index: int, key: str, default: Any) -> Any:
+        """Return a parameter as the parser keeps it."""
+        return self.graph.props(index).get(key, default)
+
+    def plugin(self, index: int) -> str:
+        """Return a node's plugin."""
+        return self.graph.plugin(index)
+
+    def inner(self, index: int) -> list[NearestPhong]:
+        """Return the materials of the nested BSDFs."""
+        return [self.nearest(child) for _, child in self.graph.children(index, BSDF)]
+
+
+Rule = Callable[[Context, int], NearestPhong]
+
+
+def to_heuristic(context: Context, replaced: Replacements) -> None:
+    """Replace the BSDFs of all shapes by the nearest ``phong``.
 
     Those that were not ``phong`` are recorded, also nested ones, but not those around others.
     """
-    nodes = graph.nodes(BSDF)
-    context = Context(graph, convention)
+    graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):
         for _, index in graph.children(shape, BSDF):
             context.nearest(index)
-    for index, material in sorted(context.found.items()):
+    for index, material in sorted(context.done.items()):
         label, plugin = graph.label(index), graph.plugin(index)
         if plugin not in ("phong", *WRAPPERS):
             is_diffuse = plugin == "diffuse"
@@ -57,36 +173,39 @@ def to_heuristic(graph: Graph, convention: Convention, replaced: Replacements) -
             replaced.bsdf(label, plugin, "phong", parameters)
             for lost, rule in material.lost:
                 replaced.lose(label, plugin, lost, rule)
-    for index in nodes:
-        if index in context.found:
-            graph.replace(index, context.found[index].properties())
+    for index, material in context.done.items():
+        graph.replace(index, material.properties())
 
 
 def to_physical(graph: Graph, convention: Convention, replaced: Replacements) -> None:
     """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
-    phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
-    glossy = [index for index in phongs if any(values.colour(graph, index, "k_s", 0.0))]
-    for index in phongs:
-        label, props = graph.label(index), physical_partner(graph, index, convention)
-        if index in glossy:
-            plastic, misses = factors.to_roughplastic(phong(graph, index), convention)
-            replaced.bsdf(label, "phong", "roughplastic", asdict(plastic), _unreal(plastic))
-            replaced.misses += misses
+    for index in [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]:
+        label, given = graph.label(index), graph.props(index)
+        plugin, parameters, misses = physical_partner(graph, index, convention)
+        replaced.misses += misses
+        if plugin == "diffuse":
+            replaced.bsdf(label, "phong", plugin, {"reflectance": _base(given)})
         else:
-            replaced.bsdf(label, "phong", "diffuse", {"reflectance": _base(graph.props(index))})
-        is_twosided = graph.props(index).get("twosided", False)
+            note = _unreal(parameters["int_ior"] / parameters["ext_ior"])
+            replaced.bsdf(label, "phong", plugin, parameters, note)
+        props = properties(plugin, **parameters)
+        is_twosided = given.get("twosided", False)
         graph.replace(index, mi.Properties("twosided") if is_twosided else props)
         if is_twosided:
             graph.attach(index, "bsdf", graph.add(BSDF, props))
 
 
-def physical_partner(graph: Graph, index: int, convention: Convention) -> mi.Properties:
-    """Return the properties of the physical BSDF that replaces a ``phong``."""
+def physical_partner(
+    graph: Graph, index: int, convention: Convention
+) -> tuple[str, dict[str, Any], tuple[Miss, ...]]:
+    """Return plugin and parameters of the physical BSDF that replaces a ``phong``, and misses."""
     if any(values.colour(graph, index, "k_s", 0.0)):
-        plastic, _ = factors.to_roughplastic(phong(graph, index), convention)
-        return properties("roughplastic", **asdict(plastic))
+        from reference.pairing import albedo  # loaded late: only lobes need it
+
+        plastic, misses = albedo.to_roughplastic(phong(graph, index), convention)
+        return "roughplastic", asdict(plastic), misses
     given = graph.props(index)
-    return properties("diffuse", reflectance=given.get(_base(given), 0.0))
+    return "diffuse", {"reflectance": given.get(_base(given), 0.0)}, ()
 
 
 def _base(given: mi.Properties) -> str:
@@ -94,10 +213,9 @@ def _base(given: mi.Properties) -> str:
     return "k_d" if "k_d" in given and values.may_be_nonzero(given["k_d"]) else "k_a"
 
 
-def _unreal(plastic):
+def _unreal(index: float) -> str:
     """Return a note on an index of refraction that no real plastic has, or an empty string."""
     low, high = PLASTICS
-    index = plastic.int_ior / plastic.ext_ior
     if low <= index <= high:
         return ""
     return f"no real plastic has the index {index:.3g}: they have {low:g} to {high:g}"
@@ -113,3 +231,165 @@ def phong(graph: Graph, index: int) -> Phong:
         form=props.get("form", "phong"),
         normalised=props.get("normalised", False),
     )
+
+
+def itself(context: Context, index: int) -> NearestPhong:
+    """``phong``: itself."""
+    props = context.graph.props(index)
+    names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
+    given = {name: props[name] for name in (*names, "tilt") if name in props}
+    return NearestPhong(**given)
+
+
+def diffuse(context: Context, index: int) -> NearestPhong:
+    """``diffuse``: ``k_d = k_a = rho`` (exact)."""
+    reflectance = context.value(index, "reflectance", 0.5)
+    return NearestPhong(k_a=reflectance, k_d=reflectance)
+
+
+def null(context: Context, index: int) -> NearestPhong:
+    """``null``: transmittance 1 (exact)."""
+    return NearestPhong(transmittance=1.0, twosided=True)
+
+
+def alike(
+    graph: Graph, first: NearestPhong, second: NearestPhong
+) -> tuple[NearestPhong, NearestPhong]:
+    """Return two materials with their lobes scaled in the same way, so ``k_s`` can be mixed."""
+    if first.normalised == second.normalised:
+        return first, second
+    return _normalised(graph, first), _normalised(graph, second)
+
+
+def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:
+    if material.normalised:
+        return material
+    if values.is_zero(material.k_s):
+        return replace(material, normalised=True)
+    n = values.plain(material.n)
+    if n is None:
+        raise InputError(
+            f"{graph.name}: a phong whose n is a texture is mixed with a BSDF whose alpha is one:"
+            " give the phong a single n, or make it normalised."
+        )
+    scale = 1 / float(normalisation(material.form, n))
+    return replace(material, normalised=True, k_s=values.product(graph, material.k_s, scale))
+
+
+def twosided(context: Context, index: int) -> NearestPhong:
+    """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
+    graph, inner = context.graph, context.inner(index)
+    if len(inner) == 1:
+        return replace(inner[0], twosided=True)
+    front, back = alike(graph, *inner[:2])
+    sided = {
+        name: values.sides(graph, getattr(front, name), getattr(back, name))
+        for name in (*COEFFICIENTS, "n", "transmittance")
+    }
+    return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
+
+
+def mask(context: Context, index: int) -> NearestPhong:
+    """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
+    graph, (inner,) = context.graph, context.inner(index)
+    opacity = context.value(index, "opacity", 0.5)
+    reflected = {
+        name: values.share(graph, getattr(inner, name), opacity) for name in ("k_a", "k_d", "k_s")
+    }
+    passed = values.total(
+        graph,
+        values.rest(graph, 1.0, opacity),
+        values.share(graph, inner.transmittance, opacity),
+    )
+    return replace(inner, **reflected, transmittance=passed)
+
+
+def blend(context: Context, index: int) -> NearestPhong:
+    """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
+
+    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
+    """
+    graph, inner = context.graph, context.inner(index)
+    first, second = alike(graph, *inner[:2])
+    weight = context.value(index, "weight", 0.5)
+    mixed = {
+        name: values.blend(graph, getattr(first, name), getattr(second, name), weight)
+        for name in (*COEFFICIENTS, "transmittance")
+    }
+    lost: tuple[tuple[str, str], ...] = ()
+    lobes = [material for material in (first, second) if not values.is_zero(material.k_s)]
+    if len(lobes) == 2:
+        mixed["n"] = values.blend(graph, first.n, second.n, weight)
+        lost = (("two lobes", "one, of the blended exponent and coefficient"),)
+        form = first.form
+    else:
+        mixed["n"], form = (lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")
+    return NearestPhong(
+        **mixed,
+        form=form,
+        normalised=first.normalised,
+        twosided=first.twosided or second.twosided,
+        tilt=first.tilt or second.tilt,
+        lost=first.lost + second.lost + lost,
+    )
+
+
+def normal_map(context: Context, index: int) -> NearestPhong:
+    """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
+    normals = context.graph.props(index)["normalmap"]
+    _require(context, index, normals, "eval_3", "normal")
+    return _tilted(context, index, normals=normals)
+
+
+def bump_map(context: Context, index: int) -> NearestPhong:
+    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
+    ((key, _),) = context.graph.children(index, TEXTURE)
+    scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
+    _require(context, index, heights, "eval_1_grad", "slope")
+    return _tilted(context, index, heights=heights, scale=scale)
+
+
+def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
+    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
+
+    Mitsuba accepts such a texture only with integrators that do not evaluate materials.
+    """
+    graph = context.graph
+    if not isinstance(texture, Reference):
+        return
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.shape = mi.ShapePtr(mi.load_dict({"type": "rectangle"}))
+    made = graph.instantiate(texture.index())
+    try:
+        dr.eval(getattr(made, ability)(si))
+    except RuntimeError as error:
+        if f"{ability}()" in str(error):
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: a texture {graph.plugin(texture.index())}"
+                f" gives {context.plugin(index)} no {what} (Mitsuba cannot {ability} it). Give a"
+                " bitmap of three channels."
+            ) from error
+
+
+def _tilted(context: Context, index: int, **parameters: Any) -> NearestPhong:
+    (inner,) = context.inner(index)
+    lost = inner.lost
+    if context.value(index, "use_shadowing_function", True):
+        lost += (("shadows that mapped bumps cast on each other", "none"),)
+    parameters["flip"] = context.value(index, "flip_invalid_normals", True)
+    if inner.tilt is not None:
+        lost += (("nested normal maps", "only the outer one"),)
+    tilt = values.node(context.graph, "heuristic_tilt", **parameters)
+    return replace(inner, tilt=tilt, lost=lost)
+
+
+RULES: dict[str, Rule] = {
+    "phong": itself,
+    "diffuse": diffuse,
+    "null": null,
+    "twosided": twosided,
+    "mask": mask,
+    "blendbsdf": blend,
+    "normalmap": normal_map,
+    "bumpmap": bump_map,
+}

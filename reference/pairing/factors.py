@@ -11,7 +11,7 @@ Physical (Mitsuba)                             Heuristic
 ``spot``, intensity ``I``                      ``I_p0 = s I / pi``, ``f_att = 1 / d^2``, the same
                                                cone, ``m`` fitted, ``s`` that of equal flux; the
                                                other way cone and beam width are fitted
-                                               (`lights.spots`)
+                                               (:mod:`reference.pairing.emitters`)
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
@@ -19,7 +19,7 @@ closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L
 emission of radiance ``L``                     ``k_i = L``
 =============================================  =====================================================
 
-The rule for the level of lights without an exact pair is in :mod:`reference.pairing.lights`.
+The rule for the level of lights without an exact pair is in :mod:`reference.pairing.emitters`.
 
 A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
 mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded
@@ -29,9 +29,8 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 ``roughplastic`` and ``phong`` have no exact pair; see :class:`Convention`.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
-from functools import lru_cache
 from math import sqrt
 from typing import Annotated, Any
 
@@ -40,17 +39,12 @@ from msgspec import Meta
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.terms import normalisation
-from reference.pairing import albedo
-from reference.pairing.albedo import LITERAL_IOR, Albedo, RoughPlastic
 from reference.records import Record
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
 
 CLOSED_LIGHT_FACTOR = INTENSITY_FACTOR / 4
-
-MATCHING_TOLERANCE = 1e-5
-"""Relative tolerance; a larger mismatch is recorded as a miss."""
 
 
 class Convention(Enum):
@@ -133,8 +127,11 @@ class Replacements:
         self.lost.append(Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest))
 
     def bsdf(self, name: str, given: str, derived: str, parameters: dict, note: str = "") -> None:
-        """Record the partner of a BSDF."""
-        short = {key: _short(value) for key, value in parameters.items()}
+        """Record the partner of a BSDF; a tuple of equal components becomes one number."""
+        short = {
+            key: value[0] if isinstance(value, tuple) and len(set(value)) == 1 else value
+            for key, value in parameters.items()
+        }
         self.bsdfs.append(
             BsdfPair(name=name, given=given, derived=derived, parameters=short, note=note)
         )
@@ -148,13 +145,6 @@ class Replacements:
                 name=name, given=given, derived=derived, factor=factor, exact=exact, note=note
             )
         )
-
-
-def _short(value: Any) -> Any:
-    """Turn a tuple of equal components into one number, for readability."""
-    if isinstance(value, tuple):
-        return value[0] if len(set(value)) == 1 else list(value)
-    return value
 
 
 def alpha_of(n: float, form: str = "phong") -> float:
@@ -195,76 +185,3 @@ def specular_albedo(phong: Phong) -> np.ndarray:
     """
     scale = 1.0 if phong.normalised else 1 / normalisation(phong.form, phong.n)
     return np.asarray(phong.k_s) * scale
-
-
-@lru_cache(maxsize=albedo.KEPT)
-def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, tuple[Miss, ...]]:
-    """Return the :class:`RoughPlastic` that corresponds to a :class:`Phong`, and its misses.
-
-    It uses the current variant of Mitsuba, whose plugin determines the albedo:
-
-    >>> grey = (0.5, 0.5, 0.5)
-    >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
-    >>> misses, round(plastic.alpha, 9)
-    ((), 0.2)
-    >>> _, misses = to_roughplastic(Phong(grey, (0.7, 0.7, 0.7), 3), Convention.MATCHED)
-    >>> [miss.what for miss in misses]
-    ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
-    """
-    if convention is Convention.LITERAL:
-        red, green, blue = (min(component, 1.0) for component in phong.k_d)
-        misses = tuple(
-            Miss(what="diffuse reflectance", wanted=component, reached=1.0)
-            for component in dict.fromkeys(phong.k_d)
-            if component > 1
-        )
-        return RoughPlastic((red, green, blue), alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
-
-    albedos = Albedo(np.array(phong.k_d), specular_albedo(phong))
-    strength = max(phong.k_s)
-    red, green, blue = (k_s / strength for k_s in phong.k_s)
-    white = RoughPlastic(
-        (1.0, 1.0, 1.0),
-        alpha_of(phong.n, phong.form),
-        LITERAL_IOR,
-        specular_reflectance=(red, green, blue),
-    )
-    white = replace(white, int_ior=albedo.ior_of_lobe(white, max(albedos.specular)))
-    if any(albedos.diffuse > albedo.of_roughplastic(white).diffuse):
-        white = replace(white, int_ior=albedo.nearest_ior(white, albedos))
-    passed = albedo.of_roughplastic(white).diffuse
-    red, green, blue = np.minimum(albedos.diffuse / passed, 1).tolist()  # it is linear in rho
-    plastic = replace(white, diffuse_reflectance=(red, green, blue))
-    return plastic, _misses(albedos, albedo.of_roughplastic(plastic))
-
-
-@lru_cache(maxsize=albedo.KEPT)
-def to_phong(plastic: RoughPlastic, convention: Convention) -> Phong:
-    """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`; nothing is missed.
-
-    By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
-
-    >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
-    >>> phong = to_phong(plastic, Convention.LITERAL)
-    >>> phong.k_d, phong.n
-    ((0.5, 0.4, 0.3), 6.0)
-    """
-    if convention is Convention.LITERAL:
-        n = exponent_of(plastic.alpha, "blinn")
-        return Phong(plastic.diffuse_reflectance, plastic.specular_reflectance, n)
-    n = exponent_of(plastic.alpha)
-    reflected = albedo.of_roughplastic(plastic)
-    k_s = reflected.specular * normalisation("phong", n)
-    (red, green, blue), lobe = reflected.diffuse.tolist(), k_s.tolist()
-    return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n)
-
-
-def _misses(wanted, reached):
-    """List the albedos that were not reached, each value once."""
-    misses = {}
-    for part in ("diffuse", "specular"):
-        for want, value in zip(getattr(wanted, part), getattr(reached, part), strict=True):
-            if abs(value - want) > MATCHING_TOLERANCE * max(want, 1e-3):
-                what = f"{part} albedo at normal incidence"
-                misses[part, want] = Miss(what=what, wanted=float(want), reached=float(value))
-    return tuple(misses.values())

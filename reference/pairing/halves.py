@@ -22,7 +22,7 @@ from heuristic.heuristics import PHONG, named
 from heuristic.interpolation import Interpolation
 from heuristic.plugins import register
 from heuristic.plugins.integrator import viewpoint
-from reference.pairing import bsdfs, lights
+from reference.pairing import bsdfs, emitters
 from reference.pairing.factors import (
     BsdfPair,
     Convention,
@@ -32,11 +32,10 @@ from reference.pairing.factors import (
     Unrepresentable,
     specular_albedo,
 )
-from reference.pairing.lights import areas, environments
+from reference.pairing.prepare import Override, prepare
 from reference.records import Record
 from reference.rendering.gbuffer import gbuffer
 from reference.scene.graph import Graph, Reference, properties
-from reference.scene.prepare import Override, prepare
 from reference.scene.source import Source
 
 BSDF, INTEGRATOR, MEDIUM, SHAPE = (
@@ -118,29 +117,34 @@ def _paired(
     geometry = cache(_bare(graph).instantiate)
 
     model, half, replaced = named(heuristic), graph.copy(), Replacements()
+    context = bsdfs.Context(half, convention)
+    if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
+        from reference.pairing import nearest  # loaded late: only for lobes and transmission
+
+        context.rule_of = nearest.rule_of
     if model.is_own and not with_partners:
-        bsdfs.to_heuristic(half, convention, replaced)
+        bsdfs.to_heuristic(context, replaced)
     else:
-        from reference.pairing import partners
+        from reference.pairing import partners  # loaded late: only users' heuristics read them
 
         known = partners.read(half, convention)
-        bsdfs.to_heuristic(half, convention, replaced)
+        bsdfs.to_heuristic(context, replaced)
         partners.give(half, known)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form
-    radiance = lights.to_heuristic(half, geometry, settings.hide_emitters, replaced)
+    radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(half, ambient, settings, interpolation, prune, model)
     if interpolation is not Interpolation.PHONG or tessellation is not None:
         replace_shapes(half, geometry(), tessellation, interpolation)
 
     physical = graph.copy()
-    areas.add_glowing_shapes(physical, replaced)
+    emitters.add_glowing_shapes(physical, replaced)
     bsdfs.to_physical(physical, convention, replaced)
-    lights.to_physical(physical, lambda: gbuffer(geometry()), replaced)
+    emitters.to_physical(physical, lambda: gbuffer(geometry()), replaced)
     if settings.ambient is not None:
-        environments.add_environment(physical, graph, settings.ambient, convention, replaced)
+        emitters.add_environment(physical, graph, settings.ambient, convention, replaced)
 
     media = tuple((graph.label(index), graph.plugin(index)) for index in graph.nodes(MEDIUM))
     for label, plugin in media:

@@ -1,182 +1,46 @@
-"""The phong material that is nearest to each of Mitsuba's BSDFs: one rule per plugin.
+"""The phong material that is nearest to a BSDF with a lobe, or that lets light through.
 
-A rule is one function, declared by :func:`rule`; any other BSDF, including a user's, is measured
-(:func:`unknown`). Values are those of :mod:`reference.scene.values`. Transparent BSDFs are seen
-through without refraction: light that passes at normal incidence, straight or refracted, becomes
-the transmittance, reflected light a lobe. A closed body has two such surfaces on each path.
+One function per plugin; any other BSDF, including a user's, is measured (:func:`unknown`).
+Transparent BSDFs are seen through without refraction: light that passes at normal incidence,
+straight or refracted, becomes the transmittance, reflected light a lobe. A closed body has two such
+surfaces on each path. The rules of diffuse and nested BSDFs are in :mod:`reference.pairing.bsdfs`.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS
 from heuristic.plugins.textures import SMALLEST_ALPHA
 from heuristic.terms import normalisation
-from reference.pairing import albedo, factors, probe
+from reference.pairing import albedo, probe
 from reference.pairing.albedo import RoughPlastic
+from reference.pairing.bsdfs import Context, NearestPhong, Rule
 from reference.pairing.factors import Convention, exponent_of
 from reference.scene import values
-from reference.scene.graph import Graph, Reference, properties
-
-BSDF, TEXTURE = mi.ObjectType.BSDF, mi.ObjectType.Texture
+from reference.scene.graph import Graph
 
 SMOOTH_ALPHA = 0.05
 """Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
 albedo is kept, so the highlight holds as much as the mirror image of a small light."""
 
 
-@dataclass(frozen=True)
-class NearestPhong:
-    """The phong material that replaces a BSDF; with values as in :mod:`reference.scene.values`.
-
-    ``lost`` are pairs of something that the heuristic model has no form for, and the rule for the
-    rest.
-    """
-
-    k_i: Any = 0.0
-    k_a: Any = 0.0
-    k_d: Any = 0.0
-    k_s: Any = 0.0
-    n: Any = 1.0
-    form: str = "phong"
-    normalised: bool = False
-    twosided: bool = False
-    transmittance: Any = 0.0
-    tilt: Any = None
-    lost: tuple[tuple[str, str], ...] = ()
-
-    def properties(self) -> mi.Properties:
-        """Return the properties of the node ``phong``, without defaults."""
-        props = properties("phong")
-        for name in (*COEFFICIENTS, "n", "transmittance"):
-            value = getattr(self, name)
-            if name in ("k_d", "n") or not values.is_zero(value):
-                props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
-        for name, default in (("normalised", False), ("twosided", False), ("form", "phong")):
-            if getattr(self, name) != default:
-                props[name] = getattr(self, name)
-        if self.tilt is not None:
-            props["tilt"] = self.tilt
-        return props
-
-    def parameters(self) -> dict[str, Any]:
-        """Return the coefficients for records: numbers, or the word ``texture``."""
-        found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
-        if not values.is_zero(self.transmittance):
-            found["transmittance"] = self.transmittance
-        return {
-            name: "texture" if values.plain(value) is None else values.plain(value)
-            for name, value in found.items()
-        }
-
-
-@dataclass
-class Context:
-    """A graph that rules read and add nodes to, and the materials that they have ``found``."""
-
-    graph: Graph
-    convention: Convention
-    found: dict[int, NearestPhong] = field(default_factory=dict)
-
-    def nearest(self, index: int) -> NearestPhong:
-        """Return the :class:`NearestPhong` material of a BSDF node."""
-        if index not in self.found:
-            self.found[index] = rule_of(self.plugin(index)).nearest(self, index)
-        return self.found[index]
-
-    def value(self, index: int, key: str, default: Any) -> Any:
-        """Return a parameter as the parser keeps it."""
-        return self.graph.props(index).get(key, default)
-
-    def plugin(self, index: int) -> str:
-        """Return a node's plugin."""
-        return self.graph.plugin(index)
-
-    def tinted(self, index: int, albedo: Any, key: str) -> Any:
-        """Return an albedo times a parameter that scales it, 1 if it is not given."""
-        return values.product(self.graph, albedo, self.value(index, key, 1.0))
-
-
-@dataclass(frozen=True)
-class Rule:
-    """How to find the nearest material of a BSDF, and what planning knows about the BSDF.
-
-    ``reflectances`` are parameters with defaults; it reflects nothing if all are 0, and without any
-    it may always reflect. It only reflects, on the side of the normal, if all ``transmittances``
-    are 0; ``reflectances`` is None if that is not known. ``wraps`` is whether it is made of other
-    BSDFs.
-    """
-
-    nearest: Callable[[Context, int], NearestPhong]
-    reflectances: Mapping[str, float] | None = None
-    transmittances: Mapping[str, float] = field(default_factory=dict)
-    wraps: bool = False
-
-
-RULES: dict[str, Rule] = {}
-"""By plugin; filled by :func:`rule`."""
-
-
-def rule(*plugins: str, **known: Any) -> Callable:
-    """Declare a function as the :class:`Rule` of some plugins, with what is known about them."""
-
-    def declared(nearest):
-        RULES.update(dict.fromkeys(plugins, Rule(nearest, **known)))
-        return nearest
-
-    return declared
-
-
-def alike(
-    graph: Graph, first: NearestPhong, second: NearestPhong
-) -> tuple[NearestPhong, NearestPhong]:
-    """Return two materials with their lobes scaled in the same way, so ``k_s`` can be mixed."""
-    if first.normalised == second.normalised:
-        return first, second
-    return _normalised(graph, first), _normalised(graph, second)
-
-
-def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:
-    if material.normalised:
-        return material
-    if values.is_zero(material.k_s):
-        return replace(material, normalised=True)
-    n = values.plain(material.n)
-    if n is None:
-        raise InputError(
-            f"{graph.name}: a phong whose n is a texture is mixed with a BSDF whose alpha is one:"
-            " give the phong a single n, or make it normalised."
-        )
-    scale = 1 / float(normalisation(material.form, n))
-    return replace(material, normalised=True, k_s=values.product(graph, material.k_s, scale))
-
-
-def rule_of(plugin: str) -> Rule:
-    """Return the rule of a BSDF, by the name of its plugin."""
-    return RULES.get(plugin, Rule(unknown))
-
-
-def lobe(context: Context, albedo: Any, alpha: Any) -> dict[str, Any]:
+def lobe(context: Context, reflected: Any, alpha: Any) -> dict[str, Any]:
     """Return ``k_s``, ``n`` and ``normalised`` of a lobe of an albedo and a roughness.
 
     ``n`` is :func:`reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the albedo times
     :func:`heuristic.terms.normalisation`; if ``alpha`` is a texture, the plugin normalises.
     """
-    if values.is_zero(albedo):
+    if values.is_zero(reflected):
         return {}
     known = values.plain(alpha)
     if known is None:
         n = values.node(context.graph, "heuristic_exponent", alpha=alpha)
-        return {"k_s": albedo, "n": n, "normalised": True}
+        return {"k_s": reflected, "n": n, "normalised": True}
     n = exponent_of(max(float(np.mean(known)), SMOOTH_ALPHA))
     scale = float(normalisation("phong", n))
-    return {"k_s": values.product(context.graph, albedo, scale), "n": n}
+    return {"k_s": values.product(context.graph, reflected, scale), "n": n}
 
 
 def unknown(context: Context, index: int) -> NearestPhong:
@@ -209,23 +73,6 @@ def unknown(context: Context, index: int) -> NearestPhong:
 MIRROR = ("mirror image", "a highlight of the same albedo")
 
 
-@rule("phong", reflectances={"k_d": 0.0, "k_s": 0.0})
-def phong(context: Context, index: int) -> NearestPhong:
-    """``phong``: itself."""
-    props = context.graph.props(index)
-    names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
-    given = {name: props[name] for name in (*names, "tilt") if name in props}
-    return NearestPhong(**given)
-
-
-@rule("diffuse", reflectances={"reflectance": 0.5})
-def diffuse(context: Context, index: int) -> NearestPhong:
-    """``diffuse``: ``k_d = k_a = rho`` (exact)."""
-    reflectance = context.value(index, "reflectance", 0.5)
-    return NearestPhong(k_a=reflectance, k_d=reflectance)
-
-
-@rule("roughplastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
 def roughplastic(context: Context, index: int) -> NearestPhong:
     """``roughplastic``: by the convention (:class:`reference.pairing.factors.Convention`).
 
@@ -236,20 +83,19 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     graph, base = context.graph, context.value(index, "diffuse_reflectance", 0.5)
     coat = context.value(index, "specular_reflectance", 1.0)
     if values.plain(base) is not None and values.plain(coat) is not None:
-        found = factors.to_phong(_roughplastic(graph, index), context.convention)
+        found = albedo.to_phong(_roughplastic(graph, index), context.convention)
         return NearestPhong(k_a=found.k_d, **asdict(found))
     white = _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
-    unit = factors.to_phong(white, context.convention)
+    unit = albedo.to_phong(white, context.convention)
     k_s = values.product(graph, coat, unit.k_s[0])
     if context.convention is Convention.LITERAL:
         return NearestPhong(k_a=base, k_d=base, k_s=k_s, n=unit.n)
     half = _roughplastic(graph, index, (0.5,) * 3, (1.0,) * 3)
-    level = factors.to_phong(half, context.convention).k_d[0]
+    level = albedo.to_phong(half, context.convention).k_d[0]
     k_d = _of_base(graph, base, unit.k_d[0], level)
     return NearestPhong(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n)
 
 
-@rule("plastic", reflectances={"diffuse_reflectance": 0.5, "specular_reflectance": 1.0})
 def plastic(context: Context, index: int) -> NearestPhong:
     """``plastic``: ``roughplastic`` in the limit of ``alpha`` to 0.
 
@@ -271,11 +117,10 @@ def plastic(context: Context, index: int) -> NearestPhong:
         albedo.of_smooth_plastic(level, inside, outside, nonlinear) for level in (1.0, 0.5)
     )
     k_d = _of_base(graph, base, whole, half)
-    reflected = context.tinted(index, mirror, "specular_reflectance")
+    reflected = _tinted(context, index, mirror, "specular_reflectance")
     return NearestPhong(k_a=k_d, k_d=k_d, **lobe(context, reflected, 0.0), lost=(MIRROR,))
 
 
-@rule("conductor", "roughconductor", reflectances={"specular_reflectance": 1.0})
 def conductor(context: Context, index: int) -> NearestPhong:
     """``conductor``, ``roughconductor``: ``k_d = 0``, and a lobe of the albedo at normal incidence.
 
@@ -284,7 +129,7 @@ def conductor(context: Context, index: int) -> NearestPhong:
     lobe reflects a constant environment: ``k_a`` is that albedo.
     """
     white = probe.measured(context.graph, index, specular_reflectance=1.0)
-    reflected = context.tinted(index, white.reflected, "specular_reflectance")
+    reflected = _tinted(context, index, white.reflected, "specular_reflectance")
     if context.plugin(index) == "conductor":
         alpha, lost = 0.0, [MIRROR]
     else:
@@ -293,7 +138,6 @@ def conductor(context: Context, index: int) -> NearestPhong:
     return NearestPhong(k_a=reflected, **lobe(context, reflected, alpha), lost=tuple(lost))
 
 
-@rule("principled", reflectances={}, transmittances={"spec_trans": 0.0})
 def principled(context: Context, index: int) -> NearestPhong:
     """``principled``: ``k_d = base_color (1 - metallic) (1 - spec_trans)``; the rest is a lobe.
 
@@ -368,19 +212,11 @@ def _roughplastic(
 NEAREST = "seen through without refraction, by the transmittance at normal incidence"
 
 
-@rule("null")
-def null(context: Context, index: int) -> NearestPhong:
-    """``null``: transmittance 1 (exact)."""
-    return NearestPhong(transmittance=1.0, twosided=True)
-
-
-@rule("dielectric", "roughdielectric")
 def dielectric(context: Context, index: int) -> NearestPhong:
     """``dielectric``, ``roughdielectric``: the interface is lit only from outside."""
     return _clear(context, index, "refraction", twosided=False)
 
 
-@rule("thindielectric")
 def sheet(context: Context, index: int) -> NearestPhong:
     """``thindielectric``: both sides reflect, without refraction."""
     return _clear(context, index, "mirror image", twosided=True)
@@ -390,132 +226,31 @@ def _clear(context: Context, index: int, lost: str, twosided: bool) -> NearestPh
     white = probe.measured(
         context.graph, index, specular_reflectance=1.0, specular_transmittance=1.0
     )
-    reflected = context.tinted(index, white.reflected, "specular_reflectance")
+    reflected = _tinted(context, index, white.reflected, "specular_reflectance")
     return NearestPhong(
         k_a=reflected,
         **lobe(context, reflected, context.value(index, "alpha", white.alpha)),
-        transmittance=context.tinted(index, white.passed, "specular_transmittance"),
+        transmittance=_tinted(context, index, white.passed, "specular_transmittance"),
         twosided=twosided,
         lost=((lost, NEAREST),),
     )
 
 
-@rule("twosided", wraps=True)
-def twosided(context: Context, index: int) -> NearestPhong:
-    """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
-    graph = context.graph
-    inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
-    if len(inner) == 1:
-        return replace(inner[0], twosided=True)
-    front, back = alike(graph, *inner[:2])
-    sided = {
-        name: values.sides(graph, getattr(front, name), getattr(back, name))
-        for name in (*COEFFICIENTS, "n", "transmittance")
-    }
-    return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
+def _tinted(context: Context, index: int, reflected: Any, key: str) -> Any:
+    """Return an albedo times a parameter that scales it, 1 if it is not given."""
+    return values.product(context.graph, reflected, context.value(index, key, 1.0))
 
 
-@rule("mask", wraps=True)
-def mask(context: Context, index: int) -> NearestPhong:
-    """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
-    graph = context.graph
-    ((_, child),) = graph.children(index, BSDF)
-    inner = context.nearest(child)
-    opacity = context.value(index, "opacity", 0.5)
-    reflected = {
-        name: values.share(graph, getattr(inner, name), opacity) for name in ("k_a", "k_d", "k_s")
-    }
-    passed = values.total(
-        graph,
-        values.rest(graph, 1.0, opacity),
-        values.share(graph, inner.transmittance, opacity),
-    )
-    return replace(inner, **reflected, transmittance=passed)
+RULES: dict[str, Rule] = {
+    "roughplastic": roughplastic,
+    "plastic": plastic,
+    **dict.fromkeys(("conductor", "roughconductor"), conductor),
+    "principled": principled,
+    **dict.fromkeys(("dielectric", "roughdielectric"), dielectric),
+    "thindielectric": sheet,
+}
 
 
-@rule("blendbsdf", wraps=True)
-def blend(context: Context, index: int) -> NearestPhong:
-    """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
-
-    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
-    """
-    graph = context.graph
-    inner = [context.nearest(child) for _, child in graph.children(index, BSDF)]
-    first, second = alike(graph, *inner[:2])
-    weight = context.value(index, "weight", 0.5)
-    mixed = {
-        name: values.blend(graph, getattr(first, name), getattr(second, name), weight)
-        for name in (*COEFFICIENTS, "transmittance")
-    }
-    lost: tuple[tuple[str, str], ...] = ()
-    lobes = [material for material in (first, second) if not values.is_zero(material.k_s)]
-    if len(lobes) == 2:
-        mixed["n"] = values.blend(graph, first.n, second.n, weight)
-        lost = (("two lobes", "one, of the blended exponent and coefficient"),)
-        form = first.form
-    else:
-        mixed["n"], form = (lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")
-    return NearestPhong(
-        **mixed,
-        form=form,
-        normalised=first.normalised,
-        twosided=first.twosided or second.twosided,
-        tilt=first.tilt or second.tilt,
-        lost=first.lost + second.lost + lost,
-    )
-
-
-@rule("normalmap", wraps=True)
-def normal_map(context: Context, index: int) -> NearestPhong:
-    """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
-    normals = context.graph.props(index)["normalmap"]
-    _require(context, index, normals, "eval_3", "normal")
-    return _tilted(context, index, normals=normals)
-
-
-@rule("bumpmap", wraps=True)
-def bump_map(context: Context, index: int) -> NearestPhong:
-    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
-    ((key, _),) = context.graph.children(index, TEXTURE)
-    scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
-    _require(context, index, heights, "eval_1_grad", "slope")
-    return _tilted(context, index, heights=heights, scale=scale)
-
-
-def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
-    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
-
-    Mitsuba accepts such a texture only with integrators that do not evaluate materials.
-    """
-    graph = context.graph
-    if not isinstance(texture, Reference):
-        return
-    si = dr.zeros(mi.SurfaceInteraction3f, 1)
-    si.shape = mi.ShapePtr(mi.load_dict({"type": "rectangle"}))
-    made = graph.instantiate(texture.index())
-    try:
-        dr.eval(getattr(made, ability)(si))
-    except RuntimeError as error:
-        if f"{ability}()" in str(error):
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: a texture {graph.plugin(texture.index())}"
-                f" gives {context.plugin(index)} no {what} (Mitsuba cannot {ability} it). Give a"
-                " bitmap of three channels."
-            ) from error
-
-
-def _tilted(context: Context, index: int, **parameters: Any) -> NearestPhong:
-    ((_, child),) = context.graph.children(index, BSDF)
-    inner = context.nearest(child)
-    lost = inner.lost
-    if context.value(index, "use_shadowing_function", True):
-        lost += (("shadows that mapped bumps cast on each other", "none"),)
-    parameters["flip"] = context.value(index, "flip_invalid_normals", True)
-    if inner.tilt is not None:
-        lost += (("nested normal maps", "only the outer one"),)
-    tilt = values.node(context.graph, "heuristic_tilt", **parameters)
-    return replace(inner, tilt=tilt, lost=lost)
-
-
-WRAPPERS = tuple(plugin for plugin, rule in RULES.items() if rule.wraps)
-"""Plugins that are made of other BSDFs."""
+def rule_of(plugin: str) -> Rule:
+    """Return the rule of a BSDF, by the name of its plugin."""
+    return RULES.get(plugin, unknown)

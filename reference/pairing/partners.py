@@ -37,8 +37,8 @@ import numpy as np
 
 from heuristic.plugins.textures import SMALLEST_ALPHA
 from reference.pairing import bsdfs, probe
+from reference.pairing.bsdfs import WRAPPERS, Context
 from reference.pairing.factors import Convention
-from reference.pairing.nearest import Context
 from reference.scene import values
 from reference.scene.graph import Graph
 
@@ -80,7 +80,7 @@ def give(graph: Graph, partners: dict[int, Partner]) -> None:
 
 def _of(graph: Graph, index: int, convention: Convention) -> Partner:
     plugin = graph.plugin(index)
-    if plugin in ("twosided", "mask", "bumpmap", "normalmap", "blendbsdf"):
+    if plugin in WRAPPERS:
         inner = [_of(graph, child, convention) for _, child in graph.children(index, BSDF)]
         return _wrapped(graph, index, plugin, inner)
     if plugin == "phong":
@@ -100,11 +100,11 @@ def _wrapped(graph: Graph, index: int, plugin: str, inner: list[Partner]) -> Par
 
 
 def _of_phong(graph: Graph, index: int, convention: Convention) -> Partner:
-    found = bsdfs.physical_partner(graph, index, convention)
-    if found.plugin_name() == "diffuse":
+    plugin, found, _ = bsdfs.physical_partner(graph, index, convention)
+    if plugin == "diffuse":
         return Partner(found["reflectance"])
     ior = found["int_ior"] / found["ext_ior"]
-    return Partner(tuple(found["diffuse_reflectance"]), found["alpha"], ior)
+    return Partner(found["diffuse_reflectance"], found["alpha"], ior)
 
 
 def _plastic(context: Context, index: int) -> Partner:

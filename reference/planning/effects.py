@@ -12,7 +12,7 @@ import mitsuba as mi
 
 from heuristic.interpolation import Interpolation
 from reference.pairing import lights
-from reference.pairing.nearest import WRAPPERS
+from reference.pairing.bsdfs import WRAPPERS
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRule
 from reference.records import Record

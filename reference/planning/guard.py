@@ -26,7 +26,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.planning.plan import Guard, Plan, physical_integrator
-from reference.rendering.passes import Stream, pass_seed
+from reference.rendering.renderer import Stream, pass_seed
 
 SHARE = 0.02
 """Share of the reference's samples that bounds the rays, within the next two limits."""

@@ -37,6 +37,7 @@ from heuristic.interpolation import Interpolation
 from heuristic.plugins.phong import COEFFICIENTS
 from reference.pairing import lights
 from reference.pairing.halves import Pair
+from reference.pairing.prepare import PATHS
 from reference.planning.effects import (
     EFFECTS,
     INTERREFLECTION,
@@ -56,7 +57,6 @@ from reference.records import Amount, Count, Record, Size
 from reference.rendering import direct
 from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER
 from reference.scene.graph import Graph
-from reference.scene.prepare import PATHS
 from reference.scene.values import plain
 
 Depth = Annotated[
@@ -238,7 +238,9 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
     integrator = mi.load_dict(description | own)
     # The effect left out may be the environment itself.
     if plan.tabulated_environment and scene.environment() is not None:
-        integrator.environment_albedo = direct.AlbedoTable(scene.shapes()[0].bsdf())
+        from reference.pairing.probe import AlbedoTable  # loaded late: few plans need it
+
+        integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator
 
 

@@ -13,8 +13,15 @@ import numpy as np
 
 from reference.pairing import lights
 from reference.pairing.halves import Pair
-from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts, LightFacts
-from reference.planning.shapes import ROUNDING, ShapeFacts
+from reference.planning.facts import (
+    BSDF,
+    EMITTER,
+    ROUNDING,
+    SHAPE,
+    Facts,
+    LightFacts,
+    ShapeFacts,
+)
 from reference.records import Record
 
 FAR = 1e6

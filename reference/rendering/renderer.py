@@ -7,13 +7,16 @@ standard error here comes from the spread of passes.
 """
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
+from dataclasses import dataclass
+from enum import IntEnum
 from math import isqrt
 from pathlib import Path
 from statistics import median
 from time import perf_counter
+from types import CodeType, FunctionType
 from typing import Any
 
 import drjit as dr
@@ -203,6 +206,29 @@ def _no_collection():
             gc.enable()
 
 
+_transform = dr.syntax
+_transformed: dict[tuple[str, CodeType], CodeType] = {}
+
+
+def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
+    """Do what ``drjit.syntax`` does, once for each function's code.
+
+    With each switch of the variant Mitsuba loads its Python integrators again, and Dr.Jit would
+    transform the same functions again: 0.1 s, as long as a pass.
+    """
+    if f is None or options:
+        return _transform(f, **options)
+    key = f.__code__.co_filename, f.__code__
+    if key not in _transformed:
+        _transformed[key] = _transform(f).__code__
+    made = FunctionType(_transformed[key], f.__globals__)
+    made.__defaults__ = f.__defaults__
+    return made
+
+
+dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded
+
+
 def _rendered(scene, integrator, spp, seed):
     return mi.render(scene, integrator=integrator, spp=spp, seed=seed)
 
@@ -212,6 +238,77 @@ def _chain(error):
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
+
+
+Progress = Callable[[str, int, int], None]
+"""Called as ``progress(stage, done, total)``."""
+
+
+class Stream(IntEnum):
+    """The purpose of passes; passes of different streams are independent at any seed."""
+
+    COMPARED = 0
+    OTHER_SIDE = 1
+    REPLICATES = 2
+    PROBE = 3
+
+
+def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
+    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
+
+    Both halves, and all compared methods, take the same seed for a pass. So their camera rays
+    cancel, while runs of different seeds have no pass in common.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
+    return int(sequence.generate_state(1)[0])
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass: its number from 0, its seed, and an image (H, W, 3) of each renderer."""
+
+    number: int
+    seed: int
+    images: tuple
+
+
+def passes(
+    renderers: Sequence[Renderer],
+    seed: int,
+    count: int,
+    *,
+    stream: Stream = Stream.COMPARED,
+    progress: Progress | None = None,
+    stage: str = "rendering",
+) -> Generator[Pass, None, None]:
+    """Render ``count`` passes of each renderer, in its own variant, and yield each as it is done.
+
+    ``progress`` is called before each pass, and once more when all are done or the caller stops.
+    """
+    done = 0
+    try:
+        for number in range(count):
+            if progress:
+                progress(stage, number, count)
+            own = pass_seed(seed, number, stream)
+            made = Pass(number, own, _images(renderers, own))
+            done = number + 1
+            yield made
+            del made  # else its images would stay alongside the next ones
+    finally:
+        if progress:
+            progress(stage, done, done)
+
+
+def _images(renderers: Sequence[Renderer], seed: int) -> tuple:
+    """Render one pass, grouped by variant: a change takes as long as a small image."""
+    images: dict[int, Any] = {}
+    for name in dict.fromkeys(renderer.variant for renderer in renderers):
+        with variant(name):
+            for place, renderer in enumerate(renderers):
+                if renderer.variant == name:
+                    images[place] = renderer.render(seed)
+    return tuple(images[place] for place in range(len(renderers)))
 
 
 def require_finite(image: np.ndarray, layer: str) -> None:

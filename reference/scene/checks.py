@@ -1,15 +1,10 @@
-"""Values and files of a scene that Mitsuba renders in silence, or that end the process.
+"""Values of a scene that Mitsuba renders in silence, or that end the process.
 
 Mitsuba rejects some values that make no sense, and renders others: a sphere of radius NaN is
-missing, an infinite index of refraction is black. It does not check whether the faces of PLY and
-serialized meshes name vertices that exist, and whether tensor files of `measured` materials are as
-long as they say: it reads memory beyond them.
+missing, an infinite index of refraction is black. A pipe blocks whoever opens it.
 """
 
-import struct
-from collections.abc import Iterator
-from functools import lru_cache
-from math import prod
+from collections.abc import Iterator, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -17,11 +12,13 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
 from heuristic.errors import InputError
-from reference.scene.graph import Graph
+from reference.scene.graph import FILENAME, Graph
 
 LARGEST = float(np.finfo(np.float32).max)
+
+DEEPEST = 100
+"""Nested elements. Scenes need about ten; some thousands fill the parser's stack."""
 
 FILM_SIZE = (768, 576)
 """Mitsuba's width and height for a film without its own."""
@@ -69,8 +66,11 @@ def check(graph: Graph) -> None:
     """Reject values that make no sense, and damaged files, in all elements in use."""
     for index in graph.nodes_in_use():
         check_node(graph, index)
-        if objection := _damage(graph, index):
-            raise _refusal(graph, index, objection)
+        if graph.plugin(index) in ("measured", "ply", "serialized"):
+            from reference.scene import files  # loaded late: most scenes have no such files
+
+            if objection := files.damage(graph, index):
+                raise _refusal(graph, index, objection)
 
 
 def check_node(graph: Graph, index: int) -> None:
@@ -185,75 +185,38 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _damage(graph: Graph, index: int) -> str:
-    """Return what is wrong with the file of a mesh or a table; empty if nothing is."""
-    plugin = graph.plugin(index)
-    path = graph.file(index) if plugin in ("measured", "ply", "serialized") else None
-    if path is None:
-        return ""
-    state, number = path.stat(), graph.props(index).get("shape_index", 0)
-    stamp = state.st_mtime_ns, state.st_size, mi.variant()
-    fault = _damage_of_file(plugin, str(path), number, stamp)
-    return f"{path}: {fault} Write the file again." if fault else ""
+def require_files(graph: Graph) -> None:
+    """Reject elements that name a folder, pipe, socket or device instead of a file."""
+    for index in graph.nodes_in_use():
+        if path := graph.file(index):
+            require_file(f"{graph.name}: {graph.label(index)}", path)
 
 
-@lru_cache(maxsize=1024)
-def _damage_of_file(plugin: str, path: str, number: int, stamp: tuple) -> str:
-    """Return the fault of a file, whose content the stamp identifies."""
-    return _torn_tensor(Path(path)) if plugin == "measured" else _wrong_mesh(plugin, path, number)
+def require_named_files(description: Mapping[str, Any], depth: int = 1) -> None:
+    """Reject the same in a dictionary, whose spectra are read during parsing."""
+    if depth > DEEPEST:
+        raise InputError(f"the scene is nested more than {DEEPEST} deep. Write it flatter.")
+    for key, value in description.items():
+        if isinstance(value, Mapping):
+            require_named_files(value, depth + 1)
+        elif key == FILENAME and isinstance(value, str) and "\0" not in value:
+            path = Path(value)
+            try:
+                if path.exists():
+                    require_file("the scene", path)
+            except OSError as error:  # a name that is too long
+                raise InputError(f"{value[:60]!r}: {error.strerror}. Give a file.") from error
 
 
-def _wrong_mesh(plugin: str, path: str, number: int) -> str:
-    # With face normals nothing is computed at vertices, which may not exist.
-    description = {"type": plugin, "filename": path, "face_normals": True}
-    if plugin == "serialized":
-        description["shape_index"] = number
-    try:
-        mesh = mi.load_dict(description)
-    except Exception:  # making the scene raises it again
-        return ""
-    faces, count = meshes.rows(mesh, meshes.FACES), mesh.vertex_count()
-    if len(faces) and faces.max() >= count:
-        return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
-    lost = ~np.isfinite(meshes.rows(mesh, meshes.POSITIONS)).all(axis=1)
-    if lost.any():
-        return (
-            f"the position of vertex {lost.argmax()} is not finite, and that of"
-            f" {np.count_nonzero(lost)} vertices in all."
-        )
-    return ""
-
-
-MAGIC = b"tensor_file\0"
-
-BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 8, 8: 8, 9: 2, 10: 4, 11: 8}
-"""Bytes of a number, by type: integers of 8 to 64 bits, unsigned and signed, and floats."""
-
-
-def _torn_tensor(path: Path) -> str:
-    """Return what a tensor file lacks; empty for one that Mitsuba itself rejects.
-
-    It has a version of two bytes, the number of fields (uint32), and for each field the length of
-    its name (uint16), the name, the number of axes (uint16), the type (uint8), the offset (uint64)
-    and the lengths of its axes (uint64).
-    """
-    with path.open("rb") as file:
-
-        def unpacked(form: str) -> tuple:
-            return struct.unpack(form, file.read(struct.calcsize(form)))
-
-        if file.read(len(MAGIC)) != MAGIC:
-            return ""
-        size = path.stat().st_size
-        try:
-            _, count = unpacked("<HI")
-            for _ in range(count):
-                (length,) = unpacked("<H")
-                name = file.read(length).decode("ascii", "replace")
-                axes, kind, offset = unpacked("<HBQ")
-                end = offset + BYTES.get(kind, 0) * prod(unpacked(f"<{axes}Q"))
-                if end > size:
-                    return f"the field {name} ends at byte {end}, and the file has {size}."
-        except struct.error:
-            return "the file ends within its table of contents."
-    return ""
+def require_file(where: str, path: Path) -> None:
+    """Reject a folder, pipe, socket or device in place of a file."""
+    if path.is_file():
+        return
+    kinds = {
+        "a folder": path.is_dir,
+        "a pipe": path.is_fifo,
+        "a socket": path.is_socket,
+        "a device": lambda: path.is_char_device() or path.is_block_device(),
+    }
+    kind = next((kind for kind, holds in kinds.items() if holds()), "not a file")
+    raise InputError(f"{where}: {path} is {kind}, which cannot be read as a file. Give a file.")

@@ -20,6 +20,9 @@ from heuristic.plugins import textures
 FILENAME = "filename"
 """The parameter with which every plugin names its file."""
 
+SCRIPT = "scene"
+"""Name of a Python file's dictionary, or of the function that returns it."""
+
 CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[: ]*".*', re.DOTALL)
 """Ends of messages that repeat a line of a file, which may be any file."""
 

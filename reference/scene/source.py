@@ -1,8 +1,14 @@
-"""The source of a scene, read once: the file parsed, the script run, its files listed, a digest."""
+"""The source of a scene, read once: the file parsed, the script run, its files listed, a digest.
+
+Mitsuba's logger writes to standard output, which is for results. Its messages are collected here,
+so a record can state them.
+"""
 
 import hashlib
 import runpy
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -13,9 +19,16 @@ import numpy as np
 
 from heuristic.errors import InputError, suggestion
 from heuristic.user_code import contained
-from reference.scene import messages
-from reference.scene.files import SCRIPT, included, require_named_files
-from reference.scene.graph import Graph, Reference, files_from, find_file, plain_message, resolving
+from reference.scene.checks import require_named_files
+from reference.scene.graph import (
+    SCRIPT,
+    Graph,
+    Reference,
+    files_from,
+    find_file,
+    plain_message,
+    resolving,
+)
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -75,7 +88,7 @@ class Source:
         """
         variant = mi.variant()
         if variant not in self.graphs:
-            with messages.collected(self.messages):
+            with collect_messages(self.messages):
                 self.graphs[variant] = self._parsed(variant)
         graph = self.graphs[variant].copy()
         for edit in self.edits:
@@ -110,6 +123,8 @@ class Source:
                 require_named_files(content)
                 state = Parser.parse_dict(config, dict(content))
             else:
+                from reference.scene.files import included  # loaded late: a dictionary has none
+
                 path = Path(content)
                 self._require_placeholders(included(path, self.parameters).placeholders)
                 resolver = files_from(path.resolve().parent)
@@ -132,6 +147,63 @@ class Source:
                 f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
                 " into the file, or leave the option -D out."
             )
+
+
+class _Listener(mi.Appender):
+    """Mitsuba's messages, one call each; progress is shown by commands themselves."""
+
+    def __init__(self, hear: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._hear = hear
+
+    def append(self, level: mi.LogLevel, text: str) -> None:
+        self._hear(text)
+
+    def log_progress(self, *progress: Any) -> None:
+        pass
+
+
+class _Plain(mi.Formatter):
+    """Only the words of a message, without time, thread and line of code."""
+
+    def format(self, *parts: Any) -> str:
+        return parts[-1]
+
+
+def divert_messages(hear: Callable[[str], Any]) -> None:
+    """Send Mitsuba's messages from now on to ``hear``, one or more lines at a time."""
+    logger = mi.logger()
+    logger.clear_appenders()
+    logger.set_formatter(_Plain())
+    logger.add_appender(_Listener(hear))
+
+
+@contextmanager
+def collect_messages(into: list[str]) -> Iterator[None]:
+    """Collect Mitsuba's messages while the block runs, and keep them from their former target."""
+    logger = mi.logger()
+    appenders = [logger.appender(number) for number in range(logger.appender_count())]
+    formatter = logger.formatter()
+    divert_messages(into.append)
+    try:
+        yield
+    finally:
+        logger.clear_appenders()
+        logger.set_formatter(formatter)
+        for appender in appenders:
+            logger.add_appender(appender)
+
+
+def count_messages(messages: Iterable[str]) -> tuple[str, ...]:
+    """Return each message once, in order, with its count if it was repeated.
+
+    Each line is a message here.
+    """
+    lines = Counter(" ".join(message.split()) for message in messages)
+    return tuple(
+        f"Mitsuba: {line}" + (f" ({count} times)" if count > 1 else "")
+        for line, count in lines.items()
+    )
 
 
 def digest(source: Source) -> str:

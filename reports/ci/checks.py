@@ -20,7 +20,7 @@ from comparisons.record import versions
 from heuristic import program
 from heuristic.errors import FotismosError, InputError
 from reference.records import VERSION, Amount, Count, Record, Share, to_json
-from reference.rendering.passes import Progress
+from reference.rendering.renderer import Progress
 from reference.scene.graph import set_variant
 from reports.ci import baselines
 from reports.ci.baselines import BaselineFile

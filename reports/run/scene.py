@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from comparisons.case import Case
     from comparisons.comparison import Comparison, Images
     from comparisons.cost.cost import Study
-    from reference.rendering.passes import Progress
+    from reference.rendering.renderer import Progress
     from reports.run.batch import Job
 
 RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"

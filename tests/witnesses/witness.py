@@ -15,7 +15,7 @@ from scipy import stats
 from comparisons.case import open_case
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from reference.rendering.passes import passes
+from reference.rendering.renderer import passes
 
 BLOCKS = 4
 """Blocks along each side of the image, whose means are looked at too: the shape counts."""

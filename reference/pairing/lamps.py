@@ -1,4 +1,10 @@
-"""Shapes that shine: ``area``. In the far field a point or an even spot; nearby a glow ``k_i``."""
+"""Lights with an extent, and those that must be measured, to their nearest heuristic forms.
+
+``area``: in the far field a point or an even spot, nearby a glow ``k_i``. ``constant``, ``envmap``
+and any other plugin whose light surrounds the scene: ``I_a``, the mean radiance; the sun of
+``sunsky`` and ``timed_sunsky`` is a directional light. ``projector`` and textured ``spot``: an even
+cone. Any other light is left out: it has no nearest form.
+"""
 
 from typing import Any
 
@@ -6,12 +12,33 @@ import mitsuba as mi
 import numpy as np
 
 from reference.pairing import probe
-from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR, Replacements
-from reference.pairing.lights.kind import LightKind, LightNode, heuristic
-from reference.scene import values
+from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
+from reference.pairing.lights import LightNode, heuristic
 from reference.scene.graph import Graph, Reference, properties
 
-EMITTER, SHAPE, BSDF = (getattr(mi.ObjectType, kind) for kind in ("Emitter", "Shape", "BSDF"))
+BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
+
+
+def to_heuristic(light: LightNode) -> Any:
+    """Replace a light by its nearest form, and return the radiance that becomes ``I_a``, if any."""
+    match light.plugin:
+        case "area" if light.shape is not None:
+            _area(light)
+        case "projector" | "spot" if light.shape is None:
+            _even_cone(light)
+        case "constant" if light.shape is None:
+            light.becomes_ambient()
+            return light.value("radiance", 1.0)
+        case "sunsky" | "timed_sunsky" if light.shape is None:
+            return _daylight(light)
+        case _ if light.shape is None and light.emitter.is_environment():
+            ambient = probe.mean_radiance(light.graph, light.emitter)
+            light.becomes_ambient(probe.MEAN, "directions of the environment's light")
+            return ambient
+        case _:
+            light.leave_out()
+    return None
+
 
 FLATNESS = 0.5
 """A light with a longer mean normal shines to one side; a closed one has a mean normal of 0."""
@@ -20,7 +47,7 @@ FLAT = 1 - 1e-4
 """A light with a mean normal longer than this is flat."""
 
 
-def _to_heuristic(light: LightNode) -> None:
+def _area(light: LightNode) -> None:
     """Replace the light by emission of its shape and a spot or point at its centroid."""
     graph, shape, radiance = light.graph, light.shape, light.value("radiance", 1.0)
     if light.hide_emitters:
@@ -85,23 +112,45 @@ def _glow(graph: Graph, shape: int, radiance: Any) -> None:
     graph.attach(shape, key, graph.add(BSDF, props))
 
 
-def add_glowing_shapes(graph: Graph, replaced: Replacements) -> None:
-    """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
+def _even_cone(light: LightNode) -> None:
+    """Replace a light by the even cone of the same solid angle and flux, as its sampling shows."""
+    origin, axis = light.column(3), light.column(2)
+    beam = probe.beam(light.graph, light.emitter, origin, axis)
+    if beam is None:
+        light.leave_out()
+        return
+    cutoff, intensity = beam
+    props = heuristic(
+        "heuristic_spot",
+        position=mi.ScalarPoint3f(*origin),
+        direction=mi.ScalarVector3f(*axis),
+        cutoff=cutoff,
+        exponent=0.0,
+        intensity=intensity,
+    )
+    note = f"an even cone of {cutoff:.4g} deg, of the same solid angle and flux"
+    light.replace(props, INTENSITY_FACTOR, exact=False, note=note, lost="its picture")
 
-    Call it while the shapes still have their ``phong``.
-    """
-    for shape in graph.nodes(SHAPE):
-        for _, bsdf in graph.children(shape, BSDF):
-            radiance = graph.props(bsdf).get("k_i", 0.0)
-            if graph.plugin(bsdf) == "phong" and values.may_be_nonzero(radiance):
-                light = graph.add(EMITTER, properties("area", radiance=radiance))
-                graph.attach(shape, "emitter", light)
-                replaced.emitter(graph.label(shape), "k_i", "area", 1.0)
+
+def _daylight(light: LightNode) -> Any:
+    sun = probe.irradiance(light.graph, _only(light, "sky_scale"))
+    note = probe.MEAN
+    if sun is not None:
+        intensity, direction = sun
+        props = properties(
+            "heuristic_directional", direction=mi.ScalarVector3f(*direction), intensity=intensity
+        )
+        props.set_id(f"sun of {light.label}")
+        node = light.graph.add(mi.ObjectType.Emitter, props)
+        light.graph.attach(0, f"sun_of_{light.index}", node)
+        note += "; the sun a directional light of its irradiance"
+    ambient = probe.mean_radiance(light.graph, _only(light, "sun_scale"))
+    light.becomes_ambient(note, "directions of the sky's light, and the sun's extent")
+    return ambient
 
 
-AREA = LightKind(
-    plugins=("area",),
-    to_heuristic=_to_heuristic,
-    colour="radiance",
-    on_shapes=True,
-)
+def _only(light: LightNode, off: str) -> mi.Emitter:
+    """Return the light with one of its two parts switched off."""
+    copy = light.graph.copy()
+    copy.props(light.index)[off] = 0.0
+    return copy.instantiate(light.index)

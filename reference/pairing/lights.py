@@ -1,4 +1,4 @@
-"""The declaration of a kind of light, and the light that its rules read."""
+"""The kinds of lights, and a light of a graph that the rules of pairing read and replace."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -8,10 +8,19 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.lights import INVERSE_SQUARE, PLUGINS, Light
+from heuristic.lights import (
+    INVERSE_SQUARE,
+    PLUGINS,
+    DirectionalLight,
+    Light,
+    PointLight,
+    SpotLight,
+)
 from reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from reference.scene import values
 from reference.scene.graph import Graph, properties
+
+EMITTER = mi.ObjectType.Emitter
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
@@ -71,6 +80,10 @@ class LightNode:
         """Return the position of a light that shines from a point, (3,) in world space."""
         return self.vector("position", (0, 0, 0), 3)
 
+    def travel(self) -> np.ndarray:
+        """Return the direction in which parallel light travels, (3,) in world space."""
+        return self.vector("direction", (0, 0, 1), 2)
+
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
         """Return the intensity of a heuristic light times a factor."""
         colour = values.colour(self.graph, self.index, "intensity", 1.0)
@@ -106,23 +119,18 @@ class LightNode:
 
 @dataclass(frozen=True)
 class LightKind:
-    """A kind of light: one declaration.
+    """A kind of light.
 
-    ``plugins`` are Mitsuba's emitters of this kind. ``to_heuristic`` and ``to_physical`` replace
-    the light by the nearest form; the second is None if the heuristic has no light of this kind,
-    otherwise ``model`` is its class in :mod:`heuristic.lights`. ``ambient`` returns the radiance
-    that becomes ``I_a``, as the parser keeps it, or None. ``colour`` is the parameter that holds
-    the intensity, if the kind is paired by its parameters. ``place`` returns ``position`` or
+    ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in :mod:`heuristic.lights`;
+    None if the heuristic has no light of this kind. ``colour`` is the parameter that holds the
+    intensity, if the kind is paired by its parameters. ``place`` returns ``position`` or
     ``toward``, the direction to the light, (3,) each, if it has one. It may be ``exact`` (it needs
     no random numbers), shine from everywhere (``surrounds``), evenly so (``uniform``), or belong to
     a shape.
     """
 
     plugins: tuple[str, ...]
-    to_heuristic: Callable[[LightNode], None]
-    to_physical: Callable[[LightNode], None] | None = None
     model: type[Light] | None = None
-    ambient: Callable[[LightNode], Any] | None = None
     colour: str = ""
     place: Callable[[LightNode], dict[str, Any]] = lambda light: {}
     exact: bool = False
@@ -135,11 +143,62 @@ class LightKind:
         return self.model is not None and _has(self.model, name)
 
 
+def _has(model: Any, name: str) -> bool:
+    return name in {entry.name for entry in fields(model)}
+
+
+def _at_point(light: LightNode) -> dict[str, Any]:
+    return {"position": light.position()}
+
+
+ENVIRONMENT = LightKind(plugins=("envmap",), surrounds=True)
+
+KINDS = (
+    LightKind(plugins=("area",), colour="radiance", on_shapes=True),
+    ENVIRONMENT,
+    LightKind(plugins=("constant",), colour="radiance", surrounds=True, uniform=True),
+    LightKind(plugins=("sunsky", "timed_sunsky"), surrounds=True),
+    LightKind(
+        plugins=("point",), model=PointLight, colour="intensity", place=_at_point, exact=True
+    ),
+    LightKind(
+        plugins=("directional",),
+        model=DirectionalLight,
+        colour="irradiance",
+        place=lambda light: {"toward": -light.travel()},
+        exact=True,
+    ),
+    LightKind(plugins=("spot",), model=SpotLight, colour="intensity", place=_at_point, exact=True),
+    LightKind(plugins=("projector",)),
+)
+
+_by_plugin = {plugin: kind for kind in KINDS for plugin in kind.plugins}
+_by_plugin |= {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
+
+
+def of(plugin: str) -> LightKind:
+    """Return the kind of an emitter, of either half, by the name of its plugin.
+
+    An unknown one counts as an environment, about which premises may assume the least.
+    """
+    return _by_plugin.get(plugin, ENVIRONMENT)
+
+
+def is_heuristic(plugin: str) -> bool:
+    """Return whether an emitter is one of the heuristic's own lights."""
+    return plugin in PLUGINS
+
+
+def check(graph: Graph) -> None:
+    """Reject intensities that are negative or not finite."""
+    for index in graph.nodes(EMITTER):
+        plugin = graph.plugin(index)
+        colour = "intensity" if is_heuristic(plugin) else of(plugin).colour
+        if colour:
+            values.check_colours(graph, index, (colour,))
+
+
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
     """Return the properties of a heuristic light with the fall-off of Mitsuba's."""
     falloff = FALLOFF_OF_MITSUBA if _has(PLUGINS[plugin], "attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
-
-
-def _has(model: Any, name: str) -> bool:
-    return name in {entry.name for entry in fields(model)}

@@ -1,4 +1,16 @@
-"""Light from a point or in parallel: ``point``, ``directional``, ``spot`` and ``projector``.
+"""Replacing the lights of a scene by their counterparts, by :mod:`reference.pairing.factors`.
+
+Lights without a row in the table get the nearest light: an environment or a sky becomes ``I_a``,
+its mean radiance over the sphere, and the sun a directional light of its irradiance and mean
+direction; a ``projector`` or textured ``spot`` becomes the even cone of the same solid angle and
+flux; a textured ``area`` light has its mean radiance. Any other light is left out.
+
+**Level.** A light without an exact pair differs from its form in the other half by shape. Its level
+follows one rule, so only the shape differs: *equal flux if the light's parameters determine it;
+otherwise equal mean irradiance over the surface that the camera sees.* A light that falls off as
+the inverse square sends the same flux through any sphere about it, so its pair depends neither on
+the scene nor on the view. A heuristic point or spot with another ``f_att`` has no single flux: it
+depends on the distance, which only the scene determines.
 
 Parallel light is an exact pair; so is a point with the fall-off of Mitsuba's.
 
@@ -6,23 +18,76 @@ Spots differ. Mitsuba's is even up to its beam width and falls linearly in the a
 cutoff; the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The
 fit minimises ``int (s f(t) - g(t))^2 sin(t) dt`` over the cone, the mean square over its solid
 angle, where ``g`` is the given fall-off and ``f`` the other one. The level ``s`` is not fitted: it
-gives equal flux, ``s int f sin = int g sin``, by the rule of :mod:`reference.pairing.lights`. On
-the axis the two then differ. The nearest form of a picture projected from a point is the even cone
-of the same flux.
+gives equal flux, ``s int f sin = int g sin``. On the axis the two then differ.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import INVERSE_SQUARE, DirectionalLight, PointLight, SpotLight
-from reference.pairing import probe
-from reference.pairing.factors import INTENSITY_FACTOR
-from reference.pairing.lights.kind import LightKind, LightNode, heuristic
-from reference.scene.graph import properties
+from heuristic.lights import INVERSE_SQUARE
+from reference.pairing.factors import INTENSITY_FACTOR, Convention, Replacements
+from reference.pairing.lights import EMITTER, LightNode, heuristic, is_heuristic
+from reference.scene import values
+from reference.scene.graph import Graph, properties
+
+Cone = Callable[[np.ndarray], Any]
+
+
+def to_heuristic(
+    graph: Graph, geometry: Callable[[], mi.Scene], hide_emitters: bool, replaced: Replacements
+) -> Any:
+    """Replace physical lights by heuristic ones, and return the radiance that becomes ``I_a``.
+
+    ``geometry()`` returns the Mitsuba scene, for the size and place of area lights. The environment
+    stays as a background. With ``hide_emitters`` the shapes of area lights are taken out.
+    """
+    ambient = None
+    for shape, key, index in list(_physical(graph)):
+        if shape is not None:
+            graph.detach(shape, key)
+        light = LightNode(
+            graph, index, shape, geometry, hide_emitters=hide_emitters, replaced=replaced
+        )
+        is_textured = light.plugin == "spot" and light.value("texture", None) is not None
+        if light.plugin in TO_HEURISTIC and shape is None and not is_textured:
+            TO_HEURISTIC[light.plugin](light)
+        else:
+            from reference.pairing import lamps  # loaded late: most scenes have points alone
+
+            found = lamps.to_heuristic(light)
+            ambient = ambient if found is None else found
+    return ambient
+
+
+def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements) -> None:
+    """Replace heuristic lights by physical ones.
+
+    ``surface()`` returns the `GBuffer` for the mean irradiance, which is used if the attenuation is
+    not the inverse square.
+    """
+    for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
+        light = LightNode(graph, index, surface=surface, replaced=replaced)
+        TO_PHYSICAL[light.plugin](light)
+
+
+def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
+    """Return shape, key and node of the physical lights; those of shapes come last."""
+    on_shapes = [
+        (shape, key, index)
+        for shape in graph.nodes(mi.ObjectType.Shape)
+        for key, index in graph.children(shape, EMITTER)
+    ]
+    owned = {index for _, _, index in on_shapes}
+    for index in graph.nodes(EMITTER):
+        if index not in owned and not is_heuristic(graph.plugin(index)):
+            yield None, "", index
+    for shape, key, index in on_shapes:
+        if graph.plugin(index) != "heuristic_glow":
+            yield shape, key, index
 
 
 def _point_to_heuristic(light: LightNode) -> None:
@@ -37,9 +102,6 @@ def _point_to_physical(light: LightNode) -> None:
     light.replace(
         properties("point", position=position, intensity=intensity), factor, not note, note
     )
-
-
-Cone = Callable[[np.ndarray], Any]
 
 
 def level(light: LightNode, cone: Cone, derived_cone: Cone, flux_ratio: float) -> tuple[float, str]:
@@ -69,23 +131,8 @@ def level(light: LightNode, cone: Cone, derived_cone: Cone, flux_ratio: float) -
     return IRRADIANCE_PER_INTENSITY * (here / there if there > 0 else 1.0), note
 
 
-POINT = LightKind(
-    plugins=("point",),
-    to_heuristic=_point_to_heuristic,
-    to_physical=_point_to_physical,
-    model=PointLight,
-    colour="intensity",
-    place=lambda light: {"position": light.position()},
-    exact=True,
-)
-
-
-def _travel(light: LightNode) -> np.ndarray:
-    return light.vector("direction", (0, 0, 1), 2)
-
-
 def _directional_to_heuristic(light: LightNode) -> None:
-    direction, intensity = mi.ScalarVector3f(*_travel(light)), light.value("irradiance", 1.0)
+    direction, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
     props = heuristic("heuristic_directional", direction=direction, intensity=intensity)
     light.replace(props, INTENSITY_FACTOR)
 
@@ -97,40 +144,6 @@ def _directional_to_physical(light: LightNode) -> None:
     light.replace(props, IRRADIANCE_PER_INTENSITY)
 
 
-DIRECTIONAL = LightKind(
-    plugins=("directional",),
-    to_heuristic=_directional_to_heuristic,
-    to_physical=_directional_to_physical,
-    model=DirectionalLight,
-    colour="irradiance",
-    place=lambda light: {"toward": -_travel(light)},
-    exact=True,
-)
-
-
-def even_cone(light: LightNode) -> None:
-    """Replace a light by the even cone of the same solid angle and flux, as its sampling shows."""
-    origin, axis = light.column(3), light.column(2)
-    beam = probe.beam(light.graph, light.emitter, origin, axis)
-    if beam is None:
-        light.leave_out()
-        return
-    cutoff, intensity = beam
-    props = heuristic(
-        "heuristic_spot",
-        position=mi.ScalarPoint3f(*origin),
-        direction=mi.ScalarVector3f(*axis),
-        cutoff=cutoff,
-        exponent=0.0,
-        intensity=intensity,
-    )
-    note = f"an even cone of {cutoff:.4g} deg, of the same solid angle and flux"
-    light.replace(props, INTENSITY_FACTOR, exact=False, note=note, lost="its picture")
-
-
-PROJECTOR = LightKind(plugins=("projector",), to_heuristic=even_cone)
-
-
 LARGEST_EXPONENT = 1e5
 STEPS = 2048
 
@@ -138,14 +151,14 @@ STEPS = 2048
 def exponent_for(cutoff: float, beam_width: float) -> float:
     """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off at equal flux; angles in degrees."""
     theta, weight = _cone(cutoff)
-    wanted, flux = linear_falloff(theta, cutoff, beam_width), linear_flux(cutoff, beam_width)
+    target, flux = linear_falloff(theta, cutoff, beam_width), linear_flux(cutoff, beam_width)
 
     def distance(log_m):
         m = np.expm1(log_m)
         fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
-        return np.sum(weight * (fitted - wanted) ** 2)
+        return np.sum(weight * (fitted - target) ** 2)
 
-    from scipy.optimize import minimize_scalar  # see albedo.ior_of_lobe
+    from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
 
     # In log(1 + m), because sharp spots differ little from one exponent to the next.
     found = minimize_scalar(distance, bounds=(0, np.log(LARGEST_EXPONENT)), method="bounded")
@@ -159,11 +172,11 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
     too, up to the cone's.
     """
     theta, weight = _cone(cutoff)
-    wanted, flux = power_falloff(theta, exponent), power_flux(cutoff, exponent)
+    target, flux = power_falloff(theta, exponent), power_flux(cutoff, exponent)
 
     def distance(edge, beam_width):
         fitted = flux / linear_flux(edge, beam_width) * linear_falloff(theta, edge, beam_width)
-        return np.sum(weight * (fitted - wanted) ** 2)
+        return np.sum(weight * (fitted - target) ** 2)
 
     def best_beam(edge):
         # Mitsuba rejects a beam as wide as the cone; just below it the cone is even.
@@ -175,7 +188,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
     """Return the minimum of a function that has only one, including the ends of the interval."""
-    from scipy.optimize import minimize_scalar  # see albedo.ior_of_lobe
+    from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
 
     found = minimize_scalar(function, bounds=(low, high), method="bounded").x
     return float(min((low, high, found), key=function))
@@ -213,9 +226,6 @@ def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _spot_to_heuristic(light: LightNode) -> None:
-    if light.value("texture", None) is not None:
-        even_cone(light)
-        return
     cutoff = light.number("cutoff_angle", 20.0)
     beam_width = light.number("beam_width", 0.75 * cutoff)
     exponent = exponent_for(cutoff, beam_width)
@@ -261,12 +271,66 @@ def _spot_to_physical(light: LightNode) -> None:
     light.replace(props, factor, exact=False, note=f"{fitted}; {rule or 'same flux'}")
 
 
-SPOT = LightKind(
-    plugins=("spot",),
-    to_heuristic=_spot_to_heuristic,
-    model=SpotLight,
-    to_physical=_spot_to_physical,
-    colour="intensity",
-    place=lambda light: {"position": light.position()},
-    exact=True,
-)
+def add_glowing_shapes(graph: Graph, replaced: Replacements) -> None:
+    """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
+
+    Call it while the shapes still have their ``phong``.
+    """
+    for shape in graph.nodes(mi.ObjectType.Shape):
+        for _, bsdf in graph.children(shape, mi.ObjectType.BSDF):
+            radiance = graph.props(bsdf).get("k_i", 0.0)
+            if graph.plugin(bsdf) == "phong" and values.may_be_nonzero(radiance):
+                light = graph.add(mi.ObjectType.Emitter, properties("area", radiance=radiance))
+                graph.attach(shape, "emitter", light)
+                replaced.emitter(graph.label(shape), "k_i", "area", 1.0)
+
+
+def add_environment(
+    physical: Graph, graph: Graph, ambient: Any, convention: Convention, replaced: Replacements
+) -> None:
+    """Add the constant environment that corresponds to ``I_a`` to the physical half of a graph.
+
+    A physical surface has one diffuse reflectance, whereas the model has ``k_a`` and ``k_d``. The
+    ``matched`` radiance is ``I_a k_a / k_d``, by least squares if materials differ; the ``literal``
+    one is ``I_a``.
+    """
+    ratio, exact = np.ones(3), True
+    if convention is Convention.MATCHED:
+        ratio, exact = _ambient_ratio(graph)
+    known = values.plain(ambient)
+    if known is not None and (ratio != 1).any():
+        ambient = values.scaled(known, ratio)
+    light = physical.add(mi.ObjectType.Emitter, properties("constant", radiance=ambient))
+    physical.attach(0, "environment", light)
+    note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"
+    replaced.emitter("ambient", "ambient", "constant", float(ratio.mean()), exact, note)
+
+
+def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
+    """Return ``k_a / k_d`` per channel by least squares, and whether it fits all materials."""
+    phongs = [i for i in graph.nodes(mi.ObjectType.BSDF) if graph.plugin(i) == "phong"]
+    k_a, k_d, k_s = (
+        np.array([values.colour(graph, i, key, 0.0) for i in phongs]).reshape(-1, 3)
+        for key in ("k_a", "k_d", "k_s")
+    )
+    # Without a diffuse part the reflectance is k_a itself.
+    has_part = np.logical_or(k_d.any(axis=1, keepdims=True), k_s.any(axis=1, keepdims=True))
+    k_d = np.where(has_part, k_d, k_a)
+    weight = np.sum(k_d**2, axis=0)
+    ratio = np.where(weight > 0, np.sum(k_a * k_d, axis=0) / np.where(weight > 0, weight, 1), 1.0)
+    fits = np.abs(k_a - ratio * k_d) <= 1e-6 * np.maximum(k_a, 1e-6)
+    return ratio, bool(fits.all() and not k_s.any())
+
+
+TO_HEURISTIC: dict[str, Callable[[LightNode], None]] = {
+    "point": _point_to_heuristic,
+    "directional": _directional_to_heuristic,
+    "spot": _spot_to_heuristic,
+}
+"""By plugin; other lights, and textured spots, are in :mod:`reference.pairing.lamps`."""
+
+TO_PHYSICAL: dict[str, Callable[[LightNode], None]] = {
+    "heuristic_point": _point_to_physical,
+    "heuristic_directional": _directional_to_physical,
+    "heuristic_spot": _spot_to_physical,
+}

@@ -8,7 +8,7 @@ import mitsuba as mi
 from heuristic.errors import InputError
 from reference.pairing import bsdfs, lights
 from reference.records import Record
-from reference.scene import checks, files
+from reference.scene import checks
 from reference.scene.graph import Graph, Reference, properties
 
 FILM, INTEGRATOR, SAMPLER, SENSOR, SHAPE = (
@@ -63,7 +63,7 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
     bsdfs.give_default(graph)
     bsdfs.check(graph)
     lights.check(graph)
-    files.require_files(graph)
+    checks.require_files(graph)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
