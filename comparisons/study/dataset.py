@@ -23,7 +23,6 @@ from comparisons.departure.metrics import (
     METRICS,
     RATIO,
     Pixelwise,
-    checked_pair,
     log2_luminance_ratio,
 )
 from comparisons.record import versions
@@ -127,36 +126,37 @@ def measure(
         f"{LEADING.name}_p95": summary.p95,
         f"{LEADING.name}_noise": summary.noise_floor,
         f"{LEADING.name}_shape": summary.after_exposure.mean,
-        **{name: float(values.mean()) for name, values in _dimmed(test, truth).items()},
+        **_dimmed(test, truth),
         "exposure": summary.after_exposure.exposure,
         RATIO.name: ratio.mean,
     }
 
 
-def measure_each(heuristic: np.ndarray, reference: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the columns of single grey values (N,), one array each.
+def measure_value(heuristic: float, reference: float) -> Row:
+    """Return the columns of a single grey value.
 
-    The shape column is missing: the best exposure would remove all departure of a single value.
+    The shape column is missing: the best exposure would remove all of its departure.
     """
-    test, truth = checked_pair(*(np.repeat(v[:, None], 3, axis=1) for v in (heuristic, reference)))
+    test, truth = np.full((1, 3), heuristic), np.full((1, 3), reference)
     pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}
     return {
         "heuristic": heuristic,
         "reference": reference,
-        **{name: metric(test, truth) for name, metric in pixelwise.items()},
+        **{name: float(metric(test, truth)[0]) for name, metric in pixelwise.items()},
         **_dimmed(test, truth),
-        RATIO.name: log2_luminance_ratio(test, truth),
+        RATIO.name: float(log2_luminance_ratio(test, truth)[0]),
     }
 
 
-def _dimmed(test: np.ndarray, truth: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the leading metric of each pixel (N, 3) under the light levels :data:`DIMMED`.
+def _dimmed(test: np.ndarray, truth: np.ndarray) -> Row:
+    """Return the leading metric's mean over pixels (N, 3) under the light levels :data:`DIMMED`.
 
     Both models are linear in the light: less light is a lower exposure on both images.
     """
+    levels = {part: replace(DEFAULT_VIEWING, exposure=factor) for part, factor in DIMMED.items()}
     return {
-        f"{LEADING.name}_{part}": LEADING(test, truth, replace(DEFAULT_VIEWING, exposure=factor))
-        for part, factor in DIMMED.items()
+        f"{LEADING.name}_{part}": float(LEADING(test, truth, viewing).mean())
+        for part, viewing in levels.items()
     }
 
 

@@ -1,81 +1,87 @@
 """Running a study: which points are left, how they are evaluated, and how they are kept.
 
-Each finished block of points is saved at once in its own file, named by everything that it depends
-on. So a run that ends early loses nothing, and the next one repeats nothing.
+Each finished point is saved at once in its own file, named by everything that it depends on. So a
+run that ends early loses nothing, and the next one repeats nothing.
 """
 
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from hashlib import sha256
-from itertools import groupby
+from itertools import pairwise
+from numbers import Real
 from pathlib import Path
 
+import mitsuba as mi
+import numpy as np
 import pyarrow as pa
 
 from comparisons import record
 from comparisons.atomic import Entry
-from comparisons.case import RGB
+from comparisons.case import RGB, open_case
+from comparisons.prepared import guarded
 from comparisons.processes.pool import Pool, Task
-from comparisons.study import dataset, rendered, surface
-from comparisons.study.dataset import Row
-from comparisons.study.design import StudyFile, StudyPart
-from comparisons.study.scenes import SCENES, Point
+from comparisons.study import dataset, surface
+from comparisons.study.dataset import STEPPED, STEPS, Row, largest_miss, measure
+from comparisons.study.design import OWN, StudyFile, StudyPart
+from comparisons.study.scenes import SCENES, Point, bsdf
 from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
+from reference.pairing.halves import Pair
+from reference.planning.effects import EFFECTS
+from reference.planning.plan import Plan, physical_integrator
 from reference.rendering import direct
-from reference.rendering.renderer import Progress
-from reference.scene.graph import set_variant
-from reference.scene.source import digest
+from reference.rendering.passes import passes
+from reference.rendering.renderer import Progress, Renderer
+from reference.rendering.sums import Accumulator
+from reference.scene.graph import Graph, set_variant
+from reference.scene.source import Source, digest
+from reference.scene.values import COLOURS
 
 POINTS = "points"
-"""Folder of finished blocks."""
-
-LARGEST_BLOCK = 4096
+"""Folder of finished points."""
 
 WORTH_A_PROCESS = 16
-"""Fewest blocks that repay the start of another process."""
+"""Fewest points that repay the start of another process."""
+
+PASSES = 4
+"""Few passes of many samples: each pass costs a launch, and stratifies its samples. Four suffice to
+estimate the noise."""
 
 
 @dataclass(frozen=True)
-class PointBlock:
-    """Points of one part that are evaluated together: one, or those that differ in directions.
+class StudyPoint:
+    """A point of a part, and its number there.
 
-    ``first`` is the number of the first one. ``identity`` is a digest of the part's scene and
-    heuristic, with every file that they read, and of the versions in use.
+    ``identity`` is a digest of the part's scene and heuristic, with every file that they read, and
+    of the versions in use.
     """
 
     part: StudyPart
-    first: int
-    points: tuple[Point, ...]
+    number: int
+    values: Point
     identity: str
 
     @property
     def key(self) -> str:
-        """A name from all that the rows depend on: equal blocks are done once."""
-        part = self.part
-        content = [part.scene, part.options.stated(), self.identity, self.points]
+        """A name from all that the row depends on: equal points are done once."""
+        content = [self.part.scene, self.part.options.stated(), self.identity, self.values]
         return sha256(json.dumps(content).encode()).hexdigest()[:32]
 
-
-@dataclass(frozen=True)
-class Outcome:
-    """A finished study: the dataset, and how many points were done, cached, and failed."""
-
-    table: pa.Table
-    done: int
-    cached: int
-    failed: int
+    def row(self, columns: Row) -> Row:
+        """Return the row of the point with these columns."""
+        return {**self.values, **columns, "part": self.part.name, "point": self.number}
 
 
-def all_blocks(study: StudyFile) -> list[PointBlock]:
-    """Return the blocks of a study; ``InputError`` if a scene, or a path into it, does not exist.
+def all_points(study: StudyFile) -> list[StudyPoint]:
+    """Return the points of a study; ``InputError`` if a scene, or a path into it, does not exist.
 
     It reads scenes and runs scripts.
     """
     _prepare()
-    return [block for part in study.parts for block in _blocks(part)]
+    return [point for part in study.parts for point in _points(part)]
 
 
 def _prepare() -> None:
@@ -84,74 +90,29 @@ def _prepare() -> None:
     direct.register()
 
 
-def _blocks(part: StudyPart) -> Iterator[PointBlock]:
+def _points(part: StudyPart) -> Iterator[StudyPoint]:
     points = part.points()
     try:
         _check(part, points)
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
-    scene = SCENES.get(part.scene)
-    own = "" if scene else digest(rendered.source_of(part, points[0]))
-    versions = [own, named(part.options.heuristic).digest(), record.versions()]
-    identity = sha256(json.dumps(versions, sort_keys=True).encode()).hexdigest()
-    together = scene.together if scene else ()
-
-    def alike(number: int) -> list[float]:
-        if not together:
-            return [number]
-        return [value for name, value in points[number].items() if name not in together]
-
-    for _, group in groupby(range(len(points)), alike):
-        numbers = list(group)
-        for begin in range(numbers[0], numbers[-1] + 1, LARGEST_BLOCK):
-            end = min(begin + LARGEST_BLOCK, numbers[-1] + 1)
-            yield PointBlock(part, begin, tuple(points[begin:end]), identity)
+    own = "" if part.scene in SCENES else digest(source_of(part, points[0]))
+    content = [own, named(part.options.heuristic).digest(), record.versions()]
+    identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    for number, values in enumerate(points):
+        yield StudyPoint(part, number, values, identity)
 
 
 def _check(part: StudyPart, points: list[Point]) -> None:
     """Ensure that a part's scene and heuristic exist, and that paths lead to numbers."""
     known = {each.name: each for each in named(part.options.heuristic).parameters}
     for point in points:
-        for name, value in rendered.split(point)[0].items():
+        for name, value in split(point)[0].items():
             if name not in known:
                 raise unknown(f"parameter of {part.options.heuristic}", name, known)
             known[name].checked(value)
     if part.scene not in SCENES:
-        graph = rendered.source_of(part, points[0]).parse()
-        rendered.set_values(graph, rendered.split(points[0])[1])
-
-
-def rows(block: PointBlock) -> list[Row]:
-    """Evaluate a block, the same in any process; return one row per point.
-
-    The row of a point that fails has its parameters and, in the column ``error``, the reason.
-    """
-    _prepare()
-    part = block.part
-    convention = part.options.convention
-    try:
-        if part.scene == "patch":
-            results = surface.patch(block.points, convention)
-        elif part.scene == "lobe":
-            results = [surface.lobe(point, convention) for point in block.points]
-        else:
-            results = [rendered.row(part, point, block.identity) for point in block.points]
-    # A failing point must not end a study of thousands.
-    except Exception as failure:
-        kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
-        return _failing(block, f"{kind}{failure}")
-    return _rows(block, [result | {"error": None} for result in results])
-
-
-def _rows(block: PointBlock, results: list[Row]) -> list[Row]:
-    return [
-        {**point, **result, "part": block.part.name, "point": block.first + number}
-        for number, (point, result) in enumerate(zip(block.points, results, strict=True))
-    ]
-
-
-def _failing(block: PointBlock, reason: str) -> list[Row]:
-    return _rows(block, [{"error": reason}] * len(block.points))
+        set_values(source_of(part, points[0]).parse(), split(points[0])[1])
 
 
 def run(
@@ -159,42 +120,174 @@ def run(
     folder: str | Path,
     pool: Pool | None = None,
     progress: Progress | None = None,
-    blocks: list[PointBlock] | None = None,
-) -> Outcome:
-    """Do the points of a study that are not done yet, and gather all.
+    points: list[StudyPoint] | None = None,
+) -> tuple[pa.Table, int]:
+    """Do the points of a study that are not done yet; return the dataset, and how many it did.
 
     Points that failed in an earlier run are done again. A pool, or a cluster, does the points; if
-    omitted, this process. ``folder`` keeps finished blocks, in ``points/``; ``progress(stage, done,
-    total)`` is called with numbers of points; ``blocks`` are those of :func:`all_blocks`, if it was
+    omitted, this process. ``folder`` keeps finished points, in ``points/``; ``progress(stage, done,
+    total)`` is called with numbers of points; ``points`` are those of :func:`all_points`, if it was
     called elsewhere.
     """
-    blocks = all_blocks(study) if blocks is None else blocks
+    points = all_points(study) if points is None else points
     kept = Path(folder) / POINTS
     kept.mkdir(parents=True, exist_ok=True)
-    entries = {block.key: Entry(kept / f"{block.key}.json", block.key) for block in blocks}
-    results = {}
-    for block in blocks:
-        saved = (entries[block.key].load() or {}).get("rows")
-        if saved and not _failed(saved):
-            results[block.key] = saved
     # Points that parts share are done once.
-    left = {block.key: block for block in blocks if block.key not in results}
-    total = sum(len(block.points) for block in blocks)
-    cached = done = total - sum(len(block.points) for block in left.values())
-    report = progress or (lambda *_: None)
-    report("points", done, total)
-    tasks = [Task(f"points of {b.part.name}", rows, (b,)) for b in left.values()]
-    for task, outcome in (pool or Pool(0)).each(tasks):
-        (block,) = task.arguments
+    entries = {point.key: Entry(kept / f"{point.key}.json", point.key) for point in points}
+    saved = {key: (entry.load() or {}).get("row") for key, entry in entries.items()}
+    results = {key: row for key, row in saved.items() if row and row["error"] is None}
+    left = {point.key: point for point in points if point.key not in results}
+    total, report = len(points), progress or (lambda *_: None)
+    begin = total - len(left)
+    report("points", begin, total)
+    tasks = [Task(f"points of {each.part.name}", row, (each,)) for each in left.values()]
+    for done, (task, outcome) in enumerate((pool or Pool(0)).each(tasks), start=begin + 1):
+        (point,) = task.arguments
         error = outcome.exception()
-        results[block.key] = _failing(block, str(error)) if error else outcome.result()
-        entries[block.key].save({"rows": results[block.key]})
-        done += len(block.points)
+        results[point.key] = point.row({"error": str(error)}) if error else outcome.result()
+        entries[point.key].save({"row": results[point.key]})
         report("points", done, total)
-    # Rows of a block that parts share get the name and numbers of each.
-    all_rows = [row for block in blocks for row in _rows(block, results[block.key])]
-    return Outcome(dataset.table(study, all_rows), done - cached, cached, _failed(all_rows))
+    # A row that parts share gets the name and number of each.
+    return dataset.table(study, [point.row(results[point.key]) for point in points]), len(left)
 
 
-def _failed(all_rows: list[Row]) -> int:
-    return sum(row["error"] is not None for row in all_rows)
+def row(point: StudyPoint) -> Row:
+    """Evaluate a point, the same in any process.
+
+    The row of a point that fails has its parameters and, in the column ``error``, the reason.
+    """
+    _prepare()
+    convention = point.part.options.convention
+    try:
+        if point.part.scene == "patch":
+            columns = surface.patch(point.values, convention)
+        elif point.part.scene == "lobe":
+            columns = surface.lobe(point.values, convention)
+        else:
+            columns = _rendered(point)
+    # A failing point must not end a study of thousands.
+    except Exception as failure:
+        kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
+        return point.row({"error": f"{kind}{failure}"})
+    return point.row(columns | {"error": None})
+
+
+# --- Renderings --------------------------------------------------------------------------------
+
+
+def _rendered(point: StudyPoint) -> Row:
+    """Render both halves with the same camera rays, and the steps between them.
+
+    The columns :data:`comparisons.study.dataset.STEPS` are the root mean square changes of the
+    image as each step is added; ``dominant`` names the largest. The scene is read once while its
+    ``identity`` stays.
+    """
+    part = point.part
+    own, in_scene = split(point.values)
+    source = source_of(part, point.values, point.identity)
+    if part.scene not in SCENES:
+        source = source.edited(partial(set_values, values=in_scene))
+    ready = guarded(source, part.options)
+    spp, scene = max(1, (part.options.spp or 0) // PASSES), ready.scene
+    ready.heuristic.spp = spp
+    parameters = mi.traverse(ready.heuristic.integrator)
+    for name, value in own.items():
+        parameters[name] = value
+    parameters.update()
+    renderers, plans = [ready.heuristic], _plans(ready.plan)
+    for stage in plans.values():
+        integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
+        renderers.append(Renderer(scene, integrator, spp, "reference image"))
+    sums = [Accumulator() for _ in renderers]
+    difference = Accumulator()
+    for one in passes(renderers, part.options.seed, PASSES):
+        for total, image in zip(sums, one.images, strict=True):
+            total.add(image)
+        difference.add(one.images[0] - one.images[-1])
+    images = [total.estimate().mean for total in sums]
+    result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
+    sizes = dict.fromkeys(STEPS, 0.0)
+    for name, (before, after) in zip(plans, pairwise(images), strict=True):
+        change = (after - before).mean(axis=2)[ready.counted]
+        sizes[name] = float(np.sqrt(np.mean(change**2)))
+    result |= sizes | {"dominant": max(sizes, key=sizes.__getitem__)}
+    result["miss"] = largest_miss(ready.pair.pairing.misses)
+    return result | (_derived(ready.pair) if part.scene in SCENES else {})
+
+
+def split(point: Point) -> tuple[Point, Point]:
+    """Return a point's parameters of the heuristic, without their prefix, and of the scene."""
+    own = {k.removeprefix(OWN): value for k, value in point.items() if k.startswith(OWN)}
+    return own, {name: value for name, value in point.items() if not name.startswith(OWN)}
+
+
+def source_of(part: StudyPart, point: Point, identity: str = "") -> Source:
+    """Return the scene of a point: a study scene is made, another is read."""
+    if part.scene in SCENES and (make := SCENES[part.scene].make):
+        return Source(part.scene, lambda: make(point, bsdf(point)))
+    return _read(part.scene, identity)
+
+
+@lru_cache(maxsize=4)
+def _read(scene: str, identity: str) -> Source:
+    """Read a user's scene or a built-in one once, while its files stay the same."""
+    case = open_case(scene)
+    if case.variant != RGB:
+        raise InputError(f"{scene} needs {case.variant}: study a scene in RGB.")
+    return case.source
+
+
+def _plans(chosen: Plan) -> dict[str, Plan]:
+    """Return the plan of each step that changes something; the last is the chosen plan."""
+    simulated = set(EFFECTS) - set(STEPPED)
+    plans = {STEPS[0]: chosen.simulating(simulated)}
+    for effect in STEPPED:
+        simulated.add(effect)
+        more = chosen.simulating(simulated)
+        if more != list(plans.values())[-1]:
+            plans[effect.label] = more
+    return plans
+
+
+def _derived(pair: Pair) -> Row:
+    """Return a study's parameters of the material that pairing derived; its colours are grey."""
+    names = {
+        ("roughplastic", "phong"): {"n": "n", "k_d": "k_d", "k_s": "k_s"},
+        ("phong", "roughplastic"): {
+            "alpha": "alpha", "int_ior": "int_ior", "reflectance": "diffuse_reflectance"
+        },
+    }  # fmt: skip
+    for each in pair.pairing.bsdfs:
+        if own := names.get((each.given, each.derived)):
+            return {name: float(np.ravel(each.parameters[key])[0]) for name, key in own.items()}
+    return {}
+
+
+def set_values(graph: Graph, values: dict[str, float]) -> None:
+    """Set values in a user's scene, by path: ``<id of the element>.<parameter>``.
+
+    The scene must state the parameter as a number, or as RGB, which becomes grey.
+    """
+    in_use = [graph.props(index) for index in graph.nodes_in_use()]
+    for path, value in values.items():
+        identifier, _, key = path.rpartition(".")
+        props = [props for props in in_use if props.id() == identifier and key in props]
+        if not props:
+            known = sorted(
+                f"{props.id()}.{name}"
+                for props in in_use
+                for name, present in props.items()
+                if props.id() and _is_number(present)
+            )
+            raise InputError(
+                f"{graph.name} has no parameter {path!r}. Write <id>.<parameter>, such as one of:"
+                f" {', '.join(known)}."
+            )
+        if not _is_number(props[0][key]):
+            raise InputError(f"{graph.name}: {path} is not a number or RGB. Vary one that is.")
+        is_colour = isinstance(props[0][key], COLOURS)
+        props[0][key] = mi.ScalarColor3f(value) if is_colour else value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (Real, *COLOURS)) and not isinstance(value, bool)

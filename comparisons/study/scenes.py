@@ -63,23 +63,12 @@ WALL_ALBEDO = StudyParameter("1", 0, 0.95, 0.5, "reflectance of the walls")
 class StudyScene:
     """A parametrised scene.
 
-    Attributes
-    ----------
-    title
-        A sentence on what is compared.
-    parameters
-        Its own parameters; each scene also has those of one of the two materials.
-    make
-        Makes the dictionary for ``mitsuba.load_dict`` from a point and a BSDF; None for scenes
-        that are not rendered.
-    together
-        Parameters that vary within one block of points, which is evaluated at once.
+    Besides ``parameters``, its own, it has those of one of the two materials. ``make`` makes the
+    dictionary for ``mitsuba.load_dict`` from a point and a BSDF; None for what is not rendered.
     """
 
-    title: str
     parameters: dict[str, StudyParameter]
     make: Callable[[Point, Dict], Dict] | None = None
-    together: tuple[str, ...] = ()
 
 
 def bsdf(point: Point) -> Dict:
@@ -149,25 +138,13 @@ def _camera(place: Vector, target: Vector, up: Vector, field_of_view: float) -> 
 
 
 SCENES = {
-    "patch": StudyScene(
-        "a flat surface under parallel light, from one direction",
-        {"light_angle": LIGHT_ANGLE, "view_angle": VIEW_ANGLE, "azimuth": AZIMUTH},
-        together=("light_angle", "view_angle", "azimuth"),
-    ),
-    "lobe": StudyScene(
-        "a flat surface under parallel light, from all directions",
-        {"light_angle": LIGHT_ANGLE},
-    ),
-    "sphere": StudyScene(
-        "a sphere under a round lamp far away",
-        {"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE},
-        _sphere,
-    ),
-    "enclosure": StudyScene(
-        "a sphere in a closed room of diffuse walls, under a round lamp at the ceiling",
-        {"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO},
-        _enclosure,
-    ),
+    # A flat surface under parallel light, from one direction, and from all.
+    "patch": StudyScene({"light_angle": LIGHT_ANGLE, "view_angle": VIEW_ANGLE, "azimuth": AZIMUTH}),
+    "lobe": StudyScene({"light_angle": LIGHT_ANGLE}),
+    # A sphere under a round lamp far away.
+    "sphere": StudyScene({"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE}, _sphere),
+    # A sphere in a closed room of diffuse walls, under a round lamp at the ceiling.
+    "enclosure": StudyScene({"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO}, _enclosure),
 }
 """The study scenes by name. Other scenes are studied through paths to their parameters."""
 

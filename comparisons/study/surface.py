@@ -5,7 +5,6 @@ surface lies in the plane z = 0, and the light in the plane y = 0 at negative x,
 is at azimuth 0. Directions point away from the surface.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import heuristic
-from comparisons.study.dataset import Row, largest_miss, measure, measure_each
+from comparisons.study.dataset import Row, largest_miss, measure, measure_value
 from comparisons.study.scenes import Point
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
@@ -186,23 +185,16 @@ def albedo(radiance: np.ndarray, light_angle: float) -> float:
 # --- Rows -----------------------------------------------------------------------------------------
 
 
-def patch(points: Sequence[Point], convention: Convention) -> list[Row]:
-    """Return the columns of views of a surface of one material, one direction per point."""
-    made = material(points[0], convention)
-    light_angle, view_angle, azimuth = (
-        np.array([point[name] for point in points])
-        for name in ("light_angle", "view_angle", "azimuth")
-    )
-    light, view = direction(light_angle, 180.0), direction(view_angle, azimuth)
-    heuristic = heuristic_radiance(made.phong, light, view)
-    reference = reference_radiance(made.plastic, light, view)
-    columns = measure_each(heuristic[0], reference[0])
-    columns |= {"specular_heuristic": heuristic[1], "specular_reference": reference[1]}
-    columns = {name: np.broadcast_to(values, len(points)) for name, values in columns.items()}
-    return [
-        {name: float(values[number]) for name, values in columns.items()} | made.columns()
-        for number in range(len(points))
-    ]
+def patch(point: Point, convention: Convention) -> Row:
+    """Return the columns of a surface seen from one direction."""
+    made = material(point, convention)
+    light = direction(point["light_angle"], 180.0)
+    view = direction(point["view_angle"], point["azimuth"])
+    heuristic, specular = heuristic_radiance(made.phong, light, view)
+    reference, lobe = reference_radiance(made.plastic, light, view)
+    columns = measure_value(float(heuristic[0]), float(reference[0]))
+    parts = {"specular_heuristic": float(specular[0]), "specular_reference": float(lobe[0])}
+    return columns | parts | made.columns()
 
 
 def lobe(point: Point, convention: Convention) -> Row:

@@ -40,15 +40,15 @@ def study(
 
     chosen = design.read(file)
     with jobs.pool(timeout) as pool:
-        blocks = pool.do(Task(chosen.name, running.all_blocks, (chosen,)))
-    tasks = len(blocks) // running.WORTH_A_PROCESS + 1
+        points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
+    tasks = len(points) // running.WORTH_A_PROCESS + 1
     with hold(output, jobs.command_line()) as top:
         studies = own(top / "study")
         (place,) = assigned(studies, [(chosen.name, file)])
-        folder = study_files.prepare(chosen, studies / place)
+        folder = study_files.prepare(studies / place)
         with jobs.pool(timeout, tasks, workers, scheduler) as pool, progress.shown("points") as bar:
-            outcome = running.run(chosen, folder, pool, bar.of(chosen.name), blocks)
-        places = study_files.write(chosen, outcome, folder)
-    tell([*study_files.summary(chosen, outcome), ""])
+            table, done = running.run(chosen, folder, pool, bar.of(chosen.name), points)
+        places = study_files.write(chosen, table, folder)
+    tell([*study_files.summary(chosen, table, done), ""])
     for path in places:
         click.echo(os.fsencode(path))

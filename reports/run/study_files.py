@@ -3,41 +3,41 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import pyarrow as pa
+
 from comparisons.study import dataset
 from comparisons.study.design import StudyFile
-from comparisons.study.running import POINTS, Outcome
+from comparisons.study.running import POINTS
 from reports.charts import study_charts, vega
 from reports.run import results
 
 FIGURES = "figures"
 
 
-def prepare(study: StudyFile, folder: Path) -> Path:
+def prepare(folder: Path) -> Path:
     """Make a study's folder, and ensure that the study will replace only its own results."""
-    results.own(folder)
-    for name in (FIGURES, POINTS):
-        results.own(folder / name)
+    for place in (folder, folder / FIGURES, folder / POINTS):
+        results.own(place)
     return folder
 
 
-def write(study: StudyFile, outcome: Outcome, folder: Path) -> tuple[Path, Path]:
+def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:
     """Write dataset and figures, and return their places."""
     place, figures = folder / f"{study.name}.parquet", folder / FIGURES
-    results.write(place, dataset.file_of(outcome.table))
-    results.own(figures)
-    with_result = {row["part"] for row in outcome.table.to_pylist() if row["error"] is None}
+    results.write(place, dataset.file_of(table))
+    with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in study_charts.all_figures(study):
         if figure.part in with_result:
-            svg = vega.paper(study_charts.chart(figure, outcome.table, study))
+            svg = vega.paper(study_charts.chart(figure, table, study))
             results.write(figures / f"{figure.name}.svg", svg)
     return place, figures
 
 
-def summary(study: StudyFile, outcome: Outcome) -> Iterator[str]:
+def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the departure."""
     width = max(4, *(len(part.name) for part in study.parts))
     yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
-    rows = outcome.table.to_pylist()
+    rows = table.to_pylist()
     for part in study.parts:
         own = [row for row in rows if row["part"] == part.name]
         good = sorted(row["dE2000"] for row in own if row["error"] is None)
@@ -45,7 +45,7 @@ def summary(study: StudyFile, outcome: Outcome) -> Iterator[str]:
         if good:
             line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
         yield line
-    if outcome.cached:
-        yield f"{outcome.cached} points were cached by an earlier run."
+    if done < len(rows):
+        yield f"{len(rows) - done} points were kept from an earlier run, or are shared."
     for row in [row for row in rows if row["error"] is not None][:3]:
         yield f"failed: {row['part']}, point {row['point']}: {row['error']}"
