@@ -10,7 +10,6 @@ from comparisons.departure.colour import Viewing
 from comparisons.departure.limits import LimitCounts
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
-from comparisons.hybrids.nearness import Nearest, Renderings
 from comparisons.pixel_terms import TermGrid
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
@@ -101,10 +100,6 @@ class PictureRecord(Record):
         white if they are.
     odd
         What is odd about them, in words, their position first.
-    nearest
-        The rendering that they are nearest to as a whole; null if none was looked for.
-    renderings
-        Those that were compared with them; null if none was.
     """
 
     files: tuple[str, ...]
@@ -114,8 +109,6 @@ class PictureRecord(Record):
     edges: float
     ratio: tuple[float, float, float]
     odd: tuple[str, ...] = ()
-    nearest: Nearest | None = None
-    renderings: Renderings | None = None
 
 
 class ComparisonRecord(Record, kw_only=True):

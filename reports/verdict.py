@@ -7,7 +7,7 @@ A scene looks right at a tolerance if at most 5 % of its pixels depart by more
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure import criterion
 from comparisons.departure.metrics import LEADING
-from comparisons.hybrids.nearness import Nearest, Renderings
 from heuristic.interpolation import Interpolation
 from reference.planning.effects import EFFECTS
 from reports.charts.theme import EFFECT_COLOURS
-from reports.terminal.words import difference, percent, seconds
+from reports.terminal.words import seconds
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
@@ -119,8 +118,6 @@ class Finding:
         Whether the mean is at most :data:`EXACT`.
     subject
         What is judged, as the first words of a sentence.
-    nearest
-        The rendering that a picture is nearest to; None if it is unknown, or not a picture.
     """
 
     scene: str
@@ -130,7 +127,6 @@ class Finding:
     remedies: dict[float, Remedy | None]
     is_exact: bool
     subject: str = "Textbook shading"
-    nearest: Nearest | None = None
     caution: str = ""
 
     def is_right(self, tolerance: float) -> bool:
@@ -145,7 +141,7 @@ class Finding:
 
 def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
     """Return the finding of a scene."""
-    metric, picture = record.metrics[LEADING.name], record.picture
+    metric = record.metrics[LEADING.name]
     return Finding(
         scene=record.scene,
         mean=metric.mean,
@@ -154,7 +150,6 @@ def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
         remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
         is_exact=metric.high <= EXACT,
         subject=judged(record).subject,
-        nearest=picture.nearest if picture else None,
         caution=record.caution,
     )
 
@@ -217,8 +212,6 @@ def about(found: Finding, tolerance: float = criterion.TOLERANCE) -> str:
     share = found.beyond[tolerance]
     wrong = f"is visibly wrong in {100 * share:.0f} % of the pixels"
     said = [f"{found.subject} {'looks right here' if found.is_right(tolerance) else wrong}."]
-    if found.nearest:
-        said.append(f"It {nearest_sentence(found.nearest)}.")
     if found.cause:
         said.append(f"It lacks mostly {_noun(found.cause)}.")
     remedy = found.remedies.get(tolerance)
@@ -234,7 +227,7 @@ def about(found: Finding, tolerance: float = criterion.TOLERANCE) -> str:
 
 def advice(findings: Sequence[Finding], tolerance: float = criterion.TOLERANCE) -> list[str]:
     """Return a line for each scene that does not look right: what it lacks, and a remedy."""
-    if not any(found.remedies or found.nearest for found in findings):
+    if not any(found.remedies for found in findings):
         return [f"For causes and remedies, give the same command with {WITH_CAUSES}."]
     lines = []
     for found in findings:
@@ -265,72 +258,3 @@ def ranked(findings: Sequence[Finding]) -> list[str]:
         for part in found.parts:
             sizes[part.effect] += part.size
     return sorted(sizes, key=lambda effect: -sizes[effect])
-
-
-# --- Pictures --------------------------------------------------------------------------------
-
-
-def nearest_lines(record: ComparisonRecord) -> Iterator[str]:
-    """Yield what a picture seems to lack, as a whole and where it departs most; or nothing."""
-    picture = record.picture
-    if not picture or not picture.nearest or not picture.renderings:
-        return
-    yield f"As a whole, the picture {nearest_sentence(picture.nearest)}."
-    for region in record.regions[:1]:
-        if region.nearest:
-            yield (
-                f"Where it departs most ({percent(region.share)} of the error), it"
-                f" {nearest_sentence(region.nearest)}."
-            )
-    yield caution(picture.renderings)
-
-
-def nearest_sentence(nearest: Nearest) -> str:
-    """Return what a picture is nearest to, as the rest of a sentence about it."""
-    away, reference = (difference(value) for value in (nearest.dE2000, nearest.reference_dE2000))
-    if nearest.outcome == "alike":
-        return f"hardly differs from the reference (mean {LEADING.label} {reference})"
-    rendering = _rendering(nearest)
-    if nearest.outcome == "unexplained":
-        return (
-            f"is near none of the renderings: {rendering}, the nearest, is {away} away, the"
-            f" reference {reference}"
-        )
-    following = f"; the next {difference(nearest.next_dE2000)}" if nearest.gap else ""
-    return f"is nearest to {rendering} (mean {LEADING.label} {away}{following})"
-
-
-def lacking(nearest: Nearest | None) -> str:
-    """Return the effects that a part of a picture seems to lack, in a few words."""
-    if nearest is None:
-        return "unknown"
-    if nearest.outcome != "named":
-        return {"alike": "nothing visible", "unexplained": "unexplained"}[nearest.outcome]
-    perhaps = f"perhaps {', '.join(nearest.undecided)}" if nearest.undecided else ""
-    return "; ".join(filter(None, (", ".join(nearest.lacks), perhaps))) or "nothing"
-
-
-def caution(renderings: Renderings) -> str:
-    """Return what a nearest rendering is, and what it is not."""
-    width, height = renderings.resolution
-    return (
-        f"Nearest of {renderings.count} renderings between textbook shading and the reference, at"
-        f" {width} x {height} pixels. This is not an attribution: distances do not add up, and"
-        " other mistakes can look like a missing effect."
-    )
-
-
-def _rendering(nearest: Nearest) -> str:
-    """Name the nearest renderings."""
-    if not nearest.lacks and not nearest.undecided:
-        return "the reference itself"
-    parts = ["textbook shading"]
-    for word, effects in (
-        ("with", nearest.simulates),
-        ("without", nearest.lacks),
-        ("with or without", nearest.undecided),
-    ):
-        if effects:
-            listed = " and ".join(filter(None, (", ".join(effects[:-1]), effects[-1])))
-            parts.append(f"{word} {listed}")
-    return ", ".join(parts)

@@ -19,7 +19,6 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.hybrids.nearness import Nearest
 from reference.records import Amount, Count, Record, Share, Size
 from reference.rendering.gbuffer import ObjectIds
 
@@ -47,9 +46,6 @@ class Region(Record):
     mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
     effect: Annotated[
         str | None, Meta(description="The dominant effect there, in words, if known.")
-    ] = None
-    nearest: Annotated[
-        Nearest | None, Meta(description="The rendering that a picture is nearest to there.")
     ] = None
 
 

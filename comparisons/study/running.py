@@ -33,8 +33,7 @@ from reference.pairing.halves import Pair
 from reference.planning.effects import EFFECTS
 from reference.planning.plan import Plan, physical_integrator
 from reference.rendering import direct
-from reference.rendering.passes import passes
-from reference.rendering.renderer import Progress, Renderer
+from reference.rendering.renderer import Progress, Renderer, passes
 from reference.rendering.sums import Accumulator
 from reference.scene.graph import Graph, set_variant
 from reference.scene.source import Source, digest

@@ -38,8 +38,7 @@ if TYPE_CHECKING:
     "--why/--no-why",
     "with_cost",
     default=True,
-    help="Find causes and remedies, at a small size; of a picture, only what it is nearest to."
-    " [default: why]",
+    help="Find causes and remedies, at a small size; of a picture, none. [default: why]",
 )
 @jobs.open_option
 @click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")

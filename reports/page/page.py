@@ -147,7 +147,7 @@ def _verdict(scenes: Sequence[PageScene]) -> dict[str, Any]:
         "effects": {name: EFFECT_COLOURS[name] for name in names},
         "with_causes": verdict.WITH_CAUSES,
         "has_remedies": any(f.remedies for f in found),
-        "has_causes": any(f.remedies or f.nearest for f in found),
+        "has_causes": any(f.remedies for f in found),
     }
 
 

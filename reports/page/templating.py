@@ -93,8 +93,6 @@ def environment() -> Environment:
         judged=verdict.judged,
         region_view=viewer_data.region_view,
         plain=plain,
-        lacking=verdict.lacking,
-        caution=verdict.caution,
         uri=_data_uri,
         webp_uri=images.webp_uri,
         webp_of=images.webp_of,

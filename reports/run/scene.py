@@ -63,7 +63,7 @@ def compare(
     comparison = compare(case.source, case.options, progress, case.command())
     spent |= _stages(comparison.record, perf_counter() - begin)
     study, begin = None, perf_counter()
-    if job.with_cost:
+    if job.with_cost and not case.options.image:  # no effect can be added to a picture
         comparison, study = _explained(case, progress, comparison, job.coarse)
         spent["cost"] = perf_counter() - begin
     begin = perf_counter()
@@ -94,16 +94,11 @@ def _explained(
     from comparisons.cost.cost import quick
     from comparisons.cost.measure import COARSE, QUICK
     from comparisons.hybrids.dominance import named
-    from comparisons.pictures import likeness
 
-    begin, study, record = perf_counter(), None, comparison.record
+    begin, record, effort = perf_counter(), comparison.record, COARSE if coarse else QUICK
     try:
-        if case.options.image:  # cannot be studied: it is nearest to some rendering
-            record = likeness.with_nearest(comparison, case.source, case.options, progress)
-        else:
-            effort = COARSE if coarse else QUICK
-            study = quick(case.source, case.options, progress, case.command() + " --why", effort)
-            record = named(comparison, study.causes.maps)
+        study = quick(case.source, case.options, progress, case.command() + " --why", effort)
+        record = named(comparison, study.causes.maps)
     except FotismosError as error:
         warnings = (*record.warnings, f"The causes are unknown: {error}")
         return replace(comparison, record=structs.replace(record, warnings=warnings)), None

@@ -15,12 +15,10 @@ from rich.text import Text
 
 from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
 from comparisons.departure.metrics import LEADING, METRICS
-from comparisons.departure.regions import ObjectShare
 from heuristic.heuristics import PHONG
 from reference.records import plain
 from reports.run import results
 from reports.terminal.words import number, percent, seconds, visible
-from reports.verdict import lacking, nearest_lines
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
@@ -206,7 +204,6 @@ def summary(records: Iterable[ComparisonRecord]) -> Iterator[str]:
             yield from _picture(record, record.picture)
     yield from printed(_table(records), right=1)
     for record in records:
-        yield from nearest_lines(record)
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
             yield from record.mistakes
@@ -289,18 +286,12 @@ def shape_lines(record: ComparisonRecord) -> Iterator[str]:
     """Yield the table of a scene's shapes; nothing if there is only one."""
     if len(record.objects) < 2:
         return
-    rows = [
-        ("shape", "lacks" if record.picture else "mostly", "departure", "pixels", "mean ΔE2000")
-    ]
+    rows = [("shape", "mostly", "departure", "pixels", "mean ΔE2000")]
     for carrier in record.objects:
         shares = percent(carrier.share), percent(carrier.pixels / record.pixels.counted)
-        rows.append((carrier.name, _cause(carrier), *shares, number(carrier.mean_dE2000)))
+        rows.append((carrier.name, carrier.effect or "", *shares, number(carrier.mean_dE2000)))
     yield from ("", *printed(rows, right=2))
     yield f"  causes took {percent(record.time.share_of_causes)} of the time; --no-why omits them"
-
-
-def _cause(carrier: ObjectShare) -> str:
-    return lacking(carrier.nearest) if carrier.nearest else carrier.effect or ""
 
 
 def _shares(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:
