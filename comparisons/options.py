@@ -17,7 +17,7 @@ from heuristic.errors import InputError, unknown
 
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
     from comparisons.departure.colour import Viewing
-    from heuristic.interpolation import Interpolation
+    from heuristic.heuristics import Interpolation
     from reference.pairing.factors import Convention
     from reference.pairing.halves import Pair
     from reference.scene.source import Source
@@ -30,7 +30,7 @@ Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Samples = Annotated[int, Meta(ge=2, le=LARGEST_SPP)]  # the noise needs at least 2
 Error = Annotated[float, Meta(gt=0, le=1000)]  # ΔE2000
 Side = Annotated[int, Meta(ge=1, le=2**31 - 1)]
-Fineness = Annotated[int, Meta(ge=1, le=512)]  # heuristic.meshes.FINEST
+Fineness = Annotated[int, Meta(ge=1, le=512)]  # heuristic.tessellation.FINEST
 Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
 
@@ -168,7 +168,7 @@ class Options(
     @property
     def polygon_shading(self) -> Interpolation:
         """How the heuristic half shades polygons."""
-        from heuristic.interpolation import Interpolation
+        from heuristic.heuristics import Interpolation
 
         return Interpolation(self.interpolation or "phong")
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.options import Options
-from heuristic import colours, kernel, lobes, terms, vectors
+from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
 from heuristic.errors import InputError
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from heuristic.materials import COEFFICIENTS, FORMS, Material
 from reference.records import Record
 from reference.rendering.gbuffer import image_size, pixel_rays
@@ -272,7 +272,7 @@ class _Points:
 
     def colours(self, value: Any) -> NDArray[np.float64]:
         """Return a colour of each point, (N, 3)."""
-        value = colours.as_array(value, mi.Vector3f)
+        value = materials.as_array(value, mi.Vector3f)
         value = value[0] if dr.depth_v(value) > 1 and len(value) == 1 else value
         return np.array(mi.Color3f(value) + dr.zeros(mi.Color3f, len(self.hit)), np.float64).T
 
@@ -313,7 +313,7 @@ class _Points:
         cos_incidence = dr.dot(self.normal, toward)
 
         def lobe(material: Material) -> NDArray:
-            cosine = lobes.lobe(material, self.normal, self.view)
+            cosine = vectors.lobe(material, self.normal, self.view)
             cosine = cosine(light, self.position, toward, cos_incidence)
             return self.floats(terms.specular(1, 1, cosine, material.n))[:, None]
 

@@ -17,6 +17,7 @@ from heuristic.convention import Scene
 from heuristic.errors import InputError
 from heuristic.lights import PLUGINS
 from heuristic.materials import COEFFICIENTS, PHYSICAL
+from heuristic.tessellation import RESOLUTION, to_mesh
 from reference.pairing.halves import pair
 from reference.rendering.gbuffer import image_size, pixel_rays
 from reference.scene.source import Source
@@ -146,9 +147,9 @@ def camera(scene: mi.Scene) -> dict:
     }
 
 
-def triangles_of(shape: mi.Shape, material: int, tessellation: int | None) -> Triangles:
-    """Return a shape as the triangles of :func:`heuristic.meshes.to_mesh`."""
-    mesh = meshes.to_mesh(shape, tessellation or meshes.RESOLUTION)
+def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Triangles:
+    """Return a shape as the triangles of :func:`heuristic.tessellation.to_mesh`."""
+    mesh = to_mesh(shape, resolution or RESOLUTION)
     parts = (meshes.POSITIONS, meshes.NORMALS, meshes.TEXCOORDS, meshes.FACES)
     positions, normals, texcoords, faces = (meshes.rows(mesh, part) for part in parts)
     assert positions is not None

@@ -19,7 +19,7 @@ from comparisons.compare import compare
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from heuristic import plugins
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.planning.rules import RULES
 from reference.rendering import direct
 from reference.scene.graph import set_variant

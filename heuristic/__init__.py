@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from heuristic import llvm
-from heuristic.version import __version__
+from heuristic.program import __version__
 
 if TYPE_CHECKING:
     from heuristic.heuristics import Heuristic, Parameter, Range

@@ -13,16 +13,16 @@ Declaration = TypeVar("Declaration")
 class Declared(Mapping[str, Declaration], Generic[Declaration]):
     """All named declarations of one kind, the package's own first.
 
-    ``own`` has them by name, or says where they are, as ``module:object``, and is imported as late
-    as it is read. Installed packages declare theirs by entry points of a group, which are loaded
-    once, when the declarations are listed or a name is not known.
+    ``own`` says where these are, as ``module:object``, imported as late as they are read. Installed
+    packages declare theirs by entry points of a group, which are loaded once, when the declarations
+    are listed or a name is not known.
     """
 
     def __init__(self, kind: str, group: str, **own: str) -> None:
         self.kind, self.group = kind, group
         self._own: dict[str, Any] = {name.replace("_", "-"): place for name, place in own.items()}
         self.added: dict[str, Declaration] = {}
-        self.is_loaded = False
+        self._is_loaded = False
 
     def own(self, declaration: Any) -> Any:
         """Declare what belongs to the package, and return it."""
@@ -43,15 +43,23 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         """Return whether a declaration is the package's own."""
         return declaration.name in self._own and self[declaration.name] is declaration
 
-    @property
-    def built_in(self) -> tuple[str, ...]:
-        """The names of the package's own declarations."""
-        return tuple(self._own)
+    def __getitem__(self, name: str) -> Declaration:
+        if isinstance(self._own.get(name), str):
+            self._own[name] = pkgutil.resolve_name(self._own[name])
+        if name not in self._own and name not in self.added:
+            self._load()
+        return self._own[name] if name in self._own else self.added[name]
 
-    def others(self) -> tuple[Declaration, ...]:
-        """Return the declarations from outside."""
-        entries = () if self.is_loaded else entry_points(group=self.group)
-        for entry in entries:
+    def __iter__(self) -> Iterator[str]:
+        self._load()
+        return iter((*self._own, *self.added))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def _load(self) -> None:
+        """Load the entry points of installed packages."""
+        for entry in () if self._is_loaded else entry_points(group=self.group):
             try:
                 self.declare(entry.load())
             except Exception as error:  # another package's code may raise anything
@@ -59,19 +67,4 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
                     f"{self.kind} {entry.name}: the entry point {entry.value} of {self.group}"
                     f" cannot be loaded: {error}. Repair or uninstall its package."
                 ) from error
-        self.is_loaded = True
-        return tuple(self.added.values())
-
-    def __getitem__(self, name: str) -> Declaration:
-        if isinstance(self._own.get(name), str):
-            self._own[name] = pkgutil.resolve_name(self._own[name])
-        if name not in self._own and name not in self.added:
-            self.others()
-        return self._own[name] if name in self._own else self.added[name]
-
-    def __iter__(self) -> Iterator[str]:
-        self.others()
-        return iter((*self._own, *self.added))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
+        self._is_loaded = True

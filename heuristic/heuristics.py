@@ -1,41 +1,177 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are here, those of engines in :mod:`heuristic.approximations`. Users write a function in a
-file (:mod:`heuristic.user_shaders`, :mod:`heuristic.glsl`); a program calls :func:`declare`; a
-package has an entry point of the group :data:`GROUP` whose object is a :class:`Heuristic`. Flat and
-Gouraud shading are not heuristics: they interpolate any heuristic (:mod:`heuristic.interpolation`).
+``blinn`` are here, those of engines in :mod:`heuristic.shadow_maps` and
+:mod:`heuristic.indirect_light`. Users write a function in a file (:mod:`heuristic.user_shaders`,
+:mod:`heuristic.glsl`); a program calls :func:`declare`; a package has an entry point of the group
+:data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are not heuristics:
+they interpolate any heuristic (:mod:`heuristic.plugins.interpolated`).
 """
 
 import pkgutil
 import re
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
 from hashlib import sha256
 from numbers import Real
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
-from heuristic import user_code
+import drjit as dr
+
+from heuristic import kernel, terms, vectors
+from heuristic.convention import Array
 from heuristic.declared import Declared
 from heuristic.errors import InputError
-from heuristic.materials import check_form
-from heuristic.points import INPUTS, Array, Point, ShadingArguments
+from heuristic.materials import Material, check_form
 
 GROUP = "fotismos.heuristics"
+
+INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "visible")
+"""The possible needs of a heuristic; ``visible`` is a shadow ray to a light."""
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic`` itself; heuristics must use other names."""
 
-LOADERS = {
-    ".py": "heuristic.user_shaders:from_file",
-    ".glsl": "heuristic.glsl.shader_files:from_file",
-}
+LOADERS = {".py": "heuristic.user_shaders:from_file", ".glsl": "heuristic.glsl:from_file"}
 """Functions that read a user's file by its suffix, imported when a name has it."""
 
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
+
+
+class Interpolation(Enum):
+    """The quantity interpolated over a face: none, the intensity, or the normal."""
+
+    FLAT = "flat"
+    GOURAUD = "gouraud"
+    PHONG = "phong"
+
+
+class ShadingArguments(NamedTuple):
+    """The arguments of :func:`heuristic.shade`."""
+
+    position: Array
+    normal: Array
+    view: Array
+    material: Material
+    lights: list[Any]
+    ambient: Array = 0
+    visible: Callable[[Array, Array], Array] | None = None
+
+
+@dataclass(frozen=True)
+class LightAtPoint:
+    """A light as it arrives at a point.
+
+    ``toward`` is the unit vector from the point towards the light, in world space; zero on the
+    light itself. ``distance`` is in units of the scene; infinite for parallel light. ``intensity``
+    is ``I_p``, display-linear, with attenuation and cone: a white diffuse surface that faces the
+    light has this value. If the integrator has ``occlusion``, and the heuristic does not need
+    ``visible``, it is 0 at points that the light does not reach.
+    """
+
+    toward: Array
+    distance: Array
+    intensity: Array
+    _point: "Point"
+
+    def visible(self) -> Array:
+        """Return the mask of points that the light reaches, by a shadow ray (a need)."""
+        self._point.require("visible")
+        ray: Any = self._point.arguments.visible  # there is one, since it was declared
+        return ray(self.toward, self.distance)
+
+
+def _input(read: Callable[["Point"], Any]) -> cached_property:
+    """Make an attribute of :class:`Point` that a heuristic can read if it declares the need."""
+
+    def checked(point: "Point") -> Any:
+        point.require(read.__name__)
+        return read(point)
+
+    return cached_property(checked)
+
+
+@dataclass(frozen=True)
+class Point:
+    """The points to shade, all at once, as read by a heuristic.
+
+    ``parameters`` has the heuristic's as attributes, ``prepared`` is the result of its ``prepare``
+    for the scene. ``wavelengths`` are those of colours in nm: four in spectral variants, otherwise
+    none. Reading what is not among the heuristic's ``needs`` raises InputError.
+    """
+
+    needs: frozenset[str]
+    arguments: ShadingArguments
+    _uv: Array
+    parameters: SimpleNamespace
+    prepared: Any = None
+    wavelengths: Array = ()
+
+    @_input
+    def position(self) -> Array:
+        """Position in world space, in units of the scene."""
+        return self.arguments.position
+
+    @_input
+    def normal(self) -> Array:
+        """Unit shading normal in world space, towards the viewer's side of two-sided surfaces."""
+        return vectors.normalise(self.arguments.normal)
+
+    @_input
+    def view(self) -> Array:
+        """Unit vector towards the viewer, in world space."""
+        return vectors.normalise(self.arguments.view)
+
+    @_input
+    def uv(self) -> Array:
+        """Texture coordinates, two components."""
+        return self._uv
+
+    @_input
+    def material(self) -> Material:
+        """The material of the surface, a :class:`heuristic.materials.PairedMaterial`.
+
+        ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
+        ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
+        """
+        material = self.arguments.material
+        if not material.normalised:
+            return material
+        k_s = material.k_s * terms.normalisation(material.form, material.n)
+        return replace(material, k_s=k_s, normalised=False)
+
+    @_input
+    def ambient(self) -> Array:
+        """``I_a``, display-linear."""
+        return self.arguments.ambient
+
+    @_input
+    def lights(self) -> tuple[LightAtPoint, ...]:
+        """The scene's lights at the points, in the order of the scene."""
+        return tuple(map(self._light, self.arguments.lights))
+
+    def textbook(self, **instead: Any) -> Array:
+        """Return the chapters' model at the points, :func:`heuristic.shade`.
+
+        Named arguments replace those given there, such as ``ambient=0``.
+        """
+        return kernel.shade(*self.arguments._replace(**instead))
+
+    def _light(self, light: Any) -> LightAtPoint:
+        toward, intensity, distance = light.illuminate(self.arguments.position)
+        if self.arguments.visible is not None and "visible" not in self.needs:
+            intensity = dr.select(self.arguments.visible(toward, distance), intensity, 0)
+        return LightAtPoint(toward, distance, intensity, self)
+
+    def require(self, name: str) -> None:
+        """Raise InputError for an input that is not among the heuristic's needs."""
+        if name not in self.needs:
+            raise InputError(f"{name!r} is read, but not declared: add it to the needs.")
 
 
 @dataclass(frozen=True)
@@ -83,40 +219,27 @@ class Parameter:
 class Heuristic:
     """A way to shade the heuristic half.
 
-    Parameters
-    ----------
-    name
-        Used in commands, records and messages: lower case, digits and hyphens; or
-        ``FILE.py:function`` or ``FILE.glsl`` for one in a file.
-    shade
-        ``shade(point)`` takes a :class:`Point` and returns the display-linear colour that the
-        viewer sees, a Dr.Jit float or colour of the current variant. It is traced, not called per
-        point: use ``drjit.select``, not Python's ``if``, on arrays.
-    label
-        For people; the name if omitted.
-    needs
-        Which of :data:`INPUTS` it reads; all but ``visible`` if omitted. A heuristic that needs
-        ``visible`` casts its own shadows; for others the integrator may (``occlusion``).
-    parameters
-        Numbers that tune it.
-    prepare
-        ``prepare(scene)`` is called once for a Mitsuba scene, before its first sample, and returns
-        anything: a table, a depth image. Later edits of the scene do not call it again. Parameters
-        that are ``prepared`` are keyword arguments.
-    refuse
-        ``refuse(scene)`` returns why it cannot shade a scene, such as "there is no environment";
-        empty if it can.
-    form
-        Form of the specular lobe for all materials; None for each material's own.
-    reads
-        What it read on trial (:func:`heuristic.user_shaders.examine`), such as ``material.k_d``.
-    files, code
-        The user's files that it depends on, and a digest of their content.
-    traced
-        Whether Dr.Jit can record ``shade``. A function that evaluates its arrays is called in
-        evaluated loops, and has no derivatives.
-    remarks
-        Warnings that every record of it carries.
+    ===========  ===================================================================================
+    name         used in commands, records and messages: lower case, digits and hyphens; or
+                 ``FILE.py:function`` or ``FILE.glsl`` for one in a file
+    shade        takes a :class:`Point` and returns the display-linear colour that the viewer sees,
+                 a Dr.Jit float or colour of the current variant. It is traced, not called per
+                 point: use ``drjit.select``, not Python's ``if``, on arrays
+    label        for people; the name if omitted
+    needs        which of :data:`INPUTS` it reads. A heuristic that needs ``visible`` casts its own
+                 shadows; for others the integrator may (``occlusion``)
+    parameters   numbers that tune it
+    prepare      ``prepare(scene)`` is called once for a Mitsuba scene, before its first sample, and
+                 returns anything: a table, a depth image. Later edits of the scene do not call it
+                 again. Parameters that are ``prepared`` are keyword arguments
+    form         form of the specular lobe for all materials; None for each material's own
+    refuse       ``refuse(scene)`` returns why it cannot shade a scene; empty if it can
+    reads        what it read on trial (:func:`heuristic.user_shaders.examine`)
+    files, code  the user's files that it depends on, and a digest of their content
+    traced       whether Dr.Jit can record ``shade``; otherwise it is called in evaluated loops, and
+                 has no derivatives
+    remarks      warnings that every record of it carries
+    ===========  ===================================================================================
     """
 
     name: str
@@ -177,7 +300,11 @@ class Heuristic:
         """Return the colour at points; InputError if a user's heuristic fails or returns none."""
         tuned = SimpleNamespace(**parameters)
         point = Point(self.needs, arguments, uv, tuned, prepared, wavelengths)
-        return self.shade(point) if self.is_own else user_code.shaded(self.name, self.shade, point)
+        if self.is_own:
+            return self.shade(point)
+        from heuristic.user_shaders import shaded  # loaded late: the package's own need no checks
+
+        return shaded(self.name, self.shade, point)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -195,10 +322,10 @@ HEURISTICS: Declared[Heuristic] = Declared(
     GROUP,
     phong="heuristic.heuristics:PHONG",
     blinn="heuristic.heuristics:BLINN",
-    shadow_map="heuristic.approximations.shadow_maps:HARD",
-    soft_shadow_map="heuristic.approximations.shadow_maps:SOFT",
-    mean_ambient="heuristic.approximations.ambient:MEAN",
-    hemisphere_ambient="heuristic.approximations.ambient:HEMISPHERE",
+    shadow_map="heuristic.shadow_maps:HARD",
+    soft_shadow_map="heuristic.shadow_maps:SOFT",
+    mean_ambient="heuristic.indirect_light:MEAN",
+    hemisphere_ambient="heuristic.indirect_light:HEMISPHERE",
 )
 """All heuristics, by name."""
 
@@ -240,14 +367,6 @@ def in_file(name: str) -> tuple[str, str] | None:
     """
     match = _FILE.fullmatch(name)
     return match and (match[1] or match[3], match[2] or "")
-
-
-def files_of(name: str) -> tuple[Path, ...]:
-    """Return the user's files that a heuristic depends on: its file, and modules that it imports.
-
-    Empty for one that the package, another package or a program declares.
-    """
-    return named(name).files
 
 
 def content_digest(files: Iterable[Path]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from heuristic import colours, lobes, numerics, terms, vectors
+from heuristic import materials, numerics, terms, vectors
 from heuristic.convention import Array, Colour, Mask, Position, Vector
 from heuristic.errors import InputError
 from heuristic.lights import Light
@@ -76,20 +76,20 @@ def shade(
     if not isinstance(material, Material):
         raise InputError(f"material is {_kind(material)}: give a heuristic.Material.")
     visible = _checked_visibility(visible)
-    ambient = colours.checked("ambient", ambient)
+    ambient = materials.checked_colour("ambient", ambient)
     _check_sizes((position, normal, view), material, lights, ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
     own = {f"lights[{i}].intensity": light.intensity for i, light in enumerate(lights)}
-    colours.common_wavelength_count(values | own)
+    materials.common_wavelength_count(values | own)
     vector_type = type(position)
     k_i, k_a, k_d, k_s, ambient = (
-        colours.as_array(value, vector_type) for value in values.values()
+        materials.as_array(value, vector_type) for value in values.values()
     )
 
     present = []
-    if not colours.is_zero(material.k_i):
+    if not materials.is_zero(material.k_i):
         present.append(terms.emission(k_i))
-    if not (colours.is_zero(material.k_a) or colours.is_zero(ambient)):
+    if not (materials.is_zero(material.k_a) or materials.is_zero(ambient)):
         present.append(terms.ambient(ambient, k_a))
     if lights:
         if material.normalised:
@@ -129,15 +129,15 @@ def sum_lights(
     so compile time, kernel size and memory do not grow with their number. They are unrolled if
     there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or call).
     """
-    has_diffuse = not colours.is_zero(material.k_d)
-    has_specular = not colours.is_zero(material.k_s)
+    has_diffuse = not materials.is_zero(material.k_d)
+    has_specular = not materials.is_zero(material.k_s)
     if not (has_diffuse or has_specular):
         return None, None
     in_blocks = (
         len(lights) > BLOCK and dr.is_jit_v(position) and not dr.flag(dr.JitFlag.SymbolicScope)
     )
     blocks = _blocks(lights, type(position)) if in_blocks else _portions(lights)
-    lobe = lobes.lobe(material, normal, view) if has_specular else None
+    lobe = vectors.lobe(material, normal, view) if has_specular else None
     normal = vectors.normalise(normal)
     sums: dict[str, tuple[Array, Array]] = {}
     for block in blocks:

@@ -16,13 +16,17 @@ from typing import Any, ClassVar, NamedTuple, Self
 import drjit as dr
 import numpy as np
 
-from heuristic import colours, numerics, terms, vectors
+from heuristic import materials, numerics, terms, vectors
 from heuristic.convention import Colour, Direction, Number, Position, Vector
 from heuristic.errors import InputError
 from heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)
+
+FAR = 1e8
+"""Where shadow rays of parallel light end: outside any scene. A Python plugin does not learn the
+size of the scene from Mitsuba, and rays of this length still keep their direction to 1e-7."""
 
 
 class Arrival(NamedTuple):
@@ -65,7 +69,7 @@ class Light:
 
     def structure(self) -> tuple:
         """Return what determines the light's instructions, apart from its numbers; hashable."""
-        return type(self), colours.wavelength_count(self.intensity), *self.compiled().items()
+        return type(self), materials.wavelength_count(self.intensity), *self.compiled().items()
 
     def numbers(self) -> dict[str, Any]:
         """Return the fields that are numbers, or tuples of them, and not compiled in."""
@@ -84,7 +88,7 @@ class Light:
         for name in {"position", "direction"} & fetched.keys():
             fetched[name] = vector_type(fetched[name])
         if "intensity" in fetched:
-            fetched["intensity"] = colours.as_array(fetched["intensity"], vector_type)
+            fetched["intensity"] = materials.as_array(fetched["intensity"], vector_type)
         light: Any = self
         return replace(light, **fetched)
 
@@ -106,7 +110,7 @@ class DirectionalLight(Light):
         """Return ``L = -direction / |direction|`` and ``I_p``."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
-        return Arrival(toward, colours.as_array(self.intensity, vector_type), inf)
+        return Arrival(toward, materials.as_array(self.intensity, vector_type), inf)
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return -numerics.wide_unit(type(position)(self.direction)), 1
@@ -124,7 +128,7 @@ class _LightFromPoint(Light):
         """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), within the cone of a spot (6.3)."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
-        intensity = colours.as_array(self.intensity, vector_type) * self.cone(toward)
+        intensity = materials.as_array(self.intensity, vector_type) * self.cone(toward)
         if not is_unattenuated(self.attenuation):
             law: Callable[..., Colour]
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
@@ -264,7 +268,7 @@ def _flag(name: str, value: Any) -> bool:
 CHECKS: dict[str, Callable[[Any], Any]] = {
     "position": partial(_triple, "position"),
     "direction": _direction,
-    "intensity": partial(colours.checked, "intensity"),
+    "intensity": partial(materials.checked_colour, "intensity"),
     "cutoff": partial(
         _number,
         "cutoff",

@@ -1,11 +1,35 @@
-"""How the program was started, so users can paste the commands that it prints."""
+"""The program: its version, a digest of its sources, and the commands that it prints."""
 
+import hashlib
 import os
 import shlex
 import sys
+from functools import lru_cache
+from pathlib import Path
+
+__version__ = "0.2.0"
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("heuristic", "reference", "comparisons", "reports")
 
 VARIABLE = "FOTISMOS_PROGRAM"
 """Environment variable with the words that start the program, such as ``./run``."""
+
+
+@lru_cache
+def source_digest() -> str:
+    """Return a digest of the sources where fotismos runs from a checkout; empty if installed."""
+    return digest_of(ROOT) if (ROOT / "pyproject.toml").is_file() else ""
+
+
+def digest_of(root: Path) -> str:
+    """Return a digest of all files in the rooms of a checkout."""
+    found = hashlib.sha256()
+    for path in sorted(path for room in ROOMS for path in (root / room).rglob("*.*")):
+        if "__pycache__" not in path.parts and path.is_file():
+            found.update(f"{path.relative_to(root)}\0".encode())
+            found.update(hashlib.sha256(path.read_bytes()).digest())
+    return found.hexdigest()
 
 
 def program() -> list[str]:

@@ -9,16 +9,11 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
-import numpy as np
-
-from heuristic.errors import FotismosError, InputError, suggestion
-from heuristic.points import Point
-from heuristic.version import ROOMS, ROOT
+from heuristic.errors import suggestion
+from heuristic.program import ROOMS, ROOT
 
 CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 """What a user's code calls the objects of these classes."""
@@ -76,8 +71,8 @@ def error_text(error: BaseException) -> str:
     """Return what went wrong, after the user's file and line if known."""
     place = _place(error)
     where = f"{place[0]}, line {place[1]}: " if place else ""
-    message = error.msg if isinstance(error, SyntaxError) else str(_first(error))
-    first = _first(error)
+    message = error.msg if isinstance(error, SyntaxError) else str(first_error(error))
+    first = first_error(error)
     if isinstance(first, AttributeError) and first.name:
         names = [each for each in dir(first.obj) if each[0] != "_"]
         if kind := CALLED.get(type(first.obj).__name__):
@@ -98,14 +93,14 @@ def _place(error: BaseException) -> tuple[str, int] | None:
     """Return the innermost line of a user's code that led to an error."""
     if isinstance(error, SyntaxError) and error.filename:
         return _shown(error.filename), error.lineno or 1
-    for each in (_first(error), error):
+    for each in (first_error(error), error):
         for frame in reversed(traceback.extract_tb(each.__traceback__)):
             if not frame.filename.startswith("<") and is_users(Path(frame.filename)):
                 return _shown(frame.filename), frame.lineno or 1
     return None
 
 
-def _first(error: BaseException) -> BaseException:
+def first_error(error: BaseException) -> BaseException:
     """Return the first error of a chain: Dr.Jit raises its own from a user's."""
     while error.__cause__ is not None:
         error = error.__cause__
@@ -116,59 +111,3 @@ def _shown(file: str) -> str:
     """Return a file's path, relative to the current folder if it lies below."""
     path = Path(file)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
-
-
-def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
-    """Return the colour that a user's function gives at points, as a spectrum of the variant.
-
-    InputError names file and line if it fails or does not return a colour.
-    """
-    import mitsuba as mi  # errors of scripts are told without it
-
-    try:
-        value = shade(point)
-    except FotismosError as error:
-        where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
-        raise type(error)(f"{where if line else ''}{error}") from error
-    except (Exception, SystemExit) as error:  # a user's code may raise anything
-        raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
-    if isinstance(value, Real) and not isinstance(value, bool):
-        return mi.Spectrum(value)
-    components = dr.size_v(mi.Spectrum)
-    returned = f"{place_of(shade)}: heuristic {name} returned"
-    expected = (
-        f"return one colour per point, as a Dr.Jit array: a mitsuba.Spectrum of {components}"
-        " components, or a mitsuba.Float"
-    )
-    is_array = dr.is_array_v(value) and dr.is_jit_v(value) and dr.is_float_v(value)
-    depth = dr.depth_v(value) if is_array else 0
-    if not (depth == 1 or (depth == 2 and dr.size_v(value) == components)):
-        raise InputError(f"{returned} {_kind(value)}; {expected}.")
-    if not dr.flag(dr.JitFlag.SymbolicScope):
-        width, points = dr.width(value), dr.width(point.arguments.position)
-        if width not in (1, points):
-            raise InputError(f"{returned} {width} values for {points} points; {expected}.")
-    return mi.Spectrum(value)
-
-
-def _kind(value: Any) -> str:
-    kind = f"{type(value).__module__}.{type(value).__qualname__}".replace("builtins.", "")
-    if isinstance(value, (list, tuple)):
-        return f"a {kind} of {len(value)}"
-    if isinstance(value, np.ndarray):
-        return f"a {kind} of shape {value.shape}"
-    return "None" if value is None else f"a {kind}"
-
-
-def _advice(error: BaseException) -> str:
-    """Return advice for the most frequent mistakes: a branch on an array, and NumPy."""
-    text = f"{error} {_first(error)}"
-    if "not aligned" in text:  # NumPy's words
-        return " For arrays of Dr.Jit use drjit.dot in place of numpy.dot."
-    if "bool" in text:
-        return (
-            " All points are shaded at once: in place of `if` use drjit.select(condition, a, b),"
-            " in place of `and`, `or` and `not` the operators &, | and ~, in place of max()"
-            " drjit.maximum()."
-        )
-    return ""

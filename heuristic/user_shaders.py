@@ -34,12 +34,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.random import default_rng
 
-from heuristic.errors import InputError, suggestion
-from heuristic.heuristics import Heuristic, Parameter, Range, content_digest, in_file
+from heuristic.errors import FotismosError, InputError, suggestion
+from heuristic.heuristics import (
+    INPUTS,
+    Heuristic,
+    Parameter,
+    Point,
+    Range,
+    ShadingArguments,
+    content_digest,
+    in_file,
+)
 from heuristic.lights import DirectionalLight, PointLight
 from heuristic.materials import PairedMaterial
-from heuristic.points import INPUTS, Point, ShadingArguments
-from heuristic.user_code import contained, error_text, place_of, shaded
+from heuristic.user_code import contained, error_text, first_error, place_of
 
 FUNCTION = "shade"
 """Name of the function, if omitted."""
@@ -106,9 +114,8 @@ def _missing(names: dict[str, Any], function: str, path: Path) -> InputError:
 def of_function(function: Any, name: str, label: str = "") -> Heuristic:
     """Return a user's function or object as a heuristic, after a trial.
 
-    The function takes a :class:`heuristic.points.Point`, and numbers with a default: these are the
-    parameters, and a :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps
-    its own label.
+    The function takes a :class:`Point`, and numbers with a default: these are the parameters, and a
+    :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps its own label.
     """
     if isinstance(function, Heuristic):
         own = replace(function, name=name)
@@ -165,10 +172,64 @@ def _unusable(function: Callable[..., Any], reason: str) -> InputError:
     )
 
 
+def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
+    """Return the colour that a user's function gives at points, as a spectrum of the variant.
+
+    InputError names file and line if it fails or does not return a colour.
+    """
+    try:
+        value = shade(point)
+    except FotismosError as error:
+        where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
+        raise type(error)(f"{where if line else ''}{error}") from error
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return mi.Spectrum(value)
+    components = dr.size_v(mi.Spectrum)
+    returned = f"{place_of(shade)}: heuristic {name} returned"
+    expected = (
+        f"return one colour per point, as a Dr.Jit array: a mitsuba.Spectrum of {components}"
+        " components, or a mitsuba.Float"
+    )
+    is_array = dr.is_array_v(value) and dr.is_jit_v(value) and dr.is_float_v(value)
+    depth = dr.depth_v(value) if is_array else 0
+    if not (depth == 1 or (depth == 2 and dr.size_v(value) == components)):
+        raise InputError(f"{returned} {_kind(value)}; {expected}.")
+    if not dr.flag(dr.JitFlag.SymbolicScope):
+        width, points = dr.width(value), dr.width(point.arguments.position)
+        if width not in (1, points):
+            raise InputError(f"{returned} {width} values for {points} points; {expected}.")
+    return mi.Spectrum(value)
+
+
+def _kind(value: Any) -> str:
+    kind = f"{type(value).__module__}.{type(value).__qualname__}".replace("builtins.", "")
+    if isinstance(value, (list, tuple)):
+        return f"a {kind} of {len(value)}"
+    if isinstance(value, np.ndarray):
+        return f"a {kind} of shape {value.shape}"
+    return "None" if value is None else f"a {kind}"
+
+
+def _advice(error: BaseException) -> str:
+    """Return advice for the most frequent mistakes: a branch on an array, and NumPy."""
+    text = f"{error} {first_error(error)}"
+    if "not aligned" in text:  # NumPy's words
+        return " For arrays of Dr.Jit use drjit.dot in place of numpy.dot."
+    if "bool" in text:
+        return (
+            " All points are shaded at once: in place of `if` use drjit.select(condition, a, b),"
+            " in place of `and`, `or` and `not` the operators &, | and ~, in place of max()"
+            " drjit.maximum()."
+        )
+    return ""
+
+
 def examine(heuristic: Heuristic) -> tuple[str, ...]:
     """Try a heuristic, and return what it reads.
 
-    Inputs have the names of :data:`heuristic.points.INPUTS`; the parts of the material are named
+    Inputs are those of :data:`heuristic.heuristics.INPUTS`; the parts of the material are named,
     too, such as ``material.k_d``. InputError if it fails, or returns something that is not a
     colour, not finite or negative.
     """

@@ -18,8 +18,7 @@ from click.shell_completion import get_completion_class
 from comparisons.processes import interruption
 from heuristic import llvm
 from heuristic.errors import FotismosError, InputError, suggestion
-from heuristic.program import program
-from heuristic.version import __version__
+from heuristic.program import __version__, program
 from reports import jobs
 from reports.terminal.words import echo
 

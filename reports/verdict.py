@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure import criterion
 from comparisons.departure.metrics import LEADING
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.planning.effects import EFFECTS
 from reports.charts.theme import EFFECT_COLOURS
 from reports.terminal.words import seconds

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from comparisons.gallery.builtin import SCENES
-from heuristic import meshes
-from heuristic.approximations import ambient, indirect, shadow_maps
+from heuristic import indirect_light, shadow_maps, tessellation
 from heuristic.errors import InputError
 from heuristic.heuristics import named
 from reference.pairing.halves import pair
@@ -57,7 +56,7 @@ def integrating_sphere(k_d):
 def test_an_integrating_sphere_has_the_light_of_its_closed_form(variant):
     """It is lit alike everywhere, so ``I = rho (I_p + I)`` and ``I = I_p rho / (1 - rho)``."""
     scene = mi.load_dict(integrating_sphere(0.5))
-    found, again = indirect.gather(scene), indirect.gather(scene)
+    found, again = indirect_light.gather(scene), indirect_light.gather(scene)
     np.testing.assert_allclose(found.mean(), 3 / 4 * 0.5 / (1 - 0.5), rtol=0.01)
     np.testing.assert_allclose(found.k_d, 0.5, rtol=0.02)
     np.testing.assert_array_equal(found.arriving, again.arriving)
@@ -82,7 +81,7 @@ def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
 def test_an_environment_replaces_ambient_light_and_is_gathered_where_nothing_hides_it(rgb):
     """A sphere under an even sky receives it everywhere, whatever ``I_a`` says."""
     scene = mi.load_dict(sky_above(lambda toward: np.full((len(toward), 3), 0.25)))
-    assert indirect.gather(scene).mean() == pytest.approx(0.25, rel=0.005)
+    assert indirect_light.gather(scene).mean() == pytest.approx(0.25, rel=0.005)
     for model in AMBIENT:
         shown = image(scene, model, ambient=9.0)[16, 16]
         assert shown == pytest.approx(0.25 * 0.8, rel=0.01), model
@@ -135,14 +134,14 @@ def test_a_sun_is_gathered_without_noise(rgb):
         return 500.0 * (np.arange(len(toward)) == nearest)[:, None] * np.ones(3)
 
     means = [
-        indirect.gather(mi.load_dict(sky_above(sun, height=height))).mean() * height**2
+        indirect_light.gather(mi.load_dict(sky_above(sun, height=height))).mean() * height**2
         for height in (32, 64)
     ]
     np.testing.assert_allclose(*means, rtol=0.15)
 
 
 def test_sky_and_ground_are_found_again(rgb):
-    prepared = ambient.prepare(mi.load_dict(sky_above(two_colours)))
+    prepared = indirect_light.prepare(mi.load_dict(sky_above(two_colours)))
     assert list(prepared.up) == [0, 0, 1]
     for table, end in ((prepared.sky, 1), (prepared.ground, -1)):
         (expected,) = two_colours(np.array([(0, 0, end)]))
@@ -156,8 +155,10 @@ def test_a_fit_keeps_the_mean_and_is_not_negative():
         normal = random.normal(size=(count, 3)) if case % 3 else np.ones((count, 3))
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         arriving, k_d = random.random((2, count, 3)) ** 4
-        found = indirect.GatheredLight(normal, arriving, k_d * (random.random((count, 3)) < 0.8))
-        sky, ground = ambient.fit(found, np.array((0.0, 0.0, 1.0)))
+        found = indirect_light.GatheredLight(
+            normal, arriving, k_d * (random.random((count, 3)) < 0.8)
+        )
+        sky, ground = indirect_light.fit(found, np.array((0.0, 0.0, 1.0)))
         assert min(sky.min(), ground.min()) >= 0
         fitted = sky * (1 + normal[:, 2:]) / 2 + ground * (1 - normal[:, 2:]) / 2
         mean = dataclasses.replace(found, arriving=fitted).mean()
@@ -399,7 +400,7 @@ def test_vertices_and_faces_are_shaded_too_and_later_passes_replay_the_first(rgb
     given = sky_above(two_colours, ambient=0.25)
     given["lamp"] = {"type": "heuristic_directional", "direction": (1, 2, -1)}
     scene = mi.load_dict(given)
-    given["ball"] = meshes.to_mesh(mi.load_dict(given["ball"]), 24)
+    given["ball"] = tessellation.to_mesh(mi.load_dict(given["ball"]), 24)
     polygons = mi.load_dict(given)
     for model in MODELS:
         integrator = mi.load_dict({"type": "heuristic", "model": model})

@@ -22,7 +22,7 @@ from comparisons.hybrids.hybrids import LEAST_SPP, PREVIEW, HybridImages, Hybrid
 from comparisons.options import Options
 from comparisons.prepared import guarded, prepare
 from heuristic.errors import InputError
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.planning.effects import EFFECTS, OCCLUSION, labelled
 from reference.rendering.renderer import Stream, passes
 from reference.rendering.sums import Accumulator

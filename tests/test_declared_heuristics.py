@@ -13,8 +13,16 @@ from comparisons.gallery.builtin import SCENES
 from heuristic import kernel, meshes
 from heuristic.declared import Declared
 from heuristic.errors import InputError
-from heuristic.heuristics import BLINN, HEURISTICS, PHONG, Heuristic, Parameter, declare, named
-from heuristic.points import Point
+from heuristic.heuristics import (
+    BLINN,
+    HEURISTICS,
+    PHONG,
+    Heuristic,
+    Parameter,
+    Point,
+    declare,
+    named,
+)
 from reference.pairing import halves
 from reference.rendering.renderer import Renderer
 from tests import checks, oracle

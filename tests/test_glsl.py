@@ -3,7 +3,6 @@
 import json
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import drjit as dr
@@ -16,11 +15,9 @@ from comparisons.compare import compare
 from comparisons.fit.fit import fit
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from heuristic import program, user_shaders
+from heuristic import glsl, program, user_shaders
 from heuristic.errors import InputError, InstallationError
-from heuristic.glsl import shader_files, shader_text
-from heuristic.heuristics import Heuristic, named
-from heuristic.points import INPUTS
+from heuristic.heuristics import INPUTS, Heuristic, named
 from reports.commands import doctor
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
@@ -31,7 +28,7 @@ SMALL = {"resolution": (24, 24), "spp": 8}
 def without_opengl():
     """Return why no shader can be run here; empty where one can."""
     try:
-        shader_files.opengl()
+        glsl.opengl()
     except InstallationError as error:
         return str(error)
     return ""
@@ -49,7 +46,7 @@ def image(scene, name, **more):
 
 def points(text, needs=INPUTS):
     """Return a shader, and the points of a trial."""
-    shader = shader_files.Shader("mine.glsl", text)
+    shader = glsl.Shader("mine.glsl", text)
     return shader, user_shaders.trial_points(Heuristic("mine.glsl", shader, needs=frozenset(needs)))
 
 
@@ -104,11 +101,11 @@ def room(lights, **bsdf):
 
 @opengl
 def test_any_number_of_lights(rgb):
-    for lights in (0, 1, shader_files.LIGHTS):
+    for lights in (0, 1, glsl.LIGHTS):
         own, theirs = (image(room(lights), name) for name in ("phong", PHONG))
         np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5)
     with pytest.raises(InputError, match=r"phong\.glsl: the scene has 65 lights; .* at most 64"):
-        image(room(shader_files.LIGHTS + 1), PHONG)
+        image(room(glsl.LIGHTS + 1), PHONG)
 
 
 @opengl
@@ -143,7 +140,7 @@ def shown(colour):
 
 FIELDS = (
     [(name, name) for name in ("position", "normal", "view", "ambient")]
-    + [(f"material.{name}", f"material.{name}") for name in shader_text.MATERIAL]
+    + [(f"material.{name}", f"material.{name}") for name in glsl.MATERIAL]
     + [
         (f"lights[{number}].{name}", f"lights[{number}].{name}")
         for number in (0, 1)
@@ -155,8 +152,8 @@ FIELDS = (
 
 @opengl
 def test_each_field_arrives_as_it_is(rgb):
-    for glsl, field in FIELDS:
-        shader, point = points(returning(f"point.{glsl}"))
+    for name, field in FIELDS:
+        shader, point = points(returning(f"point.{name}"))
         expected = eval(f"point.{field}", {"point": point})
         if field == "uv":
             expected = mi.Spectrum(expected.x, expected.y, 0.25)
@@ -169,7 +166,7 @@ def test_each_field_arrives_as_it_is(rgb):
 def test_points_are_shaded_in_portions(rgb, monkeypatch):
     shader, point = points(returning("point.position * point.material.n"))
     whole = shown(shader(point))
-    monkeypatch.setattr(shader_files, "POINTS", 100)
+    monkeypatch.setattr(glsl, "POINTS", 100)
     np.testing.assert_array_equal(shown(shader(point)), whole)
     assert len(np.unique(whole)) > user_shaders.POINTS
 
@@ -233,7 +230,7 @@ def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
     Path("noise.glsl").write_bytes(b"\xff\xfe\x00vec3")
     with pytest.raises(InputError, match=r"noise\.glsl is not text in UTF-8"):
         named("noise.glsl")
-    Path("long.glsl").write_bytes(b" " * (shader_files.LARGEST + 1))
+    Path("long.glsl").write_bytes(b" " * (glsl.LARGEST + 1))
     with pytest.raises(InputError, match=r"long\.glsl: 1048577 bytes are too long"):
         named("long.glsl")
 
@@ -270,12 +267,12 @@ LOGS = {
 
 def test_places_of_several_compilers_are_read():
     for log in LOGS.values():
-        told = shader_text.explained(log, "a.glsl", "one\ntwo")
+        told = glsl.explained(log, "a.glsl", "one\ntwo")
         assert "a.glsl, line 2: " in told
         assert "oops" in told
         assert "a.glsl, at its end: " in told
     log = "0:1(2): warning: unused\n0:2(9): error: undeclared\n0:2(1): error: no match\n"
-    assert shader_text.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: undeclared"
+    assert glsl.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: undeclared"
 
 
 # --- Where it runs -------------------------------------------------------------------------------
@@ -283,15 +280,10 @@ def test_places_of_several_compilers_are_read():
 
 @opengl
 def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
-    device = shader_files.opengl()
     name = written(returning("0.5"), "mine.glsl")
     for renderer, is_software in (("llvmpipe (LLVM 15)", True), ("NVIDIA L4", False)):
-        monkeypatch.setattr(
-            shader_files._kept,
-            "device",
-            (shader_files.os.getpid(), replace(device, renderer=renderer)),
-        )
-        monkeypatch.setattr(shader_files, "_known", {})
+        monkeypatch.setattr(glsl, "device", lambda shown=(renderer, is_software): shown)
+        monkeypatch.setattr(glsl, "_known", {})
         case = open_case("fig-8-9", Options(heuristic=name, **SMALL))
         assert ("software GPU" in named(name).label) == is_software
         warnings = compare(case.source, case.options).record.warnings
@@ -300,9 +292,9 @@ def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
 
 def test_without_moderngl_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    monkeypatch.setattr(shader_files, "_kept", shader_files.threading.local())
+    monkeypatch.setattr(glsl, "_kept", glsl.threading.local())
     with pytest.raises(InstallationError, match=re.escape(program.installation("moderngl"))):
-        shader_files.opengl()
+        glsl.opengl()
     assert "pip install" in doctor.shaded()
 
 
@@ -313,9 +305,9 @@ def test_without_a_driver_it_says_what_to_install(monkeypatch):
         raise OSError("libEGL.so is not there")
 
     monkeypatch.setattr(moderngl, "create_context", fail)
-    monkeypatch.setattr(shader_files, "_kept", shader_files.threading.local())
+    monkeypatch.setattr(glsl, "_kept", glsl.threading.local())
     with pytest.raises(InstallationError, match="apt-get install libegl1 libgl1-mesa-dri"):
-        shader_files.opengl()
+        glsl.opengl()
 
 
 WRAPPED = """uniform float wrap = 0.5;  // 0 to 1

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade
 from heuristic.errors import InputError
-from heuristic.interpolation import (
+from heuristic.normals import WEIGHTINGS
+from heuristic.plugins.interpolated import (
     Interpolation,
     MeshCorners,
     barycentric_coordinates,
@@ -22,7 +23,6 @@ from heuristic.interpolation import (
     shading_points,
     stored_shade,
 )
-from heuristic.normals import WEIGHTINGS
 from reference import Source
 from reference.pairing.halves import pair
 from reference.scene.source import collect_messages

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import heuristic
-from heuristic import kernel, lobes, numerics, terms, vectors
+from heuristic import kernel, numerics, terms, vectors
 from tests import checks, oracle
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
@@ -209,7 +209,7 @@ def test_the_lobe_between_local_directions_is_that_in_space():
     wi, wo = np.abs(rng.normal(size=(2, 3, 100)))
     for form in ("phong", "blinn"):
         for is_moderate in (False, True):
-            cosine = lobes.local_lobe(form, is_moderate, Array3f(wi), Array3f(wo))
+            cosine = vectors.local_lobe(form, is_moderate, Array3f(wi), Array3f(wo))
             cosine = cosine if is_moderate else cosine.value
             a, b = wi / np.linalg.norm(wi, axis=0), wo / np.linalg.norm(wo, axis=0)
             half = a + b

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-import heuristic.version
+import heuristic.program
 from comparisons import atomic
 from heuristic.errors import InputError, OutputError
 from reports.run import results, scene
@@ -49,7 +49,7 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     record.unlink()
     assert rendered(run, scene_file, out)
     with monkeypatch.context() as patched:
-        patched.setattr(heuristic.version, "source_digest", lambda: "terms.diffuse, halved")
+        patched.setattr(heuristic.program, "source_digest", lambda: "terms.diffuse, halved")
         assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
     for more in (("--fresh",), ("--seed", 1), ("--noise", 9)):
         assert rendered(run, scene_file, out, *more)
@@ -69,7 +69,7 @@ def test_the_digest_of_sources_changes_with_them(tmp_path):
     for text in ("a = 1", "a = 2"):
         (tmp_path / "heuristic").mkdir(exist_ok=True)
         (tmp_path / "heuristic/terms.py").write_text(text)
-        digests.add(heuristic.version.digest_of(tmp_path))
+        digests.add(heuristic.program.digest_of(tmp_path))
     assert len(digests) == 2
 
 

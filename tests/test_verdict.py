@@ -4,8 +4,7 @@ import pytest
 from msgspec import structs
 
 from comparisons.departure.metrics import LEADING
-from heuristic.heuristics import HEURISTICS
-from heuristic.points import Point
+from heuristic.heuristics import HEURISTICS, Point
 from reports import verdict
 from reports.terminal import tables
 from tests import cost_records, records

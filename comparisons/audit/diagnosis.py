@@ -21,10 +21,9 @@ from comparisons.departure.colour import from_srgb, to_srgb
 from comparisons.hard.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from comparisons.pictures.picture_warnings import MISREADINGS, Misreading, factor_of_pi
 from heuristic import heuristics
-from heuristic.heuristics import Heuristic
+from heuristic.heuristics import Heuristic, ShadingArguments
 from heuristic.lights import INVERSE_SQUARE, PointLight
 from heuristic.materials import PairedMaterial
-from heuristic.points import ShadingArguments
 from heuristic.user_shaders import DEFAULT_VARIANT
 
 Array = np.ndarray

@@ -16,10 +16,9 @@ import numpy as np
 from comparisons.audit import furnace
 from heuristic import heuristics, terms
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import Heuristic
+from heuristic.heuristics import Heuristic, ShadingArguments
 from heuristic.lights import DirectionalLight, PointLight
 from heuristic.materials import PairedMaterial
-from heuristic.points import ShadingArguments
 from reference.pairing import albedo, factors
 
 ALPHAS = (0.1, 0.3, 0.6, 1.0)

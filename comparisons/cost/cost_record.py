@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
 from comparisons.hybrids.attribution import Attribution, MeanError, ObjectContribution, Split
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.planning.plan import Guard
 from reference.records import (
     VERSION,

@@ -22,8 +22,7 @@ from comparisons.hybrids.hybrids import HybridScenes, Pairs
 from comparisons.options import Options
 from comparisons.prepared import Prepared
 from heuristic.errors import InputError
-from heuristic.heuristics import PHONG, Heuristic, named
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import PHONG, Heuristic, Interpolation, named
 from reference.pairing.halves import INTEGRATOR
 from reference.planning.effects import (
     EFFECTS,

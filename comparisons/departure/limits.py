@@ -35,7 +35,7 @@ import numpy as np
 
 from comparisons.departure.blocks import bands
 from heuristic.convention import Scene, Shape
-from heuristic.plugins.textures import SMALLEST_ALPHA
+from heuristic.materials import SMALLEST_ALPHA
 from reference.records import Count, Record
 from reference.scene.graph import Graph
 from reference.scene.values import number

@@ -36,8 +36,7 @@ from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from comparisons.record import versions, warnings
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG, Heuristic, named
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import PHONG, Heuristic, Interpolation, named
 from heuristic.materials import FORMS
 from reference.records import Pixels
 from reference.rendering.renderer import Progress, pass_seed, passes, variant

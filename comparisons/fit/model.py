@@ -41,7 +41,7 @@ from heuristic.errors import InputError
 from heuristic.heuristics import Heuristic
 from heuristic.kernel import shade
 from heuristic.materials import Material
-from heuristic.plugins.phong import SceneMaterials
+from heuristic.plugins.coefficients import SceneMaterials
 from reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
 from reference.rendering.renderer import Renderer, variant
 

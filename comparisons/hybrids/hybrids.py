@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from comparisons.options import Options
 from comparisons.prepared import Prepared
 from heuristic.convention import Scene
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.planning.effects import (

@@ -14,13 +14,27 @@ Plugin                      Kind        What it is
                                         (:mod:`heuristic.plugins.textures`)
 ``heuristic_tilt``          texture     the normal from a bump or normal map
 ==========================  ==========  ==========================================================
+
+Each module defines its classes anew for a variant, when a scene first has one of them.
 """
+
+from functools import cache, partial
+from importlib import import_module
+from typing import Any
 
 import mitsuba as mi
 
 from heuristic import llvm
 from heuristic.errors import InputError
-from heuristic.plugins import emitters, integrator, phong, textures
+
+TEXTURES = ("product", "share", "rest", "sum", "blend", "sides", "exponent", "interior", "tilt")
+PLUGINS = {"phong": ("bsdf", "phong"), "heuristic": ("integrator", "integrator")}
+PLUGINS |= {
+    f"heuristic_{name}": ("emitter", "emitters")
+    for name in ("point", "spot", "directional", "glow")
+}
+PLUGINS |= {f"heuristic_{name}": ("texture", "textures") for name in TEXTURES}
+"""Kind and module of each plugin."""
 
 _registered: set[str] = set()
 
@@ -38,6 +52,15 @@ def register() -> None:
         return
     if variant.startswith("llvm"):
         llvm.check()
-    for module in (textures, phong, emitters, integrator):
-        module.define()
+    for name, (kind, module) in PLUGINS.items():
+        getattr(mi, f"register_{kind}")(name, partial(_plugin, name, module))
     _registered.add(variant)
+
+
+def _plugin(name: str, module: str, props: Any) -> Any:
+    return _classes(module, mi.variant())[name](props)
+
+
+@cache
+def _classes(module: str, variant: str) -> dict[str, Any]:
+    return import_module(f"heuristic.plugins.{module}").define()

@@ -45,17 +45,12 @@ import mitsuba as mi
 
 from heuristic import numerics, terms, vectors
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import UNATTENUATED, DirectionalLight, Light, PointLight, SpotLight
-from heuristic.plugins.textures import coefficient, emitted
-
-FAR = 1e8
-"""Where shadow rays of parallel light end: outside any scene. A Python plugin does not learn the
-size of the scene from Mitsuba, and rays of this length still keep their direction to 1e-7."""
+from heuristic.lights import FAR, UNATTENUATED, DirectionalLight, Light, PointLight, SpotLight
+from heuristic.plugins.coefficients import coefficient, emitted
 
 
-def define() -> None:
-    """Create the classes for the current variant and register them."""
-    _define_glow()
+def define() -> dict[str, Any]:
+    """Return the classes for the current variant, by the plugins' names."""
     parameters = {
         "scale": (mi.Float, 1.0),
         "position": (mi.Point3f, mi.ScalarPoint3f(0)),
@@ -64,10 +59,6 @@ def define() -> None:
         "exponent": (mi.Float, 0.0),
     }
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
-
-    def registered(plugin: Any) -> Any:
-        mi.register_emitter(plugin.model.plugin, plugin)
-        return plugin
 
     class HeuristicEmitter(mi.Emitter):
         """Base of all kinds: a delta light without a position, never hit by a ray."""
@@ -148,7 +139,6 @@ def define() -> None:
             ds.emitter = mi.EmitterPtr(self)
             return ds
 
-    @registered
     class HeuristicPoint(HeuristicEmitter):
         """Equation 6.1, and both forms of attenuation of 8.6."""
 
@@ -178,7 +168,6 @@ def define() -> None:
         def bbox(self):
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
 
-    @registered
     class HeuristicSpot(HeuristicPoint):
         """Equations 6.2-6.4."""
 
@@ -198,7 +187,6 @@ def define() -> None:
             cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
             return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
 
-    @registered
     class HeuristicDirectional(HeuristicEmitter):
         """A directional light: parallel rays of constant intensity."""
 
@@ -215,10 +203,6 @@ def define() -> None:
 
         def bbox(self):
             return mi.ScalarBoundingBox3f()
-
-
-def _define_glow():
-    """Create the class of ``heuristic_glow`` for the current variant and register it."""
 
     class HeuristicGlow(mi.Emitter):
         """See the module's docstring."""
@@ -256,4 +240,5 @@ def _define_glow():
         def to_string(self):
             return f"HeuristicGlow[k_i = {self.k_i}, k_a = {self.k_a}, ambient = {self.ambient}]"
 
-    mi.register_emitter("heuristic_glow", HeuristicGlow)
+    lights = (HeuristicPoint, HeuristicSpot, HeuristicDirectional)
+    return {light.model.plugin: light for light in lights} | {"heuristic_glow": HeuristicGlow}

@@ -31,32 +31,24 @@ has no cosine factor; as in the chapters, it neither conserves energy nor is rec
 from functools import reduce
 from numbers import Real
 from operator import or_
-from typing import ClassVar
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import lobes, numerics, terms, vectors
-from heuristic.convention import (
-    RADIANCE_PER_IRRADIANCE,
-    Array,
-    Colour,
-    Direction,
-    Interaction,
-    Mask,
-    Scene,
-)
+from heuristic import numerics, terms, vectors
+from heuristic.convention import RADIANCE_PER_IRRADIANCE
 from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial, check_form
-from heuristic.plugins.textures import coefficient, emitted, may_be_nonzero, require_positive
+from heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
+from heuristic.plugins.coefficients import coefficient, emitted, may_be_nonzero, require_positive
 
 SMALLEST_SAMPLE = 2.0**-25
 """In place of a random number of 0, which represents all numbers below 2^-24."""
 
 
-def define() -> None:
-    """Create the class for the current variant and register it."""
+def define() -> dict[str, Any]:
+    """Return the class for the current variant, by the plugin's name."""
 
     class PhongBSDF(mi.BSDF):
         """See the module's docstring."""
@@ -147,7 +139,13 @@ def define() -> None:
             return dr.select(passes, straight, reflected), dr.select(passes, passed, weight)
 
         def eval_null_transmission(self, si, active=True):
-            return self.transmittance.eval(si, active)
+            return mi.Spectrum(self.transmittance.eval(si, active))
+
+        def shading_normal(self, si, active=True):
+            """Return the normal in world space, with a bump or normal map applied."""
+            if self.tilt is None:
+                return mi.Vector3f(si.sh_frame.n)
+            return mi.Vector3f(si.to_world(mi.Vector3f(self.tilt.eval_3(si, active))))
 
         def eval_pdf(self, ctx, si, wo, active=True):
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
@@ -267,7 +265,7 @@ def define() -> None:
 
         def _lobe_cosine(self, wi, wo):
             """Return ``R.V`` or ``N.H`` in the local frame."""
-            return lobes.local_lobe(self.form, self.n_is_moderate, wi, wo)
+            return vectors.local_lobe(self.form, self.n_is_moderate, wi, wo)
 
         def _sample_lobe(self, wi, sample2, n):
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
@@ -296,7 +294,7 @@ def define() -> None:
                 density /= numerics.at_least(2 * dr.norm(wi + wo), numerics.smallest(wo))
             return density
 
-    mi.register_bsdf("phong", PhongBSDF)
+    return {"phong": PhongBSDF}
 
 
 PARTNER = {"alpha": 1.0, "ior": 1.0, "metallic": 0.0}
@@ -321,141 +319,3 @@ def _exponent(props):
 def _require_exponent(n):
     if not 0 <= n < float("inf"):
         raise InputError(f"phong: n = {n} is not allowed: give a finite value of 0 or more.")
-
-
-class SceneMaterials:
-    """The ``phong`` BSDFs of a scene, and their values at a surface interaction.
-
-    ``prune`` leaves out the terms that no material has; ``form`` replaces the materials' own;
-    ``physical`` also reads the parameters of the physical partners
-    (:class:`heuristic.materials.PairedMaterial`).
-    """
-
-    DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze must know of
-
-    def __init__(
-        self, scene: Scene, prune: bool = True, form: str | None = None, physical: bool = False
-    ):
-        self.prune, self.form, self.physical = prune, form, physical
-        self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
-        for bsdf in self.bsdfs:
-            if not hasattr(bsdf, "material"):
-                raise InputError(
-                    f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is not a phong. The integrator"
-                    " heuristic renders the heuristic half of a pair, which reference.pair makes."
-                )
-        places = {_registry_index(bsdf): number for number, bsdf in enumerate(self.bsdfs)}
-        numbers = [places.get(index, 0) for index in range(max(places, default=0) + 1)]
-        self.table = mi.UInt32(numbers)
-
-    def at(self, si: Interaction, active: Mask) -> list[tuple[Material, Mask]]:
-        """Return the materials at a surface interaction, as pairs of a material and a mask.
-
-        There is one pair for each form of the lobe in the scene, since the form determines the
-        kernel's code; the mask says where it applies.
-        """
-        if not self.bsdfs:
-            return []  # a scene without shapes
-        if len(self.bsdfs) == 1:
-            chosen = self.prune, self.form, self.physical
-            return [(self.bsdfs[0].material(si, active, *chosen), True)]
-        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
-        present = present if self.prune else list(COEFFICIENTS)
-        readers = [_reader(bsdf, present, self.form, self.physical) for bsdf in self.bsdfs]
-        *values, n, is_blinn = dr.switch(self.index(si, active), readers, si, active)
-        kind = PairedMaterial if self.physical else Material
-        names = (*present, *(PHYSICAL if self.physical else ()))
-        forms = sorted({self.form or bsdf.form for bsdf in self.bsdfs})
-        is_moderate = all(bsdf.n_is_moderate for bsdf in self.bsdfs)
-        coefficients = dict(zip(names, values, strict=True))
-        return [
-            (
-                kind(**coefficients, n=n, form=form, n_is_moderate=is_moderate),
-                len(forms) == 1 or is_blinn == (form == "blinn"),
-            )
-            for form in forms
-        ]
-
-    def twosided(self, si: Interaction, active: Mask) -> bool | Mask:
-        """Return whether the surface is two-sided; a plain value where all agree."""
-        sides = [bsdf.twosided for bsdf in self.bsdfs]
-        if len(set(sides)) <= 1:
-            return any(sides)
-        return dr.gather(mi.Bool, mi.Bool(sides), self.index(si, active), active)
-
-    def transmittance(self, si: Interaction, active: Mask) -> Colour:
-        """Return the share of light that passes straight through; a plain 0 if none can."""
-        if not any(bsdf.is_clear for bsdf in self.bsdfs):
-            return 0
-        readers = [_transmittance_of(bsdf) for bsdf in self.bsdfs]
-        return dr.select(active, self._switch(readers, si, active), 0)
-
-    def normal(self, si: Interaction, active: Mask) -> Direction:
-        """Return the shading normal in world space, with bump and normal maps applied."""
-        if not any(bsdf.tilt for bsdf in self.bsdfs):
-            return mi.Vector3f(si.sh_frame.n)
-        readers = [_normal_of(bsdf) for bsdf in self.bsdfs]
-        return mi.Vector3f(self._switch(readers, si, active))
-
-    def _switch(self, readers, si, active):
-        if len(readers) == 1:
-            return readers[0](si, active)
-        return dr.switch(self.index(si, active), readers, si, active)
-
-    def index(self, si: Interaction, active: Mask) -> Array:
-        """Return the number in ``bsdfs`` of the material at a surface interaction."""
-        bsdf = dr.reinterpret_array(mi.UInt32, si.bsdf())
-        return dr.gather(mi.UInt32, self.table, bsdf, active)
-
-
-def _reader(bsdf, present, form, physical):
-    """Return the function that reads one BSDF's coefficients, normalisation included."""
-
-    def read(si, active):
-        material = bsdf.material(si, active, form=form, physical=physical)
-        values = {name: mi.Spectrum(getattr(material, name)) for name in present}
-        if bsdf.normalised and "k_s" in values:
-            values["k_s"] *= terms.normalisation(material.form, material.n)
-        if physical:
-            values["base_color"] = mi.Spectrum(material.base_color)
-            values |= {name: mi.Float(getattr(material, name)) for name in PHYSICAL[1:]}
-        return (*values.values(), mi.Float(material.n), mi.Bool(material.form == "blinn"))
-
-    return read
-
-
-def _transmittance_of(bsdf):
-    if not bsdf.is_clear:
-        return lambda si, active: mi.Spectrum(0)
-    return lambda si, active: mi.Spectrum(bsdf.transmittance.eval(si, active))
-
-
-def _normal_of(bsdf):
-    if bsdf.tilt is None:
-        return lambda si, active: mi.Vector3f(si.sh_frame.n)
-    return lambda si, active: si.to_world(mi.Vector3f(bsdf.tilt.eval_3(si, active)))
-
-
-def _bsdfs(scene):
-    """Return the BSDFs of a scene; only traversal finds those inside shape groups."""
-    shapes = scene.shapes()
-    if not any(shape.class_name() == "Instance" for shape in shapes):
-        return [shape.bsdf() for shape in shapes]
-    found = {}
-
-    class Below(mi.TraversalCallback):
-        """Collects the outermost BSDFs below an object."""
-
-        def put(self, name, value, *details):
-            if isinstance(value, mi.BSDF):
-                found.setdefault(value)
-            elif isinstance(value, mi.Object):
-                value.traverse(Below())
-
-    scene.traverse(Below())
-    return list(found)
-
-
-def _registry_index(bsdf):
-    """Return Dr.Jit's number of a BSDF, as found in ``si.bsdf()``."""
-    return int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])

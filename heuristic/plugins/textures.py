@@ -34,18 +34,12 @@ Mitsuba's ``normalmap`` and ``bumpmap`` define it (Blinn 1978): for heights ``h`
 displaced surface is ``(dp/du + dh/du n) x (dp/dv + dh/dv n)``.
 """
 
-from numbers import Real
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
-from heuristic import colours
-from heuristic.errors import InputError
-
-SMALLEST_ALPHA = 1e-4
-"""Mitsuba replaces every smaller roughness by this one."""
+from heuristic.materials import SMALLEST_ALPHA
 
 SCALARS = ("weight", "alpha")
 NUMBERS = ("scale", "return")
@@ -78,12 +72,9 @@ OPERATIONS = {
 }
 """The operands of each plugin, and its value of theirs."""
 
-KINDS = tuple(OPERATIONS)
 
-
-def define() -> None:
-    """Create the classes for the current variant and register them."""
-    _define_tilt()
+def define() -> dict[str, Any]:
+    """Return the classes for the current variant, by the plugins' names."""
 
     class Computed(mi.Texture):
         """See the module's docstring."""
@@ -128,8 +119,7 @@ def define() -> None:
             ]
             return self.operation(si, *values)
 
-    for name in OPERATIONS:
-        mi.register_texture(name, Computed)
+    return dict.fromkeys(OPERATIONS, Computed) | {"heuristic_tilt": _tilt()}
 
 
 def _operand(props, name):
@@ -144,8 +134,8 @@ def _operand(props, name):
     return props.get_texture(name)
 
 
-def _define_tilt():
-    """Create the class of ``heuristic_tilt`` for the current variant and register it."""
+def _tilt():
+    """Return the class of ``heuristic_tilt`` for the current variant."""
 
     class Tilt(mi.Texture):
         """See the module's docstring."""
@@ -188,63 +178,8 @@ def _define_tilt():
             normal = dr.mulsign(normal, dr.dot(si.n, normal))
             return si.to_local(normal)
 
-    mi.register_texture("heuristic_tilt", Tilt)
+    return Tilt
 
 
 def _mirrored(normal):
     return mi.Vector3f(-normal.x, -normal.y, normal.z)
-
-
-def coefficient(props: Any, name: str) -> Any:
-    """Read a reflection coefficient, 0 if omitted.
-
-    Up to 1 it is an ordinary reflectance of Mitsuba, with the same spectrum for the same RGB; above
-    1, as ``k_s`` may be for a sharp lobe, it needs Mitsuba's unbounded kind.
-    """
-    value = _plain(props, name, 0.0)
-    if value is not None and max(value) > 1:
-        return props.get_unbounded_texture(name)
-    return props.get_texture(name, 0.0)
-
-
-def emitted(props: Any, name: str, default: Any) -> Any:
-    """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
-
-    Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum of zero.
-    """
-    value = _plain(props, name, default)
-    if value is not None and max(value) == 0:
-        return props.get_unbounded_texture(name, 0.0)
-    return props.get_emissive_texture(name, default)
-
-
-def _plain(props, name, default):
-    """Return a number's or colour's components, None for textures and tabulated spectra."""
-    value = props.get(name, default)
-    if not isinstance(value, Real | mi.ScalarColor3f | mi.ScalarColor3d):
-        return None
-    components = (float(value),) if isinstance(value, Real) else tuple(map(float, value))
-    colours.checked(f"{props.plugin_name()}: {name}", components)
-    return components
-
-
-def may_be_nonzero(texture: Any) -> bool:
-    """Return whether a texture can be non-zero anywhere; True if unknown."""
-    if texture.is_spatially_varying():
-        return True
-    try:
-        return dr.max(texture.max()) > 0
-    except RuntimeError:
-        return True
-
-
-def require_positive(name: str, texture: Any) -> None:
-    """Raise InputError if a texture that is one colour has a component below 0 or NaN."""
-    if texture.is_spatially_varying():
-        return
-    si = dr.zeros(mi.SurfaceInteraction3f)
-    si.wavelengths = mi.Spectrum(550.0) if mi.is_spectral else si.wavelengths
-    components = np.ravel(dr.detach(texture.eval(si)))
-    if not np.all(components >= 0):
-        shown = ", ".join(f"{component:g}" for component in components)
-        raise InputError(f"{name} = {shown} is not allowed: give finite values of 0 or more.")

@@ -15,13 +15,10 @@ from tempfile import mkdtemp
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
 from heuristic.convention import Scene
 from heuristic.errors import FotismosError, InputError, OutputError
-from heuristic.heuristics import PHONG, named
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import PHONG, Interpolation, named
 from heuristic.plugins import register
-from heuristic.plugins.integrator import viewpoint
 from reference.pairing import bsdfs, emitters
 from reference.pairing.factors import (
     BsdfPair,
@@ -92,7 +89,7 @@ def pair(
     """Derive both halves of a scene, for the current variant.
 
     ``resolution`` replaces the film's. FLAT and GOURAUD make meshes of the heuristic half's shapes,
-    by ``tessellation`` (:func:`heuristic.meshes.to_mesh`); if that is given, PHONG gets meshes too.
+    by ``tessellation`` (:mod:`heuristic.tessellation`); if that is given, PHONG gets meshes too.
     ``prune`` lets the kernel leave out the terms that no material has. ``heuristic`` names the
     declaration that shades the heuristic half (:mod:`heuristic.heuristics`); ``with_partners`` lets
     its materials know their physical partners (:mod:`reference.pairing.partners`), as they do for
@@ -221,6 +218,10 @@ def replace_shapes(
     the meshes are written to until it is deleted. Gouraud shading needs one normal per vertex,
     hence separate faces if the mesh has ``face_normals``.
     """
+    # Loaded late: few scenes are made into triangles.
+    from heuristic import tessellation
+    from heuristic.plugins.interpolated import viewpoint
+
     if interpolation is not Interpolation.PHONG:
         viewpoint(scene.sensors()[0])  # raises before anything renders
     folder = _Folder()
@@ -232,12 +233,12 @@ def replace_shapes(
                 f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
                 " separate meshes. Use --interpolation phong."
             )
-        mesh = meshes.to_mesh(shapes[given.id()], resolution or meshes.RESOLUTION)
+        mesh = tessellation.to_mesh(shapes[given.id()], resolution or tessellation.RESOLUTION)
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:
-                mesh = meshes.split_faces(mesh)
+                mesh = tessellation.split_faces(mesh)
         elif not mesh.has_vertex_normals():
-            mesh = meshes.with_vertex_normals(mesh)
+            mesh = tessellation.with_vertex_normals(mesh)
         path = folder.path / f"{index}.ply"
         try:
             mesh.write_ply(str(path))

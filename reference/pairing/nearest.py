@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from heuristic.errors import InputError
-from heuristic.plugins.textures import SMALLEST_ALPHA
+from heuristic.materials import SMALLEST_ALPHA
 from heuristic.terms import normalisation
 from reference.pairing import albedo, probe
 from reference.pairing.albedo import RoughPlastic

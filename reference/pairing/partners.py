@@ -35,7 +35,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.plugins.textures import SMALLEST_ALPHA
+from heuristic.materials import SMALLEST_ALPHA
 from reference.pairing import bsdfs, probe
 from reference.pairing.bsdfs import WRAPPERS, Context
 from reference.pairing.factors import Convention

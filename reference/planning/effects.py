@@ -10,7 +10,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic.interpolation import Interpolation
+from heuristic.heuristics import Interpolation
 from reference.pairing import lights
 from reference.pairing.bsdfs import WRAPPERS
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts

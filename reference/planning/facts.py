@@ -16,8 +16,8 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
-from heuristic.interpolation import Interpolation
-from heuristic.plugins.phong import COEFFICIENTS
+from heuristic.heuristics import Interpolation
+from heuristic.materials import COEFFICIENTS
 from reference.pairing import lights
 from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, may_differ_from_0
 from reference.pairing.halves import Pair

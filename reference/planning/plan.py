@@ -33,8 +33,8 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from heuristic.convention import Scene
-from heuristic.interpolation import Interpolation
-from heuristic.plugins.phong import COEFFICIENTS
+from heuristic.heuristics import Interpolation
+from heuristic.materials import COEFFICIENTS
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.prepare import PATHS

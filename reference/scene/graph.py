@@ -13,9 +13,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import lights, llvm
+from heuristic import llvm
 from heuristic.errors import InputError, unknown
-from heuristic.plugins import textures
+from heuristic.plugins import PLUGINS
 
 FILENAME = "filename"
 """The parameter with which every plugin names its file."""
@@ -28,17 +28,16 @@ CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[
 
 LONG = re.compile(r'("[^"]{60})[^"]+([^"]{20})(?=")')
 
+KINDS = {
+    "bsdf": mi.ObjectType.BSDF,
+    "integrator": mi.ObjectType.Integrator,
+    "emitter": mi.ObjectType.Emitter,
+    "texture": mi.ObjectType.Texture,
+}
+"""Kinds of our own plugins."""
+
 Parser = mi.parser
 Reference = mi.Properties.ResolvedReference
-
-KINDS_OF_OWN_PLUGINS = {
-    "phong": mi.ObjectType.BSDF,
-    "heuristic": mi.ObjectType.Integrator,
-    "heuristic_glow": mi.ObjectType.Emitter,
-    "heuristic_tilt": mi.ObjectType.Texture,
-}
-KINDS_OF_OWN_PLUGINS |= dict.fromkeys(lights.PLUGINS, mi.ObjectType.Emitter)
-KINDS_OF_OWN_PLUGINS |= dict.fromkeys(textures.KINDS, mi.ObjectType.Texture)
 
 
 def set_variant(variant: str) -> None:
@@ -158,7 +157,9 @@ class Graph:
             return kind
         plugin = self.plugin(index)
         if plugin not in self.kinds:
-            self.kinds[plugin] = KINDS_OF_OWN_PLUGINS.get(plugin) or self._kind_of_object(index)
+            is_own = plugin in PLUGINS
+            kind = KINDS[PLUGINS[plugin][0]] if is_own else self._kind_of_object(index)
+            self.kinds[plugin] = kind
         return self.kinds[plugin]
 
     def _kind_of_object(self, index):
@@ -276,7 +277,7 @@ def resolving(resolver: Any) -> Iterator[None]:
 def _is_python(node):
     """Return whether a node's plugin is written in Python, including a user's."""
     is_unknown = node.type == mi.ObjectType.Unknown
-    return is_unknown or node.props.plugin_name() in KINDS_OF_OWN_PLUGINS
+    return is_unknown or node.props.plugin_name() in PLUGINS
 
 
 def plain_message(error: Exception) -> str:

@@ -12,7 +12,7 @@ import click
 from comparisons.processes.pool import Task
 from heuristic import llvm
 from heuristic.errors import InstallationError
-from heuristic.version import __version__
+from heuristic.program import __version__
 from reports import jobs
 
 TIMEOUT_S = 300
@@ -93,14 +93,14 @@ def meshed(variant: str) -> str:
 
 def shaded() -> str:
     """Compile and run a small shader, and return on which device, or what to install."""
-    from heuristic.glsl import shader_files
+    from heuristic import glsl
 
     try:
-        device = shader_files.opengl()
+        renderer, is_software = glsl.device()
     except InstallationError as error:
         return f"cannot be run; only --heuristic FILE.glsl needs it: {error}"
-    shader_files.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
-    return f"runs on {device.renderer}{', a software GPU' if device.is_software else ''}"
+    glsl.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
+    return f"runs on {renderer}{', a software GPU' if is_software else ''}"
 
 
 def compared() -> float:

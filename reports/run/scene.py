@@ -16,7 +16,7 @@ from msgspec import structs
 from comparisons import atomic
 from comparisons.comparison import CAUSES, ComparisonRecord
 from comparisons.departure.metrics import METRICS, drawn
-from heuristic import version
+from heuristic import program
 from heuristic.errors import FotismosError
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
@@ -131,7 +131,7 @@ def key_of(case: Case, job: Job) -> str | None:
         "options": plain(case.options),
         "variant": case.variant,
         "versions": versions(),
-        "sources": version.source_digest(),
+        "sources": program.source_digest(),
         "heuristic": named(case.options.heuristic).digest(),
         "pictures": [_digest_of(path) for path in files if path.is_file()],
         "scene": digest(case.source),

@@ -23,10 +23,9 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
-from heuristic.heuristics import Heuristic, Parameter
-from heuristic.lights import DirectionalLight
-from heuristic.plugins.emitters import FAR
-from heuristic.points import INPUTS, Array, Point
+from heuristic.convention import Array
+from heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
+from heuristic.lights import FAR, DirectionalLight
 
 LAMPS = 16
 """Lamps with a depth image, at most."""

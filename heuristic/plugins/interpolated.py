@@ -1,4 +1,4 @@
-"""Flat, Gouraud and Phong shading of triangle meshes (chapter 6, section 6.6).
+"""Flat and Gouraud shading of triangle meshes (chapter 6, section 6.6).
 
 The chapter interpolates twice along straight lines: along two edges to the points D and E where a
 scan line meets them (6.35, 6.37), then along the scan line (6.36, 6.38). On a triangle this is the
@@ -17,12 +17,13 @@ Phong shading does not need either: Mitsuba interpolates and normalises the vert
 """
 
 from collections.abc import Callable, Sequence
-from enum import Enum
+from functools import cache
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import meshes, normals, vectors
+from heuristic import meshes, normals, tessellation, vectors
 from heuristic.convention import (
     Colour,
     Direction,
@@ -35,17 +36,10 @@ from heuristic.convention import (
     Vector,
 )
 from heuristic.errors import InputError
+from heuristic.heuristics import Interpolation
 from heuristic.kernel import shade
 from heuristic.lights import Light
 from heuristic.materials import Material
-
-
-class Interpolation(Enum):
-    """The quantity interpolated over a face: none, the intensity, or the normal."""
-
-    FLAT = "flat"
-    GOURAUD = "gouraud"
-    PHONG = "phong"
 
 
 def edge_intensity(
@@ -90,6 +84,12 @@ def scan_line_normal(
     return vectors.normalise(_between(normal_d, normal_e, x_d, x_e, x))
 
 
+def _between(value_a, value_b, place_a, place_b, place):
+    length = place_b - place_a
+    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
+    return value_a * (1 - fraction) + value_b * fraction
+
+
 def barycentric_coordinates(
     point: Position, p0: Position, p1: Position, p2: Position
 ) -> tuple[Number, Number, Number]:
@@ -110,12 +110,6 @@ def barycentric_coordinates(
     return 1 - b1 - b2, b1, b2
 
 
-def _between(value_a, value_b, place_a, place_b, place):
-    length = place_b - place_a
-    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
-    return value_a * (1 - fraction) + value_b * fraction
-
-
 BLOCK = 3
 """Components of one attribute: Mitsuba 3.9.1 reads 1 or 3, and any other number as zero."""
 
@@ -125,31 +119,30 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
 
     GOURAUD are the vertices with their normals, or those of 6.34 if it has none; FLAT the faces'
     centroids with theirs. They are in the order of the vertices or faces, as far as textures need
-    it: ``p``, ``n``, ``sh_frame.n``, ``uv``, ``shape`` and ``prim_index``. PHONG has no such
-    points, nor has GOURAUD on a mesh with ``face_normals``.
+    it: ``p``, ``n``, ``sh_frame.n``, ``uv``, ``shape`` and ``prim_index``. GOURAUD has no such
+    points on a mesh with ``face_normals``.
     """
-    if interpolation is Interpolation.PHONG:
-        raise InputError(
-            "interpolation phong evaluates the model at every point, not at those of the mesh: call"
-            " shade with si.sh_frame.n."
-        )
     corners, points = meshes.faces(mesh), meshes.positions(mesh)
     uv = meshes.texture_coordinates(mesh)
     face = dr.arange(mi.UInt32, mesh.face_count())
-    si = dr.zeros(mi.SurfaceInteraction3f, mesh.vertex_count())
     if interpolation is Interpolation.FLAT:
         si = dr.zeros(mi.SurfaceInteraction3f, mesh.face_count())
-        si.p = mi.Point3f(_mean(points, corners))
-        si.n = meshes.face_normals(mesh)
-        si.uv = _mean(uv, corners) if uv is not None else si.uv
+        points, uv = _mean(points, corners), None if uv is None else _mean(uv, corners)
+        si.n = tessellation.face_normals(mesh)
         si.prim_index = face
     else:
-        _refuse_face_normals(mesh)
-        si.p = mi.Point3f(points)
-        si.n = meshes.normals(mesh)
-        si.uv = uv if uv is not None else si.uv
+        if mesh.has_face_normals():
+            raise InputError(
+                f"mesh {mesh.id()!r} has face_normals, so several normals at a vertex. Gouraud"
+                " shading needs one: pass it through heuristic.tessellation.split_faces, or take"
+                " face_normals off."
+            )
+        si = dr.zeros(mi.SurfaceInteraction3f, mesh.vertex_count())
+        si.n = tessellation.normals(mesh)
         for corner in range(3):  # any of the faces around a vertex will do
             dr.scatter(si.prim_index, face, corners[corner])
+    si.p = mi.Point3f(points)
+    si.uv = si.uv if uv is None else uv
     si.sh_frame.n = si.n
     si.shape = mi.ShapePtr(mesh)
     si.t = mi.Float(0)
@@ -177,11 +170,21 @@ def shade_mesh(
     si = shading_points(mesh, interpolation)
     position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
     view = mi.Vector3f(viewer) - position
-    components = 0
+    everywhere = dr.zeros(mi.Float, dr.width(position))
+    attributes = {}
+    components = BLOCK
     for back in (False, True)[: 1 + twosided]:
         facing = -normal if back else normal
         colour = model(position, facing, view, material, lights, ambient, visible)
-        components = _store(mesh, interpolation, colour, back, dr.width(position))
+        is_colour = dr.depth_v(colour) > 1
+        values = [mi.Float(part) for part in (colour if is_colour else [colour] * BLOCK)]
+        components = len(values)
+        values += [mi.Float(0)] * (-components % BLOCK)
+        for block in range(len(values) // BLOCK):
+            # Terms that do not depend on the position are a single number until spread out.
+            value = mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)]) + everywhere
+            attributes[_name(interpolation, back, block)] = value
+    meshes.store(mesh, attributes)
     return components
 
 
@@ -211,6 +214,16 @@ def stored_shade(
     return values[:components]
 
 
+def _mean(values, corners):
+    return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
+
+
+def _name(interpolation, back, block):
+    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and suffixes."""
+    element = "face" if interpolation is Interpolation.FLAT else "vertex"
+    return f"{element}_heuristic" + ("_back" if back else "") + (f"_{block}" if block else "")
+
+
 class MeshCorners:
     """The vertices of all faces of a scene's meshes, to shade at those of the face hit.
 
@@ -219,7 +232,8 @@ class MeshCorners:
     """
 
     def __init__(self, scene: Scene):
-        parts, starts, count = [_corner_arrays(None)], {}, 1  # the first face belongs to no mesh
+        nothing = dr.zeros(mi.Vector3f, 3)  # the first face belongs to no mesh
+        parts, starts, count = [(nothing, nothing, dr.zeros(mi.Point2f, 3))], {}, 1
         for shape in scene.shapes():
             if shape.is_mesh():
                 starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
@@ -258,15 +272,13 @@ class MeshCorners:
 
 def _corner_arrays(mesh):
     """Return positions, normals and texture coordinates, three entries per face."""
-    if mesh is None:
-        return dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Vector3f, 3), dr.zeros(mi.Point2f, 3)
     if mesh.has_face_normals():
-        mesh = meshes.split_faces(mesh)
+        mesh = tessellation.split_faces(mesh)
     corners = dr.ravel(meshes.faces(mesh))
     uv = meshes.texture_coordinates(mesh)
     return (
         dr.gather(mi.Vector3f, meshes.positions(mesh), corners),
-        dr.gather(mi.Vector3f, meshes.normals(mesh), corners),
+        dr.gather(mi.Vector3f, tessellation.normals(mesh), corners),
         dr.zeros(mi.Point2f, dr.width(corners))
         if uv is None
         else dr.gather(mi.Point2f, uv, corners),
@@ -279,36 +291,89 @@ def _joined(arrays):
     return type(arrays[0])(*(dr.concat([array[i] for array in arrays]) for i in components))
 
 
-def _mean(values, corners):
-    return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
+@cache
+def derived(base: type) -> type:
+    """Return a variant's integrator ``heuristic`` with ``flat`` or ``gouraud`` (6.35, 6.36).
+
+    In RGB variants the heuristic runs once per vertex or face before the rendering, for the sensor
+    that renders, and Mitsuba interpolates the stored values. Spectral variants draw other
+    wavelengths for each ray; there it runs at the corners of the face that a ray hits.
+    """
+
+    class InterpolatingIntegrator(base):
+        """See :mod:`heuristic.plugins.integrator`."""
+
+        def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+            if not mi.is_spectral:
+                self._store(scene, scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
+            return super().render(scene, sensor, seed, spp, develop, evaluate)
+
+        def surface_colour(self, scene, si, view, active):
+            if mi.is_spectral:
+                return self._at_corners(scene, si, view, active)
+            twosided = any(shape.bsdf().twosided for shape in scene.shapes())
+            values = stored_shade(si, self.interpolation, twosided=twosided, active=active)
+            return mi.Color3f(values) if mi.is_rgb else mi.Spectrum(values[0])
+
+        def _store(self, scene, sensor):
+            viewer = viewpoint(sensor)
+            for mesh in _meshes(scene):
+                at = shading_points(mesh, self.interpolation)
+                shade_mesh(
+                    mesh,
+                    self.interpolation,
+                    viewer,
+                    mesh.bsdf().material(
+                        at, True, self.prune, self.model.form, not self.model.is_own
+                    ),
+                    self.lights(scene, at, True),
+                    self.ambient_at(at, True),
+                    self.visibility(scene, at, True),
+                    # Stored for all, because reading cannot distinguish the shapes.
+                    twosided=any(shape.bsdf().twosided for shape in scene.shapes()),
+                    model=self.model_at(scene, at),
+                )
+
+        def _at_corners(self, scene, si, view, active):
+            _meshes(scene)
+            corners = MeshCorners(scene).at(si, active)
+            viewer = si.p + view * si.t
+            front = dr.dot(si.n, view) > 0
+            if self.interpolation is Interpolation.FLAT:
+                # One point: the centroid, with the face's own normal.
+                centroid = mi.SurfaceInteraction3f(si)
+                centroid.p = sum(corner.p for _, corner in corners) / 3
+                centroid.uv = sum(corner.uv for _, corner in corners) / 3
+                centroid.sh_frame.n = centroid.n = si.n
+                corners = [(mi.Float(1), centroid)]
+            colour = mi.Spectrum(0)
+            for weight, corner in corners:
+                normal = dr.select(front, mi.Vector3f(corner.sh_frame.n), -corner.sh_frame.n)
+                value = self.shaded(scene, corner, viewer - corner.p, normal, active)
+                colour += weight * value
+            twosided = self.twosided(scene, si, active)
+            return dr.select(active & (twosided | front), colour, 0)
+
+    return InterpolatingIntegrator
 
 
-def _refuse_face_normals(mesh):
-    if mesh.has_face_normals():
+def _meshes(scene):
+    """Return the scene's shapes; reject those that are not meshes."""
+    for shape in scene.shapes():
+        if not shape.is_mesh():
+            raise InputError(
+                f"shape {shape.id()!r} is a {shape.class_name()}: flat and Gouraud shading need"
+                " triangle meshes. Make one with heuristic.tessellation.to_mesh; fotismos does so"
+                " itself."
+            )
+    return scene.shapes()
+
+
+def viewpoint(sensor: Any) -> Position:
+    """Return the viewer's position; reject cameras without one."""
+    if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
         raise InputError(
-            f"mesh {mesh.id()!r} has face_normals, so several normals at a vertex. Gouraud"
-            " shading needs one: pass it through heuristic.meshes.split_faces, or take face_normals"
-            " off."
+            f"sensor {sensor.id()!r} ({sensor.class_name()}) has no single viewpoint, which flat"
+            " and Gouraud shading need: use perspective or thinlens, or phong interpolation."
         )
-
-
-def _store(mesh, interpolation, colour, back, count):
-    """Store a float or a colour in attributes of three components, the last filled with zeros."""
-    is_colour = dr.depth_v(colour) > 1
-    values = [mi.Float(component) for component in colour] if is_colour else [mi.Float(colour)] * 3
-    components = len(values)
-    values += [mi.Float(0)] * (-components % BLOCK)
-    # Terms that do not depend on the position are a single number until spread out.
-    triples = {
-        _name(interpolation, back, block): mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)])
-        + dr.zeros(mi.Float, count)
-        for block in range(len(values) // BLOCK)
-    }
-    meshes.store(mesh, triples)
-    return components
-
-
-def _name(interpolation, back, block):
-    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and suffixes."""
-    element = "face" if interpolation is Interpolation.FLAT else "vertex"
-    return f"{element}_heuristic" + ("_back" if back else "") + (f"_{block}" if block else "")
+    return sensor.world_transform().translation()

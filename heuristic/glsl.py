@@ -1,0 +1,372 @@
+"""Heuristics in GLSL, run by OpenGL 4.3, which a command names as ``FILE.glsl``.
+
+The file holds ``vec3 shade(Point point)``. Its text is put between declarations of the record and a
+``main``, compiled in a context without a window and called for arrays of points.
+"""
+
+import os
+import re
+import threading
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from heuristic import program, user_shaders
+from heuristic.errors import InputError, InstallationError
+from heuristic.heuristics import INPUTS, Heuristic, LightAtPoint, Parameter, Point
+
+VERSION = 430
+"""OpenGL 4.3, the first with compute shaders."""
+
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+"""Parts of the names of OpenGL renderers that do not use a graphics card."""
+
+SIGNATURE = "vec3 shade(Point point)"
+
+LARGEST = 1 << 20
+"""Bytes of a file at most: a longer one is not a shader."""
+
+LIGHTS = 64
+"""Lights at most: each point's record holds them all."""
+
+FLOATS = 1 << 24
+"""Floats sent at once: half of what every OpenGL allows in a buffer (128 MiB with Mesa)."""
+
+POINTS = 1 << 20
+"""Points shaded at once, at most; OpenGL allows 65,535 work groups."""
+
+GROUP = 64
+"""Points that one work group shades."""
+
+POINT = {"position": 3, "normal": 3, "view": 3, "uv": 2, "ambient": 3}
+MATERIAL = {
+    "k_i": 3, "k_a": 3, "k_d": 3, "k_s": 3, "n": 1, "base_color": 3,
+    "alpha": 1, "ior": 1, "metallic": 1,
+}  # fmt: skip
+LIGHT = {"toward": 3, "distance": 1, "intensity": 3, "visible": 1}
+"""Fields of the structures, and how many floats each is."""
+
+_kept = threading.local()
+_known: dict[tuple[str, Path], Heuristic] = {}
+
+
+def opengl() -> Any:
+    """Return this thread's context of moderngl, made at the first call."""
+    pid, context = getattr(_kept, "context", (None, None))
+    if context is not None and pid == os.getpid():  # a context does not outlive a fork
+        return context
+    try:
+        import moderngl  # loaded late: only shaders in GLSL need it
+    except ImportError as error:
+        raise InstallationError(
+            "moderngl is not installed, and heuristics in GLSL need it. Install it:"
+            f" {program.installation('moderngl')}"
+        ) from error
+    try:
+        options: Any = {"backend": "egl"}  # moderngl annotates all options as one
+        context = moderngl.create_context(standalone=True, require=VERSION, **options)
+    except Exception as error:  # its type depends on which library is missing
+        raise InstallationError(
+            f"EGL finds no OpenGL {VERSION / 100:.1f}, and heuristics in GLSL need it:"
+            f" {str(error).strip().rstrip('.')}. Install a driver; Mesa's works without a"
+            " graphics card (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)."
+        ) from error
+    _kept.context = os.getpid(), context
+    return context
+
+
+def device() -> tuple[str, bool]:
+    """Return the name of OpenGL's renderer, and whether the processor does its work."""
+    renderer = opengl().info["GL_RENDERER"]
+    return renderer, any(name in renderer.lower() for name in SOFTWARE)
+
+
+def from_file(word: str) -> Heuristic:
+    """Return the heuristic in a GLSL file, after a trial; a file that changed is read again."""
+    path = Path(word)
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such file. Give a GLSL file with a function `{SIGNATURE}`."
+        )
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise InputError(f"{path}: {size} bytes are too long for a shader: give {LARGEST} at most.")
+    content = path.read_bytes()
+    code = sha256(content).hexdigest()
+    key = word, path.resolve()
+    if key not in _known or _known[key].code != code:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InputError(f"{word} is not text in UTF-8: {error}.") from error
+        _known[key] = replace(of_text(word, text), files=(path.resolve(),), code=code)
+    return _known[key]
+
+
+def of_text(word: str, text: str) -> Heuristic:
+    """Return the heuristic of a text, after a trial; InputError names the faulty line."""
+    shader = Shader(word, text)
+    if shader.line is None:
+        raise InputError(
+            f"{word}: there is no function `{SIGNATURE}`. Add it; it returns a display-linear"
+            " colour."
+        )
+    if refused := refusal(text):
+        raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
+    shader.compiled(2)
+    renderer, is_software = device()
+    heuristic = Heuristic(
+        word,
+        shader,
+        Path(word).stem + (", software GPU" if is_software else ""),
+        frozenset(name for name in INPUTS if name in shader.words),
+        parameters=uniforms(text),
+        traced=False,
+        remarks=(
+            f"{word} ran on {renderer}, a software GPU: its times are not those of a graphics"
+            " card.",
+        )[: int(is_software)],
+    )
+    with mi.scoped_set_variant(user_shaders.DEFAULT_VARIANT):
+        return replace(heuristic, reads=user_shaders.examine(heuristic))
+
+
+class Shader:
+    """A user's GLSL as a function of a :class:`heuristic.heuristics.Point`.
+
+    It evaluates the point's arrays and sends those that its code may read. So it cannot be traced
+    in a loop and has no derivatives.
+    """
+
+    def __init__(self, file: str, text: str) -> None:
+        self.file, self.text = file, text
+        code = bare(text)
+        self.words = frozenset(re.findall(r"\b[A-Za-z_]\w*", code))
+        match = _SHADE.search(code)
+        self.line = match and code.count("\n", 0, match.start()) + 1
+        self.__qualname__ = f"{file}, line {self.line}"  # its name in messages
+        self._programs: dict[int, tuple[Any, Any]] = {}
+
+    def __call__(self, point: Point) -> Any:
+        """Return the colours (3, points) as a Dr.Jit colour; raise InputError if it cannot run."""
+        if dr.flag(dr.JitFlag.SymbolicScope):
+            raise InputError(
+                f"{self.file}: Dr.Jit cannot record a shader in GLSL, so it cannot run in a"
+                " symbolic loop. Evaluate that loop, or write the heuristic in Python."
+            )
+        if not mi.is_rgb:
+            raise InputError(
+                f"{self.file}: a shader in GLSL needs RGB colours, which {mi.variant()} does not"
+                " have. Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb."
+            )
+        lights = point.lights if "lights" in self.words else ()
+        fields = self.fields(max(len(lights), 1))
+        values = {name: _value(point, lights, name) for name in fields}
+        dr.eval(list(values.values()))
+        rows = [row for name, size in fields.items() for row in _rows(values[name], size)]
+        count = dr.width(point.arguments.position)
+        compute = self.compiled(max(len(lights), 1))
+        for name, value in vars(point.parameters).items():
+            if name in compute:  # compilers drop unused names
+                compute[name] = float(np.ravel(value)[0])
+        colours = np.empty((count, 3), np.float32)
+        step = max(min(POINTS, FLOATS // max(len(rows), 1)), 1)
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count))
+            chunk = [np.broadcast_to(row, count)[part] for row in rows]
+            colours[part] = _run(compute, chunk, part.stop - start)
+        return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
+
+    def fields(self, lights: int) -> dict[str, int]:
+        """Return the fields of a point that the code may read, in the order of the buffer.
+
+        They are such as ``lights[0].toward``, each with the number of its floats.
+        """
+        owners = [("", POINT), ("material.", MATERIAL)]
+        owners += [(f"lights[{number}].", LIGHT) for number in range(lights)]
+        return {
+            owner + name: size
+            for owner, fields in owners
+            for name, size in fields.items()
+            if name in self.words
+        }
+
+    def compiled(self, lights: int) -> Any:
+        """Compile it for a number of lights; raise InputError with the faulty lines."""
+        context = opengl()
+        known, compute = self._programs.get(lights, (None, None))
+        if known is context:
+            return compute
+        if lights > LIGHTS:
+            raise InputError(
+                f"{self.file}: the scene has {lights} lights; a shader in GLSL takes at most"
+                f" {LIGHTS}. Write it in Python, or remove lights from the scene."
+            )
+        try:
+            compute = context.compute_shader(self._source(lights))
+        except Exception as error:  # moderngl's own, which has the compiler's message
+            message = explained(str(error), self.file, self.text)
+            raise InputError(f"{message}. It does not compile as GLSL 4.30.") from error
+        self._programs[lights] = context, compute
+        return compute
+
+    def _source(self, lights: int) -> str:
+        """Return the compute shader that calls the user's ``shade`` for all points.
+
+        One buffer holds the floats, each for all points before the next.
+        """
+        readings, number = [], 0
+        for name, size in self.fields(lights).items():
+            parts = [f"fotismos_read({number + part}, index)" for part in range(size)]
+            is_mask = " > 0.5" if name.endswith(".visible") else ""
+            readings.append(f"    point.{name} = {_TYPES[size]}({', '.join(parts)}){is_mask};\n")
+            number += size
+        whole = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", self.text)
+        return f"""#version 430
+layout(local_size_x = {GROUP}) in;
+layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values[]; }};
+layout(std430, binding = 1) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
+uniform int fotismos_count;
+{_structure("Material", MATERIAL)}
+{_structure("Light", LIGHT).replace("float visible", "bool visible")}
+{_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
+#line 1
+{whole}
+
+#line {_OURS}
+float fotismos_read(int number, int point) {{
+    return fotismos_values[number * fotismos_count + point];
+}}
+void main() {{
+    int index = int(gl_GlobalInvocationID.x);
+    if (index >= fotismos_count) return;
+    Point point;
+{"".join(readings)}
+    vec3 colour = shade(point);
+    for (int part = 0; part < 3; ++part) fotismos_colours[3 * index + part] = colour[part];
+}}
+"""
+
+
+def _value(point: Point, lights: tuple[LightAtPoint, ...], name: str) -> Any:
+    """Return a field of the record as a Dr.Jit value; a scene without lights gets a dark one."""
+    owner, _, field = name.rpartition(".")
+    if not owner:
+        return getattr(point, field)
+    if owner == "material":
+        return getattr(point.material, field)
+    if not lights:
+        return mi.Float(0)
+    value = getattr(lights[int(owner[len("lights[") : -1])], field)
+    return dr.select(value(), mi.Float(1), 0) if field == "visible" else value
+
+
+def _rows(value: Any, size: int) -> list[np.ndarray]:
+    """Return a value as arrays of floats, one per component."""
+    value = dr.detach(value)
+    is_vector = dr.is_array_v(value) and dr.depth_v(value) == 2
+    parts = list(value) if is_vector else [value] * size
+    return [np.array(part, np.float32).reshape(-1) for part in parts]
+
+
+def _run(compute: Any, rows: list[np.ndarray], count: int) -> np.ndarray:
+    """Return the colours (points, 3) of a chunk of points."""
+    context = opengl()
+    values = context.buffer(reserve=max(4 * count * len(rows), 4))
+    colours = context.buffer(reserve=12 * count)
+    for number, row in enumerate(rows):  # saves one copy
+        values.write(np.ascontiguousarray(row), offset=4 * count * number)
+    for number, buffer in enumerate((values, colours)):
+        buffer.bind_to_storage_buffer(number)
+    compute["fotismos_count"] = count
+    compute.run(group_x=-(-count // GROUP))
+    context.memory_barrier()
+    image = np.frombuffer(colours.read(), np.float32).reshape(count, 3)
+    values.release()
+    colours.release()
+    if (fault := context.error) != "GL_NO_ERROR":
+        raise InputError(f"the shader failed on the graphics card: {fault}. Does it end?")
+    return image
+
+
+_TYPES = {1: "float", 2: "vec2", 3: "vec3"}
+_OURS = 1_000_001
+"""Our lines after the user's are numbered from here, so messages can be told apart. Mesa 22 gives
+the right number of the source string only in some of its messages.
+"""
+
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
+_PLACE = re.compile(r"(?<![\w.])\d+(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+_NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
+_PARAMETER = re.compile(
+    rf"\s*uniform\s+float\s+(\w+)\s*=\s*{_NUMBER}\s*;\s*//\s*{_NUMBER}\s+to\s+{_NUMBER}\s*$"
+)
+_UNIFORM = re.compile(r"\s*(?:layout\s*\(.*\)\s*)?uniform\b")
+_REFUSED = {
+    re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader is one file here: paste the included"
+    " text in its place",
+    re.compile(r"\bvoid\s+main\s*\("): "leave out `main`: fotismos calls `shade` for each point",
+    re.compile(r"\b\w*fotismos_\w*"): "names with `fotismos_` are reserved: choose another one",
+}
+
+
+def bare(text: str) -> str:
+    """Return GLSL without its comments, with the same lines."""
+    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)
+
+
+def uniforms(text: str) -> tuple[Parameter, ...]:
+    """Return the parameters: ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
+    matches = [match for line in text.splitlines() if (match := _PARAMETER.match(line))]
+    return tuple(
+        Parameter(match[1], float(match[2]), float(match[3]), float(match[4])) for match in matches
+    )
+
+
+def refusal(text: str) -> tuple[int, str] | None:
+    """Return the line of a forbidden word, and what to do; None if there is none."""
+    code = bare(text)
+    for number, (line, own) in enumerate(
+        zip(text.splitlines(), code.splitlines(), strict=False), 1
+    ):
+        if _UNIFORM.match(own) and not _PARAMETER.match(line):
+            return number, (
+                "a uniform is a parameter: write its default and bounds, as in"
+                " `uniform float wrap = 0.5;  // 0 to 1`"
+            )
+    for pattern, advice in _REFUSED.items():
+        if match := pattern.search(code):
+            return code.count("\n", 0, match.start()) + 1, advice
+    return None
+
+
+def explained(log: str, file: str, text: str) -> str:
+    """Return the compiler's first errors, with places in a user's text as ``FILE, line N``.
+
+    Compilers write a place as ``0:3(7)``, ``0(3)`` or ``0:3``: source, line, column. Of each line
+    only the first counts, since others follow from it.
+    """
+    messages: dict[str, str] = {}
+    for line in log.splitlines():
+        if "error" not in line.lower():
+            continue
+        match = _PLACE.search(line)
+        message = re.sub(r"(?i)^error:\s*", "", line[match.end() :] if match else line.strip())
+        number = int(next(filter(None, match.groups()))) if match else 0
+        place = f"{file}, line {number}" if number else file
+        if number > text.count("\n") + 1:
+            place = f"{file}, at its end"
+        messages.setdefault(place, message.strip())
+    shown = [f"{place}: {message}" for place, message in messages.items()]
+    return "; ".join(shown[:3]) or f"{file}: {' '.join(log.split())}"
+
+
+def _structure(name: str, fields: dict[str, int], more: str = "") -> str:
+    declared = " ".join(f"{_TYPES[size]} {field};" for field, size in fields.items())
+    return f"struct {name} {{ {declared} {more} }};"
