@@ -10,7 +10,7 @@ from comparisons.case import open_case
 from comparisons.departure.colour import MOST_PIXELS
 from comparisons.options import LARGEST_SPP, Options
 from heuristic.errors import InputError
-from heuristic.meshes import FINEST
+from heuristic.tessellation import FINEST
 from reference.scene import source
 from tests.small_scene import PLAIN, SCENE
 

@@ -10,7 +10,7 @@ import pytest
 
 from comparisons.cost.methods import FULL_PLAN, KERNELS, shaded_by
 from comparisons.gallery.builtin import SCENES
-from heuristic import kernel, meshes
+from heuristic import kernel
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import (
@@ -207,7 +207,7 @@ def test_phong_is_the_kernel_itself(rgb, monkeypatch, interpolation):
     """The declaration leaves no instruction behind: a bare call of the kernel has the same hash."""
     given = checks.with_film(scene(interpolation=interpolation), 32, 4)
     if interpolation != "phong":
-        mesh = meshes.to_mesh(mi.load_dict(given["sphere"]), 4)
+        mesh = tessellation.to_mesh(mi.load_dict(given["sphere"]), 4)
         given = {name: value for name, value in given.items() if name != "sphere"} | {"mesh": mesh}
     loaded = mi.load_dict(given, optimize=False)
     image, hashes = kernels(loaded)

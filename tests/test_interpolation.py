@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heuristic import DirectionalLight, Material, PointLight, meshes, shade
+from heuristic import DirectionalLight, Material, PointLight, meshes, shade, tessellation
 from heuristic.errors import InputError
 from heuristic.normals import WEIGHTINGS
 from heuristic.plugins.interpolated import (
@@ -259,7 +259,7 @@ def test_any_number_of_wavelengths(rgb):
 @pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
 def test_large_meshes_are_stored_whole(rgb, interpolation):
     """Mitsuba reads past the end of a list that is too short, which large meshes bring to light."""
-    mesh = meshes.to_mesh(mi.load_dict({"type": "sphere"}), 256)
+    mesh = tessellation.to_mesh(mi.load_dict({"type": "sphere"}), 256)
     shade_mesh(mesh, interpolation, (0, 0, 9), Material(k_d=1.0), LIGHTS[1:])
     name = "face_heuristic" if interpolation is FLAT else "vertex_heuristic"
     stored = dr.unravel(mi.Color3f, mesh.attribute_buffer(name))
@@ -284,7 +284,7 @@ def test_the_back_is_black_or_has_its_own_values(rgb):
 def test_evaluating_at_the_corners_of_the_face_gives_what_is_stored(variant, flipped):
     """Several meshes and a sphere, with texture coordinates and normals or without."""
     ball = mi.load_dict({"type": "sphere", "center": (0, 0, -5)})
-    mesh = meshes.to_mesh(mi.load_dict({"type": "sphere", "flip_normals": flipped}), 6)
+    mesh = tessellation.to_mesh(mi.load_dict({"type": "sphere", "flip_normals": flipped}), 6)
     few = triangle_mesh(np.add(CORNERS, (3, 3, 0)), TILTED)
     roof = triangle_mesh(np.add(ROOF, (-4, 3, 0)), faces=ROOF_FACES)
     faceted = triangle_mesh(CORNERS - (6, 6, 0), face_normals=True)
@@ -330,7 +330,7 @@ def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
             "bsdf": {"type": "phong"},
         }
     )
-    mesh = meshes.to_mesh(shape, 32)
+    mesh = tessellation.to_mesh(shape, 32)
     assert mesh.id() == "it"
     assert mesh.bsdf().class_name() == shape.bsdf().class_name()
     step = np.pi / 64
@@ -370,20 +370,20 @@ def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
 def test_what_cannot_be_made_into_triangles_is_refused(rgb):
     grid = mi.TensorXf(np.linspace(-1, 1, 8).reshape(2, 2, 2, 1))
     with pytest.raises(InputError, match=r"'blob'.*SDFGrid.*phong interpolation"):
-        meshes.to_mesh(mi.load_dict({"type": "sdfgrid", "id": "blob", "grid": grid}))
+        tessellation.to_mesh(mi.load_dict({"type": "sdfgrid", "id": "blob", "grid": grid}))
     sheared = mi.ScalarTransform4f().rotate((1, 2, 3), 40)  # an axis of another length than 1
     with collect_messages(said := []):
         shape = mi.load_dict({"type": "cylinder", "id": "tube", "to_world": sheared})
     assert "shearing" in " ".join(said)
     with pytest.raises(InputError, match=r"'tube'.*to_world"):
-        meshes.to_mesh(shape)
+        tessellation.to_mesh(shape)
     for resolution in (0, -3, 1.5):
         with pytest.raises(InputError, match="whole number from 1 to 512"):
-            meshes.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
+            tessellation.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
     with pytest.raises(InputError, match="every point"):
         shade_mesh(triangle_mesh(CORNERS, TILTED), PHONG, (0, 0, 1), COLOURED, LIGHTS)
     cube = mi.load_dict({"type": "cube"})
-    assert meshes.to_mesh(cube) is cube
+    assert tessellation.to_mesh(cube) is cube
     scene = mi.load_dict(two_balls(twosided=False))
     with pytest.raises(InputError, match=r"shape '(out|in)ward' is a Sphere: .* need triangle"):
         scene.integrator().render(scene, spp=1)
@@ -400,8 +400,8 @@ def test_a_mesh_without_vertex_normals_gets_those_of_6_34(rgb):
     expected = np.array([(0, 0, 1)] * 2 + [(1, 0, 2) / np.sqrt(5), (-1, 0, 2) / np.sqrt(5)])
     np.testing.assert_allclose(rows(shading_points(mesh, GOURAUD).n), expected, atol=1e-6)
     for weighting in WEIGHTINGS:
-        smooth = meshes.with_vertex_normals(mesh, weighting)
-        np.testing.assert_allclose(rows(meshes.normals(smooth)), expected, atol=1e-6)
+        smooth = tessellation.with_vertex_normals(mesh, weighting)
+        np.testing.assert_allclose(rows(tessellation.normals(smooth)), expected, atol=1e-6)
         assert smooth.has_vertex_normals()
     assert not mesh.has_vertex_normals()
 
@@ -410,7 +410,7 @@ def test_face_normals_need_faces_of_their_own_vertices(rgb):
     mesh = triangle_mesh(ROOF, faces=ROOF_FACES, face_normals=True)
     with pytest.raises(InputError, match="split_faces"):
         shading_points(mesh, GOURAUD)
-    split = meshes.split_faces(mesh)
+    split = tessellation.split_faces(mesh)
     expected = np.repeat([(1, 0, 2), (-1, 0, 2)], 3, axis=0) / np.sqrt(5)
     np.testing.assert_allclose(rows(shading_points(split, GOURAUD).n), expected, atol=1e-6)
     assert split.vertex_count() == 6
@@ -469,7 +469,7 @@ def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
     """Of the face's own normal, on the side that is seen; the corners are those of the mesh."""
     given = two_balls(twosided)
     names = ("outward", "inward")
-    given |= {name: meshes.to_mesh(given[name], 3) for name in names}
+    given |= {name: tessellation.to_mesh(given[name], 3) for name in names}
     scene = mi.load_dict(given, optimize=False)
     mi.render(scene, spp=1)  # stores the values, in variants that do
     x, z = np.random.default_rng(6).uniform(-2, 2, (2, 400))

@@ -17,7 +17,7 @@ from comparisons.departure.limits import (
     of_scene,
     terminator,
 )
-from heuristic import meshes
+from heuristic import tessellation
 from reference.scene.source import Source
 
 SIDE = 32
@@ -209,7 +209,7 @@ def coarse_sphere(light):
             "type": "perspective", "fov": 35.0,
             "to_world": mi.ScalarTransform4f().look_at((0, -4, 0), (0, 0, 0), (0, 0, 1)),
         },
-        "shape": meshes.to_mesh(smooth, 4),
+        "shape": tessellation.to_mesh(smooth, 4),
         "light": light,
     }  # fmt: skip
     return mi.load_dict(description, optimize=False)

@@ -12,7 +12,7 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic import Range, user_shaders
 from heuristic.errors import FotismosError, InputError
-from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, files_of, known_as, named
+from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
 from reference.pairing import halves
 from reference.scene.source import Source
 from tests import checks, oracle
@@ -441,8 +441,8 @@ def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
 def test_files_of_a_heuristic_are_its_own_and_the_modules_that_it_imports(rgb, written, tmp_path):
     written("LEVEL = 0.25\n", "level.py")
     name = written("import fotismos, json, level\ndef shade(point): return level.LEVEL\n")
-    assert files_of(name) == (tmp_path / "level.py", tmp_path / "mine.py")
-    assert files_of("phong") == ()
+    assert named(name).files == (tmp_path / "level.py", tmp_path / "mine.py")
+    assert named("phong").files == ()
     first = named(name).digest()
     written("LEVEL = 0.75\n", "level.py")
     assert named(name).digest() != first
