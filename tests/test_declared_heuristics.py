@@ -10,7 +10,7 @@ import pytest
 
 from comparisons.cost.methods import FULL_PLAN, KERNELS, shaded_by
 from comparisons.gallery.builtin import SCENES
-from heuristic import kernel
+from heuristic import kernel, tessellation
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import (

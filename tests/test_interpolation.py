@@ -380,8 +380,6 @@ def test_what_cannot_be_made_into_triangles_is_refused(rgb):
     for resolution in (0, -3, 1.5):
         with pytest.raises(InputError, match="whole number from 1 to 512"):
             tessellation.to_mesh(mi.load_dict({"type": "sphere"}), resolution)
-    with pytest.raises(InputError, match="every point"):
-        shade_mesh(triangle_mesh(CORNERS, TILTED), PHONG, (0, 0, 1), COLOURED, LIGHTS)
     cube = mi.load_dict({"type": "cube"})
     assert tessellation.to_mesh(cube) is cube
     scene = mi.load_dict(two_balls(twosided=False))
