@@ -15,14 +15,16 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
-from comparisons.departure import criterion
+from comparisons.departure.criterion import TOLERANCE
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
 from reports import verdict
 from reports.charts import figures
+from reports.charts.theme import EFFECT_COLOURS
 from reports.files.images import webp
-from reports.run import batch, scene
-from reports.terminal.words import number
+from reports.jobs import Job
+from reports.run import scene
+from reports.terminal.words import number, percent
 
 SCENE = "cornell-box"
 GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"
@@ -43,39 +45,41 @@ DENSITY = 160
 
 @dataclass(frozen=True)
 class Hero:
-    """A scene's pictures by file name, and its finding."""
+    """A scene's pictures by file name, its numbers, and the parts of its mean by effect."""
 
     pictures: dict[str, Image.Image]
-    finding: verdict.Finding
+    mean: float
+    visible: float
+    parts: dict[str, float]
     command: str
 
 
 def made(request: Options | None = None) -> Hero:
     """Compare the scene as the command does."""
-    job = batch.Job(request or Options(), with_cost=True)
+    job = Job(request or Options(), with_cost=True)
     with TemporaryDirectory() as folder:
         view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
-    study = view.cost.record if view.cost else None
-    return Hero(pictures, verdict.finding(view.record, study), f"./run compare {SCENE}")
+    record, study = view.record, view.cost.record if view.cost else None
+    mean, share = record.metrics[LEADING.name].mean, verdict.share(record).value
+    parts = {name: mean * part for name, part in verdict.missing(record, study).items()}
+    return Hero(pictures, mean, share, parts, f"./run compare {SCENE}")
 
 
 def caption(hero: Hero) -> Iterator[str]:
     """Yield the sentences below the picture, which hold its numbers."""
-    found = hero.finding
-    parts = ", ".join(f"{part.effect} {number(part.size)}" for part in found.parts)
-    share = 100 * found.beyond[criterion.TOLERANCE]
+    parts = ", ".join(f"{effect} {number(part)}" for effect, part in hero.parts.items())
     yield (
-        f"*`{hero.command}`: the mean departure is {LEADING.label} {number(found.mean)}, and"
-        f" {share:.0f} % of the pixels depart by more than {criterion.TOLERANCE:g}, which shows"
-        f" side by side. The bar splits the mean by the effects that would remove it: {parts}.*"
+        f"*`{hero.command}`: {percent(hero.visible)} of the pixels differ visibly, by more than"
+        f" {LEADING.label} {TOLERANCE:g}; the mean is {number(hero.mean)}. The bar splits it by the"
+        f" effects that are missing: {parts}.*"
     )
 
 
 def picture(hero: Hero) -> Figure:
     """Return the labelled panels, the legend of the map, and the bar of effects."""
-    titles = {**PANELS, LEADING.name: f"{LEADING.label}, mean {number(hero.finding.mean)}"}
+    titles = {**PANELS, LEADING.name: f"{LEADING.label}, mean {number(hero.mean)}"}
     with rc_context({"font.size": 12, "text.color": INK, "font.family": "sans-serif"}):
         figure = Figure(figsize=(WIDTH, HEIGHT), facecolor=GROUND)
         for column, (name, title) in enumerate(titles.items()):
@@ -84,7 +88,7 @@ def picture(hero: Hero) -> Figure:
             axes.set_title(title, loc="left", pad=6, fontsize=14)
             axes.axis("off")
         figures.legend(figure, figure.add_axes(_box(8.39, 1.2, 0.12, 2.67)))
-        _effects(figure, hero.finding)
+        _effects(figure, hero)
     return figure
 
 
@@ -94,20 +98,20 @@ def encoded(figure: Figure) -> bytes:
     return webp(Image.open(BytesIO(drawn)).convert("RGB"))
 
 
-def _effects(figure: Figure, found: verdict.Finding) -> None:
+def _effects(figure: Figure, hero: Hero) -> None:
     """Draw the bar on the scale of the mean, and a label for each effect below it."""
     axes = figure.add_axes(_box(0.1, 0.16, BAR, 0.92), xlim=(0, BAR), ylim=(0, 0.92))
     axes.axis("off")
-    axes.text(0, 0.74, "What it lacks", fontsize=14)
+    axes.text(0, 0.74, "What is missing", fontsize=14)
     left = 0.0
-    for part in found.parts:
-        wide = BAR * part.size / found.mean
-        axes.barh(0.47, wide, 0.24, left, color=part.colour, edgecolor=GROUND, linewidth=0.6)
+    for effect, part in hero.parts.items():
+        wide, colour = BAR * part / hero.mean, EFFECT_COLOURS[effect]
+        axes.barh(0.47, wide, 0.24, left, color=colour, edgecolor=GROUND, linewidth=0.6)
         left += wide
     place = 0.0
-    for part in found.parts:
-        axes.barh(0.12, 0.15, 0.15, place, color=part.colour)
-        words = axes.text(place + 0.23, 0.12, f"{part.effect} {number(part.size)}", va="center")
+    for effect, part in hero.parts.items():
+        axes.barh(0.12, 0.15, 0.15, place, color=EFFECT_COLOURS[effect])
+        words = axes.text(place + 0.23, 0.12, f"{effect} {number(part)}", va="center")
         box = words.get_window_extent()
         place = axes.transData.inverted().transform((box.x1, 0))[0] + 0.35
 

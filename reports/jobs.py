@@ -85,7 +85,7 @@ RESULTS = "Results"
 GROUPS = {
     "What is rendered": {*Options.__struct_fields__, "scripts"},
     RESULTS: {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
-    "Bounds and CI": {"max_mean", "max_visible", "within", "junit", "summary", "link"},
+    "Bounds and CI": {"max_visible", "within", "junit", "summary"},
     "Processes": {"timeout", "workers", "scheduler"},
 }
 """The groups of options in help; a command's own options come first."""
@@ -264,6 +264,44 @@ IN_PROCESSES = True
 """Whether scenes are read and rendered in separate processes; tests use their own process."""
 
 
+class Percentage(click.ParamType):
+    """A percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
+
+    name = "percentage"
+
+    def convert(
+        self, value: str, parameter: click.Parameter | None, context: click.Context | None
+    ) -> float:
+        digits, sign, rest = value.strip().partition("%")
+        try:
+            share = float(digits) / 100.0
+        except ValueError:
+            share = math.nan
+        if not (sign and not rest and 0.0 <= share <= 1.0):
+            message = f"{value!r} is not a percentage: give one from 0% to 100%, such as 5%."
+            self.fail(message, parameter, context)
+        return share
+
+
+within_option = click.option(
+    "--within",
+    type=float,
+    default=2.0,
+    show_default=True,
+    metavar="DE",
+    help="Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.",
+)
+_file = click.Path(path_type=Path, dir_okay=False)
+ci_options = with_options(
+    click.option("--junit", type=_file, metavar="FILE", help="Write a JUnit XML file."),
+    click.option(
+        "--summary",
+        type=_file,
+        metavar="FILE",
+        help="Append a summary in Markdown, such as for a comment on a pull request.",
+    ),
+)
+
 open_option = click.option(
     "--open", "is_opened", is_flag=True, help="Open the page in a browser as soon as it exists."
 )
@@ -350,6 +388,22 @@ class Ready:
         import comparisons.compare  # noqa: F401  part of start-up
 
         gc.freeze()  # modules stay: garbage collections need not look at them
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a command does with each of its scenes.
+
+    ``request`` says how to render; ``fresh`` renders finished scenes again; ``coarse`` finds causes
+    with less effort; pixels differ visibly above the ΔE2000 ``within``.
+    """
+
+    request: Options
+    figures: bool = False
+    with_cost: bool = False
+    fresh: bool = False
+    coarse: bool = False
+    within: float = 2.0
 
 
 def command_line() -> str:

@@ -66,7 +66,7 @@ class Shown:
 
     def __repr__(self) -> str:
         """Return the finding, for consoles and notebooks that show text alone."""
-        return " ".join(verdict.sentences([verdict.finding(self.comparison.record)]))
+        return verdict.about(self.comparison.record)
 
     def _repr_html_(self) -> str:
         """Show the page in a frame, which isolates its styles and scripts."""

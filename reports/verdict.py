@@ -1,49 +1,47 @@
-"""A run's findings in sentences and bars: how many scenes look right, and what the others lack.
+"""What a run found, in sentences: how many scenes look right, what is missing, and what to do.
 
-A scene looks right at a tolerance if at most 5 % of its pixels depart by more
-(:mod:`comparisons.departure.criterion`). The attribution of a study of cost says what it lacks.
+One quantity decides everything here, see :mod:`comparisons.departure.criterion`: the share of the
+pixels that differ visibly, by more than a tolerance.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from comparisons.comparison import ComparisonRecord
-from comparisons.departure import criterion
+from comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
 from comparisons.departure.metrics import LEADING
-from heuristic.heuristics import Interpolation
-from reference.planning.effects import EFFECTS
-from reports.charts.theme import EFFECT_COLOURS
-from reports.terminal.words import seconds
+from comparisons.departure.noise import VisibleShare
+from heuristic import program
+from reports.terminal.words import number, percent, seconds
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
 
-TOLERANCES = (1.0, 2.0, 5.0)
-"""The tolerances that can be chosen."""
+NAMED = 3
+"""Number of effects that the sentence on a run names."""
 
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
 
-WITH_CAUSES = "--why"
-"""The option of ``compare`` that finds causes and remedies; it is on by default."""
-
-NAMED = 3
-"""Number of effects that the sentence names."""
-
-NO_REMEDY = "none at the small size of the study; `cost SCENE` tries more"
-"""What stands in place of a method if none of the study's is within the tolerance."""
-
-KERNEL_NAMES = {
-    Interpolation.FLAT: "flat kernel",
-    Interpolation.GOURAUD: "Gouraud kernel",
-    Interpolation.PHONG: "Phong kernel",
+MISSING = {
+    "distance attenuation": "fall-off with distance",
+    "environment": "environment light",
+    "extended lights": "the size of the lamps",
+    "interreflection": "light between surfaces",
+    "microfacets and Fresnel": "microfacets",
+    "occlusion": "shadows",
+    "polygon interpolation": "normals between the vertices",
+    "spectral": "spectral light",
+    "spot cone": "the fall-off in a spot's cone",
 }
-"""The method that is judged, by its interpolation."""
+"""What an image without an effect lacks."""
 
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
@@ -53,14 +51,8 @@ TEXTBOOK = ("phong", "blinn")
 class Judged:
     """The names of a first half.
 
-    Attributes
-    ----------
-    subject
-        The first words of a sentence, such as "Textbook shading".
-    title
-        Of a row or column, such as "Textbook".
-    name
-        Within a sentence, such as "textbook".
+    ``subject`` begins a sentence, such as "Textbook shading"; ``title`` heads a row or column, such
+    as "Textbook"; ``name`` stands within a sentence, such as "textbook".
     """
 
     subject: str
@@ -78,183 +70,172 @@ def judged(record: ComparisonRecord) -> Judged:
     return Judged(name, name, name)
 
 
-@dataclass(frozen=True)
-class BarPart:
-    """One effect's part of a bar: ΔE2000, scaled to the scene's mean."""
-
-    effect: str
-    colour: str
-    size: float
+# --- One scene -------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Remedy:
-    """The cheapest method of a study whose mean error stays within a tolerance.
+def share(record: ComparisonRecord, threshold: float = TOLERANCE) -> VisibleShare:
+    """Return the share of a scene's pixels that differ visibly, with its interval."""
+    return share_above(record.metrics[LEADING.name].visible, threshold)
 
-    ``is_judged`` tells that it is the judged method itself: its mean is within the tolerance,
-    though too many of its pixels are not.
+
+def decision(record: ComparisonRecord, threshold: float = TOLERANCE) -> Verdict:
+    """Return whether a scene passes at a tolerance, fails, or is undecided."""
+    return decide(record.metrics[LEADING.name].visible, threshold)
+
+
+def missing(record: ComparisonRecord, cost: Cost | None = None) -> dict[str, float]:
+    """Return ``{effect: its share of what all surely remove}``, the largest first."""
+    effects = cost.attribution.effects if cost else ()
+    sure = {one.effect: one.removes.value for one in effects if one.removes.low > 0}
+    total = sum(sure.values())
+    return {effect: sure[effect] / total for effect in sorted(sure, key=lambda name: -sure[name])}
+
+
+def cause(record: ComparisonRecord, cost: Cost | None = None) -> str:
+    """Return what is mostly missing in a scene, as a sentence; empty if that is unknown."""
+    effects = missing(record, cost)
+    return f"Mostly missing: {_noun(next(iter(effects)))}." if effects else ""
+
+
+def sentence(
+    record: ComparisonRecord, cost: Cost | None = None, threshold: float = TOLERANCE
+) -> str:
+    """Return what to do about a scene at a tolerance: nothing that fails the criterion itself."""
+    if record.caution:
+        return record.caution
+    lead, found = record.metrics[LEADING.name], share(record, threshold)
+    match decision(record, threshold):
+        case "pass":
+            return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
+        case "undecided":
+            return (
+                f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
+                f" differ, and {percent(LIMIT)} may. More samples (--spp, --noise) decide."
+            )
+    if lead.after_exposure.p95 <= threshold:
+        return f"Only the level is off: ×{number(lead.after_exposure.exposure)} makes it pass."
+    if record.picture:
+        return "The map shows where the picture is wrong."
+    if cost is None or not hasattr(cost, "predicted"):  # a study without tolerances
+        return f"To find the cheapest method that passes: `{search(record, threshold)}`."
+    return _remedy(record, cost, threshold)
+
+
+def _remedy(record: ComparisonRecord, cost: Any, threshold: float) -> str:
+    """Return the cheapest method of a study that passes, or else the nearest that is better.
+
+    At the scene's own size, if the study predicts for it. Times that cannot be told apart are not
+    ranked: of these methods, the most accurate is named.
     """
-
-    method: str
-    seconds: float
-    is_judged: bool = False
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One scene of a run.
-
-    Attributes
-    ----------
-    scene, mean
-        Its name, and its mean departure.
-    beyond
-        ``{tolerance: share of the pixels that depart by more}``.
-    parts
-        The effects' parts of the mean, largest first; empty without a study of cost.
-    remedies
-        ``{tolerance: cheapest method, or None}``; empty without a study of cost.
-    is_exact
-        Whether the mean is at most :data:`EXACT`.
-    subject
-        What is judged, as the first words of a sentence.
-    """
-
-    scene: str
-    mean: float
-    beyond: dict[float, float]
-    parts: tuple[BarPart, ...]
-    remedies: dict[float, Remedy | None]
-    is_exact: bool
-    subject: str = "Textbook shading"
-    caution: str = ""
-
-    def is_right(self, tolerance: float) -> bool:
-        """Return whether the scene looks right at one of :data:`TOLERANCES`."""
-        return self.beyond[tolerance] <= criterion.LIMIT
-
-    @property
-    def cause(self) -> str | None:
-        """The effect that causes most of the departure; None if unknown."""
-        return self.parts[0].effect if self.parts else None
-
-
-def finding(record: ComparisonRecord, cost: Cost | None = None) -> Finding:
-    """Return the finding of a scene."""
-    metric = record.metrics[LEADING.name]
-    return Finding(
-        scene=record.scene,
-        mean=metric.mean,
-        beyond={limit: criterion.share_above(metric.visible, limit).value for limit in TOLERANCES},
-        parts=_parts(metric.mean, cost) if cost else (),
-        remedies={limit: _remedy(cost, limit) for limit in TOLERANCES} if cost else {},
-        is_exact=metric.high <= EXACT,
-        subject=judged(record).subject,
-        caution=record.caution,
+    points = cost.predicted or cost.points
+    size = "x".join(map(str, cost.at if cost.predicted and cost.at else cost.resolution))
+    kernels = [point for point in points if _is_judged(cost, point.method)]
+    passing = [point for point in points if point.tolerance.high <= threshold]
+    if passing:
+        fastest = min(passing, key=lambda point: point.seconds.value)
+        tied = [point for point in passing if point.seconds.low <= fastest.seconds.high]
+        best = min(tied, key=lambda point: point.tolerance.mean)
+        time = seconds(best.seconds.value)
+        if kernels:
+            time += f", kernel {seconds(min(point.seconds.value for point in kernels))}"
+        return f"{_capital(best.method)} passes: {time} at {size}."
+    nearest = min(points, key=lambda point: point.tolerance.mean)
+    more = f"To try more samples: `{search(record, threshold, 4 * nearest.spp)}`."
+    if nearest in kernels:
+        return f"None of the {len(cost.methods)} methods measured is closer. {more}"
+    return (
+        f"None of the {len(cost.methods)} methods measured passes. Nearest:"
+        f" {nearest.method} with {nearest.spp} samples, which passes at"
+        f" {LEADING.label} {number(nearest.tolerance.high)}. {more}"
     )
 
 
-def _parts(mean: float, cost: Cost) -> tuple[BarPart, ...]:
-    """Scale what effects surely remove to the mean, which was measured at full size."""
-    sure = [one for one in cost.attribution.effects if one.removes.low > 0]
-    total = sum(one.removes.value for one in sure)
-    ordered = sorted(sure, key=lambda one: -one.removes.value)
-    return tuple(
-        BarPart(one.effect, EFFECT_COLOURS[one.effect], mean * one.removes.value / total)
-        for one in ordered
+def _is_judged(cost: Any, name: str) -> bool:
+    """Return whether a method of a study is the kernel that is judged."""
+    return any(
+        name in (one.name, *one.names)
+        and one.is_kernel
+        and not (one.shadows or one.heuristic)
+        and one.interpolation == cost.interpolation
+        for one in cost.methods
     )
 
 
-def _remedy(cost: Cost, tolerance: float) -> Remedy | None:
-    from comparisons.cost.front import cheapest  # only with a study of cost
-
-    best = cheapest(cost.points, tolerance)
-    if best is None:
-        return None
-    names = next(method.names for method in cost.methods if method.name == best.method)
-    judged_name = KERNEL_NAMES[cost.interpolation]
-    # Another heuristic than Phong's stands behind a colon.
-    is_judged = any(name.partition(":")[0] == judged_name for name in names)
-    return Remedy(best.method, best.seconds.value, is_judged)
-
-
-def sentences(findings: Sequence[Finding], tolerance: float = criterion.TOLERANCE) -> list[str]:
-    """Return a run's findings, in one or two sentences."""
-    right = sum(found.is_right(tolerance) for found in findings)
-    if len(findings) == 1:
-        (only,) = findings
-        share = only.beyond[tolerance]
-        said = [
-            f"{only.subject} looks right in {only.scene}."
-            if right
-            else f"{only.subject} is visibly wrong in {100 * share:.0f} % of the pixels of"
-            f" {only.scene}."
-        ]
-    else:
-        subjects = {found.subject for found in findings}
-        subject = subjects.pop() if len(subjects) == 1 else "The first half"
-        said = [f"{subject} looks right in {right} of {len(findings)} scenes."]
-    doubts = [(found.scene, found.caution) for found in findings if found.caution]
-    if doubts:
-        said[0] = " ".join([*(f"{scene}: {caution}" for scene, caution in doubts), said[0]])
-    lacking = ranked([found for found in findings if not found.is_right(tolerance)])
-    if lacking:
-        said.append(f"What it lacks most is {', then '.join(map(_noun, lacking[:NAMED]))}.")
-    return said
+def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -> str:
+    """Return the command that finds the cheapest method for a scene at a tolerance."""
+    words = shlex.split(record.command)
+    scene, *rest = words[words.index("compare") + 1 :]
+    kept = [
+        word
+        for option, value in pairwise([*rest, ""])
+        if option in ("-D", "--sensor", "--heuristic", "--pairing", "--interpolation")
+        for word in (option, value)
+    ]
+    more = ["--spp", spp] if spp else []
+    return program.command("plan", scene, "--within", f"{threshold:g}", *kept, *more)
 
 
-def about(found: Finding, tolerance: float = criterion.TOLERANCE) -> str:
-    """Return one scene's finding: how much is wrong, mostly why, and a remedy."""
-    if found.caution:
-        return found.caution
-    if found.is_exact:
-        return f"{found.subject} is exact here, as far as can be seen."
-    share = found.beyond[tolerance]
-    wrong = f"is visibly wrong in {100 * share:.0f} % of the pixels"
-    said = [f"{found.subject} {'looks right here' if found.is_right(tolerance) else wrong}."]
-    if found.cause:
-        said.append(f"It lacks mostly {_noun(found.cause)}.")
-    remedy = found.remedies.get(tolerance)
-    if remedy and remedy.is_judged and not found.is_right(tolerance):
-        said.append(f"Its mean is within {LEADING.label} {tolerance:g} all the same.")
-    elif remedy and not found.is_right(tolerance):
-        said.append(
-            f"The cheapest method tried within a mean of {LEADING.label} {tolerance:g}:"
-            f" {remedy.method}, {seconds(remedy.seconds)} at the small size of the study."
-        )
-    return " ".join(said)
+def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float = TOLERANCE) -> str:
+    """Return a scene's verdict, what is mostly missing, and what to do, in a few sentences."""
+    parts = [headline([record], threshold)]
+    if decision(record, threshold) != "pass":
+        parts += [cause(record, cost), sentence(record, cost, threshold)]
+    return " ".join(dict.fromkeys(filter(None, parts)))
 
 
-def advice(findings: Sequence[Finding], tolerance: float = criterion.TOLERANCE) -> list[str]:
-    """Return a line for each scene that does not look right: what it lacks, and a remedy."""
-    if not any(found.remedies for found in findings):
-        return [f"For causes and remedies, give the same command with {WITH_CAUSES}."]
-    lines = []
-    for found in findings:
-        if found.is_right(tolerance) or not found.remedies:
-            continue
-        remedy = found.remedies[tolerance]
-        cause = f"mostly {_noun(found.cause)}" if found.cause else "no cause is known"
-        way = _way(remedy)
-        lines.append(f"{found.scene}: {cause}; mean within {LEADING.label} {tolerance:g}: {way}")
-    return lines
+def _noun(effect: str) -> str:
+    return MISSING.get(effect, effect)
 
 
-def _way(remedy: Remedy | None) -> str:
-    if remedy is None:
-        return NO_REMEDY
-    return "as it is" if remedy.is_judged else f"{remedy.method} in {seconds(remedy.seconds)}"
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
-def _noun(label: str) -> str:
-    """Return what an image without an effect lacks."""
-    return next(effect.noun or label for effect in EFFECTS if effect.label == label)
+# --- A run -----------------------------------------------------------------------------------
+
+Studied = tuple[ComparisonRecord, "Cost | None"]
+"""A scene's record, and its study of cost if there is one."""
 
 
-def ranked(findings: Sequence[Finding]) -> list[str]:
-    """Return the effects by their total departure over some scenes, largest first."""
-    sizes: dict[str, float] = defaultdict(float)
-    for found in findings:
-        for part in found.parts:
-            sizes[part.effect] += part.size
-    return sorted(sizes, key=lambda effect: -sizes[effect])
+def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:
+    """Return how many scenes look right at a tolerance; of a single one, how much is wrong."""
+    subjects = {judged(record).subject for record in records}
+    subject = subjects.pop() if len(subjects) == 1 else "The first half"
+    decisions = Counter(decision(record, threshold) for record in records)
+    if len(records) > 1:
+        undecided = decisions["undecided"]
+        close = f"; {undecided} {'is' if undecided == 1 else 'are'} too close to call"
+        count = f"{decisions['pass']} of {len(records)} scenes"
+        return f"{subject} looks right in {count}{close if undecided else ''}."
+    (record,) = records
+    if record.caution:
+        return f"{record.scene}: {record.caution}"
+    if decisions["pass"]:
+        return f"{subject} looks right in {record.scene}."
+    if decisions["undecided"]:
+        return f"{subject} may look right in {record.scene}."
+    wrong = percent(share(record, threshold).value)
+    return f"{subject} is visibly wrong in {wrong} of the pixels of {record.scene}."
+
+
+def most_missing(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> str:
+    """Return what the scenes that fail lack most, by pixels; empty if that is unknown."""
+    pixels: Counter[str] = Counter()
+    for record, cost in scenes:
+        if decision(record, threshold) == "fail":
+            wrong = share(record, threshold).value
+            pixels.update({effect: wrong * part for effect, part in missing(record, cost).items()})
+    named = [_noun(effect) for effect, _ in pixels.most_common(NAMED)]
+    return f"Mostly missing: {', '.join(named)}." if named else ""
+
+
+def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[str]:
+    """Yield a line for each scene that does not pass: what is missing, and what to do."""
+    for record, cost in scenes:
+        if decision(record, threshold) != "pass" and not record.caution:
+            yield " ".join(
+                filter(
+                    None,
+                    (f"{record.scene}:", cause(record, cost), sentence(record, cost, threshold)),
+                )
+            )

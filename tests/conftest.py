@@ -80,7 +80,7 @@ def run():
 def two_scenes(tmp_path_factory):
     """What a comparison of two small scenes wrote, one of them without noise, and printed."""
     folder = tmp_path_factory.mktemp("two")
-    names = ["--resolution", "24x16", "--spp", 16, "--max-mean", 1, "--max-visible", "0%"]
+    names = ["--resolution", "24x16", "--spp", 16, "--max-visible", "10%"]
     files = ["-o", folder / "out", "--junit", folder / "j.xml", "--summary", folder / "s.md"]
     code, printed, _ = command_line("compare", "lambert-sphere", "fig-8-9", *names, *files)
     return SimpleNamespace(folder=folder, out=folder / "out", code=code, printed=printed)

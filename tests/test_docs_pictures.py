@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from reports import verdict
 from tests.programs import ROOT
 
 
@@ -21,16 +20,21 @@ def docs(monkeypatch):
 @pytest.fixture
 def hero(docs):
     module = docs("hero")
-    parts = (verdict.BarPart("shadows", "#0072b2", 6.0), verdict.BarPart("Fresnel", "#e69f00", 2.0))
-    found = verdict.Finding("box", 8.0, {1.0: 0.9, 2.0: 0.75, 5.0: 0.5}, parts, {}, False)
+    parts = {"occlusion": 6.0, "interreflection": 2.0}
     pictures = {name: Image.new("RGB", (8, 8)) for name in module.PANELS}
-    return module, module.Hero(pictures, found, "./run compare box")
+    return module, module.Hero(pictures, 8.0, 0.75, parts, "./run compare box")
 
 
 def test_the_caption_has_the_numbers_of_the_finding(hero):
     module, made = hero
     (caption,) = module.caption(made)
-    for words in ("`./run compare box`", "ΔE2000 8", "75 % of", "shadows 6", "Fresnel 2"):
+    for words in (
+        "`./run compare box`",
+        "the mean is 8",
+        "75.0 % of",
+        "occlusion 6",
+        "interreflection 2",
+    ):
         assert words in caption
 
 
@@ -43,7 +47,7 @@ def test_the_first_picture_is_labelled_and_its_bar_is_as_long_as_the_mean(hero):
     ]  # fmt: skip
     bars = figure.axes[-1]
     written = [text.get_text() for text in bars.texts]
-    assert written == ["What it lacks", "shadows 6.00", "Fresnel 2.00"]
+    assert written == ["What is missing", "occlusion 6.00", "interreflection 2.00"]
     widths = [bar.get_width() for bar in bars.patches[:2]]
     assert np.allclose(widths, [0.75 * module.BAR, 0.25 * module.BAR])
 

@@ -44,12 +44,14 @@ def share_above(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -
     )
 
 
-def decide(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -> Verdict:
-    """Return whether at most `LIMIT` of the pixels are above a threshold, as far as noise allows.
+def decide(
+    visible: Sequence[VisibleShare], threshold: float = TOLERANCE, limit: float = LIMIT
+) -> Verdict:
+    """Return whether at most ``limit`` of the pixels are above a threshold, if noise allows.
 
-    ``pass`` if the interval ends at `LIMIT` or below it, ``fail`` if it begins above it.
+    ``pass`` if the interval ends at ``limit`` or below it, ``fail`` if it begins above it.
     """
     share = share_above(visible, threshold)
-    if share.high <= LIMIT:
+    if share.high <= limit:
         return "pass"
-    return "fail" if share.low > LIMIT else "undecided"
+    return "fail" if share.low > limit else "undecided"

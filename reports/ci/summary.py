@@ -1,44 +1,29 @@
-"""What CI and people read of a run: JUnit XML, a summary in Markdown, lines of a check.
-
-Modules that load metrics or rich are imported late: the options are part of ``--help``.
-"""
+"""What CI and people read of a run: gates, JUnit XML, a summary in Markdown, lines of a check."""
 
 from __future__ import annotations
 
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import click
-
 from comparisons import atomic
+from comparisons.comparison import ComparisonRecord
+from comparisons.departure.criterion import TOLERANCE, Verdict, decide
+from comparisons.departure.metrics import LEADING
+from comparisons.departure.noise import VisibleShare
 from heuristic import program
 from heuristic.errors import InputError, OutputError
-from reports.terminal.words import visible
+from reports import verdict
+from reports.terminal.tables import escaped, markdown, printed
+from reports.terminal.words import number, percent, visible
 
 if TYPE_CHECKING:
     from comparisons.check.moved import Move
     from reports.ci.checks import CheckRecord
-    from reports.ci.gates import Gate
-    from reports.page.scene_view import SceneView
-
-_file = click.Path(path_type=Path, dir_okay=False)
-
-options = (
-    click.option("--junit", type=_file, metavar="FILE", help="Write a JUnit XML file."),
-    click.option(
-        "--summary",
-        type=_file,
-        metavar="FILE",
-        help="Append a summary in Markdown, such as for a comment on a pull request.",
-    ),
-    click.option(
-        "--link", metavar="URL", help="Where the page will be, for the summary. [default: its path]"
-    ),
-)
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""
@@ -52,13 +37,74 @@ SHOWN = 12
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
+# --- Gates -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Gate:
+    """The largest share of a scene's pixels that may differ visibly, and the share that does."""
+
+    scene: str
+    bound: float
+    found: VisibleShare
+    state: Verdict
+
+    def cells(self) -> tuple[str, ...]:
+        """Return its row of a table: scene, at most, share, from, to, result."""
+        numbers = self.bound, self.found.value, self.found.low, self.found.high
+        return self.scene, *map(percent, numbers), self.state
+
+    def __str__(self) -> str:
+        _, bound, share, low, high, state = self.cells()
+        return (
+            f"{share} of the pixels ({low} to {high}) differ by more than {LEADING.label}"
+            f" {self.found.threshold:g}, at most {bound} may: {state}"
+        )
+
+
+GATE_HEADINGS = ("scene", "at most", "pixels that differ", "from", "to", "result")
+
+
+def gates(
+    records: Iterable[ComparisonRecord], bound: float | None, threshold: float = TOLERANCE
+) -> list[Gate]:
+    """Return a gate for each scene; none without a bound."""
+    if bound is None:
+        return []
+    return [
+        Gate(
+            record.scene,
+            bound,
+            verdict.share(record, threshold),
+            decide(record.metrics[LEADING.name].visible, threshold, bound),
+        )
+        for record in records
+    ]
+
+
+def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
+    """Yield the lines on the gates of a run."""
+    yield ""
+    yield from printed([GATE_HEADINGS, *(gate.cells() for gate in gates)], right=1)
+    yield gate_outcome(gates)
+
+
+def gate_outcome(gates: Sequence[Gate]) -> str:
+    """Return the line that says how it went."""
+    states = [gate.state for gate in gates]
+    words: dict[Verdict, str] = {"fail": "failed", "undecided": "undecided", "pass": "passed"}
+    counts = (f"{states.count(state)} {word}" for state, word in words.items() if state in states)
+    more = " More samples (--spp, --noise) decide." if "undecided" in states else ""
+    return f"gates: {', '.join(counts)}.{more}"
+
+
 # --- Files -----------------------------------------------------------------------------------
 
 
 def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str | Path]) -> None:
     """Ensure that the files for CI replace no input, and nothing that fotismos did not make.
 
-    A JUnit file replaces only an earlier one; a summary is appended to Markdown, or to
+    JUnit replaces only an earlier JUnit file; a summary is appended to Markdown, or to
     ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
     """
     paths = [Path(one) for one in inputs]
@@ -114,51 +160,43 @@ def append(path: Path | None, text: Callable[[], str]) -> None:
 
 def junit_of_checks(checks: Sequence[CheckRecord]) -> bytes:
     """Return the XML document of checks, one test case for each baseline."""
-    statuses = [made.status for made in checks]
-    seconds = sum(made.seconds for made in checks)
-    counts = {"failures": statuses.count("failed"), "errors": statuses.count("error"), "skipped": 0}
-    root, suite = _suites("check", len(checks), counts, time=f"{seconds:.3f}")
+    cases = []
     for made in checks:
-        names = {"name": _clean(made.name), "file": _clean(made.baseline)}
-        time = f"{made.seconds:.3f}"
-        case = SubElement(suite, "testcase", names, classname="fotismos.check", time=time)
+        names = {"name": made.name, "file": made.baseline, "time": f"{made.seconds:.3f}"}
+        case = _element("testcase", {**names, "classname": "fotismos.check"})
         if made.status == "failed":
-            failure = SubElement(case, "failure", message=_clean(headline(made)), type="moved")
+            failure = _element("failure", {"message": headline(made), "type": "moved"})
             failure.text = _clean("\n".join(moved_lines(made)))
+            case.append(failure)
         elif made.status == "error":
-            error = SubElement(case, "error", message=_clean(made.message), type="error")
-            error.text = _clean(made.message)
-    return _document(root)
+            case.append(_element("error", {"message": made.message, "type": "error"}))
+        cases.append(case)
+    return _document("check", cases)
 
 
 def junit_of_gates(gates: Sequence[Gate]) -> bytes:
     """Return the XML document of a comparison's gates, one test case for each."""
-    states = [gate.state for gate in gates]
-    skipped = states.count("undetermined")
-    counts = {"failures": states.count("failed"), "errors": 0, "skipped": skipped}
-    root, suite = _suites("compare", len(gates), counts)
+    cases = []
     for gate in gates:
-        name = _clean(f"{gate.scene}, {gate.name}")
-        case = SubElement(suite, "testcase", name=name, classname="fotismos.compare")
-        kind = {"failed": "failure", "undetermined": "skipped"}.get(gate.state)
-        if kind:
-            SubElement(case, kind, message=_clean(str(gate)))
-    return _document(root)
+        case = _element("testcase", {"name": gate.scene, "classname": "fotismos.compare"})
+        if gate.state != "pass":
+            case.append(_element("failure", {"message": str(gate), "type": gate.state}))
+        cases.append(case)
+    return _document("compare", cases)
 
 
-def _suites(
-    command: str, tests: int, counts: dict[str, int], **more: str
-) -> tuple[Element, Element]:
-    """Return the root of a document, and its one suite."""
-    totals = {"name": f"fotismos {command}", "tests": str(tests)}
-    totals |= {name: str(count) for name, count in counts.items()} | more
+def _document(command: str, cases: Sequence[Element]) -> bytes:
+    kinds = [child.tag for case in cases for child in case]
+    totals = {"name": f"fotismos {command}", "tests": str(len(cases)), "skipped": "0"}
+    totals |= {f"{kind}s": str(kinds.count(kind)) for kind in ("failure", "error")}
     root = Element("testsuites", totals)
-    return root, SubElement(root, "testsuite", totals)
-
-
-def _document(root: Element) -> bytes:
+    SubElement(root, "testsuite", totals).extend(cases)
     indent(root)
     return tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _element(tag: str, attributes: dict[str, str]) -> Element:
+    return Element(tag, {name: _clean(text) for name, text in attributes.items()})
 
 
 def _clean(text: str) -> str:
@@ -169,36 +207,34 @@ def _clean(text: str) -> str:
 # --- Markdown --------------------------------------------------------------------------------
 
 
-def of_comparison(views: Sequence[SceneView], gates: Sequence[Gate], page: str) -> str:
-    """Return the summary of a run: its finding, a row for each scene, and its gates.
-
-    ``page`` is the address of the page, or its path.
-    """
-    from comparisons.departure import criterion
-    from reports import verdict
-    from reports.ci.gates import HEADINGS, outcome
-    from reports.terminal.tables import escaped, markdown
-    from reports.terminal.words import number, percent
-
-    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
-    lead, usual = verdict.LEADING, criterion.TOLERANCE
-    rows = [("Scene", "Mostly lacks", f"Mean {lead.label}", f"Pixels above {usual:g}")]
-    rows += [
-        (escaped(f.scene), escaped(f.cause or ""), number(f.mean), percent(f.beyond[usual]))
-        for f in found
-    ]
-    sentences = escaped(" ".join(verdict.sentences(found)))
-    parts = ["### fotismos compare", sentences, "\n".join(markdown(rows, 2))]
+def of_comparison(
+    scenes: Sequence[verdict.Studied],
+    gates: Sequence[Gate],
+    page: str,
+    threshold: float = TOLERANCE,
+) -> str:
+    """Return the summary of a run: its verdict, a row for each scene, and its gates."""
+    headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What to do")
+    rows = []
+    for record, cost in scenes:
+        numbers = (
+            percent(verdict.share(record, threshold).value),
+            number(record.metrics[LEADING.name].mean),
+        )
+        words = f"{verdict.cause(record, cost)} {verdict.sentence(record, cost, threshold)}"
+        rows.append((escaped(record.scene), *numbers, escaped(words.strip())))
+    first = verdict.headline([record for record, _ in scenes], threshold)
+    second = verdict.most_missing(scenes, threshold)
+    parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
+    parts.append("\n".join(markdown([headings, *rows])))
     if gates:
         cells = [[escaped(text) for text in gate.cells()] for gate in gates]
-        parts += ["\n".join(markdown([HEADINGS, *cells], 2)), outcome(gates)]
-    return "\n\n".join([*parts, _link(page)]) + "\n\n"
+        parts += ["\n".join(markdown([GATE_HEADINGS, *cells])), gate_outcome(gates)]
+    return "\n\n".join([*parts, _where(page)]) + "\n\n"
 
 
 def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     """Return the summary of checks; ``page`` is empty if none was written."""
-    from reports.terminal.tables import escaped, markdown
-
     rows: list[tuple[str, ...]] = [
         ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
     ]
@@ -210,14 +246,10 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
         rows.append((made.name, made.status, *cells))
     table = markdown([rows[0], *([escaped(cell) for cell in row] for row in rows[1:])], right=3)
     parts = ["### fotismos check", outcome(checks, level), "\n".join(table)]
-    return "\n\n".join([*parts, *([_link(page)] if page else ())]) + "\n\n"
+    return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
-def _link(page: str) -> str:
-    from reports.terminal.tables import escaped
-
-    if page.startswith(("https://", "http://")):
-        return f"[Pictures, maps and numbers]({page.replace(')', '%29').replace(' ', '%20')})"
+def _where(page: str) -> str:
     return f"Pictures, maps and numbers: {escaped(page) if '`' in page else f'`{visible(page)}`'}"
 
 
@@ -226,8 +258,6 @@ def _link(page: str) -> str:
 
 def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     """Yield what moved in each scene, then a table of all scenes."""
-    from reports.terminal.tables import printed
-
     for made in checks:
         yield from _details(made)
     if len(checks) > 1:
@@ -261,8 +291,6 @@ def headline(made: CheckRecord) -> str:
 
 def moved_lines(made: CheckRecord) -> Iterator[str]:
     """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
-    from reports.terminal.tables import printed
-
     moved = made.moved or ()
     rows: list[tuple[str, ...]] = [
         ("what moved", "baseline", "now", "change", "standard errors", "p")

@@ -9,7 +9,6 @@ from click.core import ParameterSource
 
 from heuristic.errors import InputError
 from reports import jobs
-from reports.ci import summary as summaries
 from reports.terminal.words import echo, is_quiet, quiet_option, tell, verbose_option
 
 
@@ -37,7 +36,7 @@ from reports.terminal.words import echo, is_quiet, quiet_option, tell, verbose_o
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
 @jobs.json_option
-@jobs.with_options(*summaries.options)
+@jobs.ci_options
 @jobs.output_option("out", "check")
 @jobs.timeout_option
 @jobs.workers_option
@@ -57,7 +56,6 @@ def check(
     as_json: bool,
     junit: Path | None,
     summary: Path | None,
-    link: str | None,
     output: Path,
     timeout: float,
     workers: int | None,
@@ -87,6 +85,8 @@ def check(
     _require_consistent(update, scenes, images, given)
     jobs.require_known(scenes)
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
+    from reports.ci import summary as summaries  # loaded late: --help needs no metrics
+
     summaries.require_free(junit, summary, [*scenes, *inputs])
     with jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler) as pool:
         pool.start()
@@ -114,8 +114,7 @@ def check(
         if made.status == "error":
             echo(f"fotismos: error: {made.message}", err=True)
     summaries.write_junit(junit, lambda: summaries.junit_of_checks(found))
-    address = (link or place) if views else ""
-    summaries.append(summary, lambda: summaries.of_checks(found, significance, address))
+    summaries.append(summary, lambda: summaries.of_checks(found, significance, place))
     code = max(made.exit_code for made in found)
     if as_json:
         record = checks.Checks(passed=not code, significance=significance, checks=tuple(found))

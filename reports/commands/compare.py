@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reports import jobs
-from reports.ci import gates
-from reports.ci import summary as summaries
 from reports.run import batch
 from reports.terminal.words import quiet_option, tell, verbose_option
 
@@ -41,8 +39,14 @@ if TYPE_CHECKING:
     help="Find causes and remedies, at a small size; of a picture, none. [default: why]",
 )
 @jobs.open_option
-@click.option("--cost", is_flag=True, hidden=True, help="The same as --why.")
-@jobs.with_options(*gates.options, *summaries.options)
+@jobs.within_option
+@click.option(
+    "--max-visible",
+    type=jobs.Percentage(),
+    metavar="P%",
+    help="Exit code 1 unless at most this share of each scene's pixels differs visibly.",
+)
+@jobs.ci_options
 @click.pass_context
 def compare(
     context: click.Context,
@@ -51,17 +55,15 @@ def compare(
     figures: bool,
     fresh: bool,
     with_cost: bool,
-    cost: bool,
     scripts: bool,
     timeout: float,
     workers: int | None,
     scheduler: str | None,
     is_opened: bool,
-    max_mean: float | None,
+    within: float,
     max_visible: float | None,
     junit: Path | None,
     summary: Path | None,
-    link: str | None,
     **rendering: Any,
 ) -> None:
     """Measure how far textbook shading is from physics, where, and whether it is more than noise.
@@ -91,30 +93,36 @@ def compare(
     if rendering["image"] and len(scenes) > 1:
         raise click.UsageError("--image goes with one scene.")
     request = jobs.request(rendering)
-    heuristic = (rendering["heuristic"] or "").partition(":")[0]
-    pictures = [word.partition(":")[0] for word in rendering["image"]]
-    summaries.require_free(
-        junit, summary, [*scenes, *pictures, *([heuristic] if heuristic else ())]
-    )
-    with_cost |= cost
-    job = batch.Job(request, figures, with_cost=with_cost, fresh=fresh)
-    failed = False
+    has_summary = max_visible is not None or junit is not None or summary is not None
+    if has_summary:
+        from reports.ci.summary import require_free  # loaded late: most comparisons need no CI
+
+        named = [rendering["heuristic"] or "", *rendering["image"]]
+        files = (word.partition(":")[0] for word in named)
+        require_free(junit, summary, [*scenes, *filter(None, files)])
+    code = 0
 
     def finish(folder: Path, views: Sequence[SceneView]) -> None:
         """Print the gates, and write the files for CI."""
-        nonlocal failed
-        found = gates.evaluate([view.record for view in views], max_mean, max_visible)
-        if found:
-            tell(gates.lines(found))
-        failed = any(gate.state == gates.FAILED for gate in found)
-        page = link or str(folder / "index.html")
-        summaries.write_junit(junit, lambda: summaries.junit_of_gates(found))
-        if summary is not None:
-            summaries.append(summary, lambda: summaries.of_comparison(views, found, page))
+        from reports.ci import summary as ci  # loaded late: most comparisons need no CI
+
+        nonlocal code
+        studied = [(view.record, view.cost.record if view.cost else None) for view in views]
+        gates = ci.gates([record for record, _ in studied], max_visible, within)
+        if gates:
+            tell(ci.gate_lines(gates))
+        code = int(any(gate.state != "pass" for gate in gates))
+        ci.write_junit(junit, lambda: ci.junit_of_gates(gates))
+        page = str(folder / "index.html")
+        ci.append(summary, lambda: ci.of_comparison(studied, gates, page, within))
 
     scenes = tuple(jobs.expand(scenes, scripts))
-    rendered = jobs.pool(timeout, len(scenes), workers, scheduler)
     batch.run(
-        scenes, output, job, rendered, on_page=jobs.open_page if is_opened else None, finish=finish
+        scenes,
+        output,
+        jobs.Job(request, figures, with_cost=with_cost, fresh=fresh, within=within),
+        jobs.pool(timeout, len(scenes), workers, scheduler),
+        on_page=jobs.open_page if is_opened else None,
+        finish=finish if has_summary else None,
     )
-    context.exit(int(failed))
+    context.exit(code)

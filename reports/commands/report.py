@@ -46,6 +46,7 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @verbose_option
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @jobs.open_option
+@jobs.within_option
 def report(
     output: Path,
     figures: bool,
@@ -55,6 +56,7 @@ def report(
     scheduler: str | None,
     quick: bool,
     is_opened: bool,
+    within: float,
     **rendering: Any,
 ) -> None:
     """Compare all built-in scenes, attribute their errors to effects, and write one report.
@@ -74,7 +76,7 @@ def report(
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
-    job = batch.Job(request, figures, with_cost=True, fresh=fresh, coarse=quick)
+    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, coarse=quick, within=within)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
     further = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, job, rendered, further, jobs.open_page if is_opened else None)

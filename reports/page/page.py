@@ -52,6 +52,9 @@ SCRIPTS = (
 )  # fmt: skip
 
 
+TOLERANCES = (1.0, 2.0, 5.0)
+"""The tolerances that can be chosen."""
+
 #: Fewest scenes for a meaningful ranking.
 FEWEST = 4
 
@@ -133,21 +136,29 @@ def render(
 
 def _verdict(scenes: Sequence[PageScene]) -> dict[str, Any]:
     """Return the data of the first screen: the verdict, and a bar for each scene, worst first."""
-    found = [verdict.finding(s.record, s.cost.record if s.cost else None) for s in scenes]
-    rows = sorted(zip(scenes, found, strict=True), key=lambda row: -row[1].mean)
-    names = verdict.ranked(found)
+    studied = [(scene.record, scene.cost.record if scene.cost else None) for scene in scenes]
+    rows: list[dict[str, Any]] = [
+        {
+            "id": scene.id,
+            "name": record.scene,
+            "mean": record.metrics[LEADING.name].mean,
+            "parts": verdict.missing(record, cost),
+            "passes": [t for t in TOLERANCES if verdict.decision(record, t) == "pass"],
+            "sentences": {t: verdict.sentence(record, cost, t) for t in TOLERANCES},
+        }
+        for scene, (record, cost) in zip(scenes, studied, strict=True)
+    ]
+    names = dict.fromkeys(effect for row in rows for effect in row["parts"])
+    records = [scene.record for scene in scenes]
     return {
-        "sentences": verdict.sentences(found),
-        "rows": rows,
-        "about": {s.id: verdict.about(f) for s, f in zip(scenes, found, strict=True)},
-        "tolerances": verdict.TOLERANCES,
+        "sentences": [verdict.headline(records), verdict.most_missing(studied)],
+        "rows": sorted(rows, key=lambda row: -row["mean"]),
+        "about": {s.id: verdict.about(*pair) for s, pair in zip(scenes, studied, strict=True)},
+        "tolerances": TOLERANCES,
         "usual": criterion.TOLERANCE,
         "share": criterion.LIMIT,
-        "top": ROOM * max((f.mean for f in found), default=1.0) or 1.0,
+        "top": ROOM * max((row["mean"] for row in rows), default=1.0) or 1.0,
         "effects": {name: EFFECT_COLOURS[name] for name in names},
-        "with_causes": verdict.WITH_CAUSES,
-        "has_remedies": any(f.remedies for f in found),
-        "has_causes": any(f.remedies for f in found),
     }
 
 

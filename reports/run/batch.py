@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 from comparisons.processes.pool import Pool, Task
 from heuristic.errors import FotismosError, InstallationError, OutputError
 from reports import jobs
+from reports.jobs import Job
 from reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
-    from comparisons.options import Options
     from reports.page.scene_view import SceneView
     from reports.run.results import Failure, RunRecord
     from reports.terminal.progress import Bar
@@ -30,21 +30,6 @@ SCENE, FURTHER = 8.0, 1.0
 
 SHARE = 0.1
 """Greatest share of the time that writing unfinished pages may take."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What a command does with each of its scenes.
-
-    ``request`` says how to render; ``fresh`` renders finished scenes again; ``coarse`` finds causes
-    with less effort.
-    """
-
-    request: Options
-    figures: bool = False
-    with_cost: bool = False
-    fresh: bool = False
-    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,10 +134,12 @@ def run(
     """
     with pool as pool:
         pool.start()
+        from comparisons.departure.criterion import checked_threshold
         from reports.run import results
         from reports.run.results import FIGURES, START, TABLES
         from reports.terminal import progress
 
+        checked_threshold(job.within)
         requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
         command = jobs.command_line()
         with results.hold(folder, command) as folder:
@@ -173,9 +160,9 @@ def run(
             except KeyboardInterrupt:
                 pool.end()
                 if batch.done:
-                    _write(batch, job.figures, is_interrupted=True)
+                    _write(batch, job, is_interrupted=True)
                 raise
-            _write(batch, job.figures, content)
+            _write(batch, job, content)
             if finish is not None:
                 finish(folder, batch.ordered)
     if batch.errors:
@@ -232,7 +219,7 @@ def _compare(
 
 def _write(
     batch: Batch,
-    with_figures: bool,
+    job: Job,
     content: Mapping[str, Any] | None = None,
     is_interrupted: bool = False,
 ) -> None:
@@ -250,7 +237,7 @@ def _write(
     ]
     if views:
         steps.append(lambda: tables.write(folder / results.TABLES, records))
-    if views and with_figures:
+    if views and job.figures:
         from reports.charts import figures
 
         steps.append(lambda: figures.write_run(folder / results.FIGURES, records))
@@ -262,15 +249,17 @@ def _write(
     if errors:
         raise errors[0]
     if views:
-        tell(_summary(views))
+        tell(_summary(views, job.within))
     tell_where(folder / results.PAGE)
 
 
-def _summary(views: Sequence[SceneView]) -> Iterable[str]:
+def _summary(views: Sequence[SceneView], threshold: float) -> Iterable[str]:
     """Yield the table of scenes, the verdict and its advice."""
     from reports import verdict
     from reports.terminal import tables
 
     yield from tables.summary([view.record for view in views])
-    found = [verdict.finding(v.record, v.cost.record if v.cost else None) for v in views]
-    yield from ("", *verdict.sentences(found), *verdict.advice(found))
+    studied = [(view.record, view.cost.record if view.cost else None) for view in views]
+    yield from ("", verdict.headline([record for record, _ in studied], threshold))
+    yield from filter(None, [verdict.most_missing(studied, threshold)])
+    yield from verdict.advice(studied, threshold)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from comparisons.comparison import Comparison, Images
     from comparisons.cost.cost import Study
     from reference.rendering.renderer import Progress
-    from reports.run.batch import Job
+    from reports.jobs import Job
 
 RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"
 
