@@ -22,7 +22,7 @@ from comparisons.comparison import (
     Significant,
     TimeSpent,
 )
-from comparisons.departure import limits, marks, regions, statistics
+from comparisons.departure import marks, regions, statistics
 from comparisons.departure.blocks import bands
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn, leading_distance
@@ -122,9 +122,6 @@ def _compare(
     caution = require_light(*shown, source.name, options)
     picture = picture_warnings.picture_record(place, options, images) if options.image else None
     done("metrics")
-    noisy = estimates.reference, estimates.standard_error
-    faults = limits.count(ready.scene, ready.pair.physical, *noisy, images.counted)
-    done("limits of the reference")
     terms, no_terms = pixel_terms.trace(ready.heuristic, options)
     done("terms")
     made = ComparisonRecord(
@@ -138,7 +135,6 @@ def _compare(
         plan=record.plan_record(ready, reference.spp * estimates.passes, estimates.passes),
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
-        limits=faults,
         regions=regions.find(images.maps[LEADING.name], images.counted),
         histograms={
             name: statistics.histogram(images.maps[name][images.counted]) for name in drawn()

@@ -7,7 +7,6 @@ import numpy as np
 from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
-from comparisons.departure.limits import LimitCounts
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
 from comparisons.pixel_terms import TermGrid
@@ -132,7 +131,6 @@ class ComparisonRecord(Record, kw_only=True):
     log2_luminance: RatioSummary
     significant: Significant
     pixels: Pixels
-    limits: LimitCounts
     regions: Annotated[
         tuple[Region, ...],
         Meta(description="Boxes that hold most of dE2000, the most valuable first."),

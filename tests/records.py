@@ -135,7 +135,6 @@ def data():
         },
         "log2_luminance": {"mean": -0.133, "p05": -0.561, "p50": -0.0542, "p95": 0.321},
         "significant": {"fraction": 0.632, "undetermined": 0.171, "level": 0.05},
-        "limits": {"clamped": 3, "terminator": 4, "energy_loss": 5, "fireflies": 6, "any": 17},
         "pixels": {"counted": 20, "total": 24},
         "regions": [
             {"x": 1, "y": 2, "width": 3, "height": 2, "share": 0.541, "mean_dE2000": 9.13},

@@ -103,9 +103,12 @@ def test_no_required_key_may_be_missing(record):
 def test_the_numbers_on_the_page_are_the_records(record, pictures):
     shown = Page(page.render([records.view(record, embedded=pictures)]))
     values = {value for value, _ in shown.values}
-    keys = ("metrics", "log2_luminance", "significant", "limits", "viewing", "pixels", "pairing")
-    keys += ("time",)
+    keys = ("log2_luminance", "significant", "viewing", "pixels", "pairing", "time")
     parts = [record[key] for key in keys]
+    for metric in record["metrics"].values():
+        chosen = [each for each in metric["visible"] if each["threshold"] in (1, 2, 5)]
+        shares = [[each[end] for end in ("value", "low", "high")] for each in chosen]
+        parts.append(metric | {"visible": shares})
     parts += [(region["share"], region["mean_dE2000"]) for region in record["regions"]]
     # The level of the marks is printed, as "5 %", without a machine-readable value.
     missing = {n for n in numbers_in(parts) if n not in values} - {0.05}

@@ -183,16 +183,6 @@ def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
     )
 
 
-def white_roughplastic(graph: Graph, index: int) -> RoughPlastic | None:
-    """Return a white roughplastic, None for other BSDFs and those that pairing will reject."""
-    if graph.plugin(index) != "roughplastic":
-        return None
-    try:
-        return _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
-    except (InputError, RuntimeError):
-        return None
-
-
 def _roughplastic(
     graph: Graph, index: int, base: tuple | None = None, coat: tuple | None = None
 ) -> RoughPlastic:

@@ -21,7 +21,7 @@ SAMPLES = (None, 4)
 """None for the plan's own number."""
 
 CLOCKS = ("comparisons.compare.perf_counter", "reference.rendering.renderer.perf_counter")
-METRICS = ("metrics", "limits of the reference")
+METRICS = ("metrics",)
 
 
 def run(rounds):
