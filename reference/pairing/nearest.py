@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from heuristic.errors import InputError
 from heuristic.materials import SMALLEST_ALPHA
 from heuristic.terms import normalisation
 from reference.pairing import albedo, probe
