@@ -209,7 +209,8 @@ LEADING = METRICS.own(
         definition="CIE DE2000 between CIE L*a*b* colours (D65, 2° observer) of the images as a "
         "display shows them: exposed, then clipped to [0, 1].",
         caution="It was fitted to small differences, up to about 5, of uniform patches: large "
-        "values are ordered, but twice the value is not twice as far. Above white it sees nothing.",
+        "values are ordered, but twice the value is not twice as far. Values above white look "
+        "alike to it.",
         map_range=(0.0, 20.0),
         visible=THRESHOLDS,
         coordinates=lab,
@@ -240,7 +241,7 @@ METRICS.own(
         definition="Euclidean distance in J'a'b' of CAM16-UCS (Li et al. 2017), of the images as a "
         "display shows them: exposed, then clipped to [0, 1].",
         caution="It assumes one adaptation over the whole image, from the viewing conditions. "
-        "Above white it sees nothing.",
+        "Values above white look alike to it.",
         map_range=(0.0, 20.0),
         visible=THRESHOLDS,
         coordinates=cam16ucs,
@@ -272,7 +273,7 @@ METRICS.own(
         definition="FLIP (Andersson et al. 2020) of the images as a display shows them: what a "
         "viewer sees in flipping between them, also edges and points, at the given pixels per "
         "degree.",
-        caution="It holds for one distance from the screen. Above white it sees nothing.",
+        caution="It holds for one distance from the screen. Values above white look alike to it.",
         map_range=(0.0, 1.0),
         rounding=1e-4,
         function=ldr_flip,

@@ -29,6 +29,9 @@ CHANGES = {
 }
 """What another version than the pinned one changes; whether meshes work, ``doctor`` tries."""
 
+BROKEN = "cannot be "
+"""How the state of a part begins that does not work here."""
+
 
 @jobs.command()
 def doctor() -> None:
@@ -55,10 +58,18 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
-        yield f"meshes          {pool.do(Task('meshes', meshed, (llvm.VARIANTS[0],)))}"
-        yield f"GLSL            {pool.do(Task('GLSL', shaded, ()))}"
+        parts = {
+            "meshes": pool.do(Task("meshes", meshed, (llvm.VARIANTS[0],))),
+            "GLSL": pool.do(Task("GLSL", shaded, ())),
+        }
+        yield from (f"{part:<15} {state}" for part, state in parts.items())
         apart = pool.do(Task("colour differences", compared, ()))
         yield f"metrics         at most {apart:.0e} from those of colour-science"
+    broken = [part for part, state in parts.items() if state.startswith(BROKEN)]
+    yield ""
+    yield "fotismos works here" + (
+        f", except for {' and '.join(broken)}: see above for what to do." if broken else "."
+    )
 
 
 def rendered(variant: str) -> str:

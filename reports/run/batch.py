@@ -156,7 +156,8 @@ def run(
             total = SCENE * len(places) + (FURTHER * len(further.tasks) if further else 0.0)
             try:
                 with progress.shown(total=total) as bar:
-                    content = _compare(pool, batch, calls, bar, further)
+                    stages = ("rendering", *(["causes"] if job.with_cost else ()))
+                    content = _compare(pool, batch, calls, bar, further, stages)
             except KeyboardInterrupt:
                 pool.end()
                 if batch.done:
@@ -177,6 +178,7 @@ def _compare(
     calls: Mapping[str, tuple[Any, ...]],
     bar: Bar,
     further: Further | None,
+    stages: tuple[str, ...],
 ) -> dict[str, Any]:
     """Collect the views and errors of scenes, and return the further content of the page."""
     from comparisons.case import name_of
@@ -186,7 +188,8 @@ def _compare(
     others: dict[str, Any] = {}
     names = {task.name for task in further.tasks} if further else set()
     tasks = [
-        Task(place, scene.compare, call, bar.of(name_of(call[0]))) for place, call in calls.items()
+        Task(place, scene.compare, call, bar.of(name_of(call[0]), stages))
+        for place, call in calls.items()
     ]
     bar.begin("scenes", len(tasks), SCENE)
     for task, outcome in pool.each([*tasks, *(further.tasks if further else ())]):
@@ -258,7 +261,7 @@ def _summary(views: Sequence[SceneView], threshold: float) -> Iterable[str]:
     from reports import verdict
     from reports.terminal import tables
 
-    yield from tables.summary([view.record for view in views])
+    yield from tables.summary([view.record for view in views], threshold)
     studied = [(view.record, view.cost.record if view.cost else None) for view in views]
     yield from ("", verdict.headline([record for record, _ in studied], threshold))
     yield from filter(None, [verdict.most_missing(studied, threshold)])

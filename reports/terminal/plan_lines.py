@@ -103,7 +103,7 @@ def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
 
 
 def _rules(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "pruning rule", "applies", "premise not known to hold", "evidence"
+    yield "pruning rule", "applies", "premise not shown", "evidence"
     for rule in plan.rules:
         yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
 

@@ -1,19 +1,10 @@
-"""Progress bars while a command runs."""
+"""Progress while a command runs: each scene's stage, what comes next, and the time left."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    Task,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
 from rich.text import Text
 
 from reports.terminal.words import level, visible
@@ -32,46 +23,59 @@ class Bar:
     def __init__(
         self, progress: Progress, unit: str = "passes", total: float | None = None
     ) -> None:
-        self._progress, self._unit, self._whole = progress, unit, None
-        if total:
-            self._whole = progress.add_task("", total=total, unit="", is_whole=True)
+        self._progress, self._unit = progress, unit
+        self._whole = progress.add_task("", total=total) if total else None
+        self._tasks: dict[Callable[..., None], TaskID] = {}
         self._stage, self._done, self._count, self._weight = "", 0, 0, 0.0
 
-    def of(self, scene: str) -> Callable[[str, int, int], None]:
-        """Return the callback ``(stage, done, total)`` for one scene."""
-        task = self._progress.add_task(visible(scene), total=None, unit=self._unit, is_whole=False)
-        return partial(self._update, task)
+    def of(self, scene: str, stages: tuple[str, ...] = ()) -> Callable[[str, int, int], None]:
+        """Return the callback ``(stage, done, total)`` for one scene; ``stages`` are to come."""
+        name = visible(scene)
+        task, current = self._progress.add_task(name, total=None), ""
+
+        def update(stage: str, done: int, total: int) -> None:
+            nonlocal current
+            if stage != current:
+                current = stage
+                self._progress.reset(task)  # the speed of the last stage says nothing on this one
+            after = stages[stages.index(stage) + 1 :] if stage in stages else ()
+            words = f"{name}: {stage} {done} of {total} {self._unit}"
+            words += f", {after[0]} next" if after else ""
+            self._progress.update(task, completed=done, total=total, description=words)
+
+        self._tasks[update] = task
+        return update
 
     def begin(self, stage: str, count: int, weight: float) -> None:
         """Begin a stage of the run: ``count`` tasks of a weight each."""
         self._stage, self._done, self._count, self._weight = stage, 0, count, weight
-        if self._whole is not None:
-            self._progress.update(self._whole, description=self._words())
+        self._advance(0.0)
 
     def over(self, update: Callable[..., None] | None, weight: float | None = None) -> None:
         """End the task with this callback: remove its bar, and advance the run's.
 
         A task with its own weight is not one of the stage's.
         """
-        if isinstance(update, partial):
-            self._progress.remove_task(update.args[0])
+        if update in self._tasks:
+            self._progress.remove_task(self._tasks.pop(update))
         self._done += weight is None
+        self._advance(self._weight if weight is None else weight)
+
+    def _advance(self, weight: float) -> None:
         if self._whole is not None:
-            advance = self._weight if weight is None else weight
-            self._progress.update(self._whole, advance=advance, description=self._words())
-
-    def _words(self) -> str:
-        return f"{self._stage}, {self._done} of {self._count}"
-
-    def _update(self, task: TaskID, stage: str, done: int, total: int) -> None:
-        self._progress.update(task, completed=done, total=total)
+            words = f"{self._stage}, {self._done} of {self._count}"
+            self._progress.update(self._whole, advance=weight, description=words)
 
 
-class _Count(MofNCompleteColumn):
-    """The part of a task that is done; of the whole run, in percent."""
+class TimeLeft(ProgressColumn):
+    """The time that a task still takes, roughly."""
 
     def render(self, task: Task) -> Text:
-        return Text(f"{task.percentage:.0f} %") if task.fields["is_whole"] else super().render(task)
+        """Return it in seconds or minutes; nothing while it is unknown."""
+        left = task.time_remaining
+        if left is None or task.finished:
+            return Text("")
+        return Text(f"about {left:.0f} s" if left < 90 else f"about {left / 60:.0f} min")
 
 
 @contextmanager
@@ -81,9 +85,7 @@ def shown(unit: str = "passes", total: float | None = None) -> Iterator[Bar]:
     with Progress(
         TextColumn("{task.description}", markup=False),  # a name may hold brackets
         BarColumn(),
-        _Count(),
-        TextColumn("{task.fields[unit]}"),
-        TimeRemainingColumn(),
+        TimeLeft(),
         console=console,
         transient=True,
         speed_estimate_period=SPEED_OVER_S,

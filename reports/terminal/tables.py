@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
+from comparisons.departure.criterion import TOLERANCE, share_above
 from comparisons.departure.metrics import LEADING, METRICS
 from heuristic.heuristics import PHONG
 from reference.records import plain
@@ -196,19 +197,35 @@ def _shown(cell: Any) -> str:
 # --- Lines on a run ----------------------------------------------------------------------------
 
 
-def summary(records: Iterable[ComparisonRecord]) -> Iterator[str]:
-    """Yield a line for each scene: departure, noise, shape, and times."""
-    records = list(records)
+def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Iterator[str]:
+    """Yield a line for each scene: pixels that differ, departure, noise, shape, and times."""
     for record in records:
         if record.picture:
             yield from _picture(record, record.picture)
-    yield from printed(_table(records), right=1)
+    headings = "differ", f"mean {LEADING.label}", "noise", "shape", "heuristic", "reference"
+    rows: list[tuple[str, ...]] = [("scene", *headings)]
+    for record in records:
+        metric = record.metrics[LEADING.name]
+        means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
+        halves = record.time.heuristic, record.time.reference
+        rows.append(
+            (
+                record.scene,
+                percent(share_above(metric.visible, threshold).value),
+                *(number(mean) for mean in means),
+                *(seconds(half.total_s) for half in halves),
+            )
+        )
+    yield from printed(rows, right=1)
+    yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
             yield from record.mistakes
         if record.noise_target:
             yield _noise(record, record.noise_target)
+        if count := len(record.warnings):
+            yield f"{record.scene}: {count} warning{'s' * (count > 1)}, which -v and the page show"
         guard = record.plan.guard
         if guard and guard.state == "disagreed":
             yield (
@@ -225,24 +242,6 @@ def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
     yield f"shift {place}; red, green, blue {ratio} times the reference's"
     yield from picture.odd
     yield ""
-
-
-def _table(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
-    yield (
-        "scene",
-        f"mean {LEADING.label}",
-        "noise",
-        "shape",
-        "significant",
-        "heuristic",
-        "reference",
-    )
-    for record in records:
-        metric = record.metrics[LEADING.name]
-        means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
-        times = (f"{half.total_s:.2f} s" for half in (record.time.heuristic, record.time.reference))
-        significant = f"{record.significant.fraction:.1%}"
-        yield record.scene, *(f"{mean:.3f}" for mean in means), significant, *times
 
 
 def details(record: ComparisonRecord) -> Iterator[str]:
