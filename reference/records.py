@@ -85,22 +85,7 @@ def schema(kind: type) -> dict[str, Any]:
 
 
 def read(kind: type[Kind], text: str, where: str) -> Kind:
-    """Read a record.
-
-    Parameters
-    ----------
-    kind
-        The type of record.
-    text
-        JSON.
-    where
-        Name of the file, for messages.
-
-    Raises
-    ------
-    InputError
-        When the text is not such a record, or is of another version.
-    """
+    """Read a record from JSON; InputError names the file ``where`` if it holds none."""
     try:
         content = json.loads(text)
         version = content.get("record_version") if isinstance(content, dict) else None
@@ -130,7 +115,6 @@ def _of_version_2(kind: type[Kind], content: dict[str, Any], where: str) -> Kind
 
 
 def _describe(definition: dict[str, Any]) -> None:
-    """Move the meanings of attributes from a type's docstring to the attributes."""
     docstring = inspect.cleandoc(
         re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
     )

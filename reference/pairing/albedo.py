@@ -16,9 +16,8 @@ plugin tabulates by Gauss-Legendre rules over visible microfacet normals ``m``
     R = 2 mean(mu sum w G(o) F),  o the reflected one,  seen from within, over the same cosines,
 
 for light that arrives at the cosine ``mu``, with Fresnel's ``F`` and Smith's masking ``G``. The
-rules are visibly coarse: ``1 - R`` is uneven by 1e-4 in the index of refraction, so no table of it
-reproduces the plugin's values. Here the same sums run as a kernel, in 8 ms; to make the plugin and
-evaluate it takes 70 ms, and a search for an index of refraction does so some forty times.
+rules are coarse: ``1 - R`` is uneven by 1e-4 in the index of refraction. Here the same sums run as
+a kernel, in 8 ms; the plugin takes 70 ms, and a search for an index asks some forty times.
 
 Two symmetries save work: light arrives in the plane of x and z, so slopes along y count once for
 both signs, and Beckmann's slopes along x and y are independent.
@@ -49,8 +48,6 @@ KEPT = 4096
 """Materials whose results are kept."""
 
 ROWS = 64
-"""Cosines at which the plugin tabulates."""
-
 COSINES = np.maximum(np.linspace(0, 1, ROWS, dtype=np.float32), np.float32(1e-6))
 SINES = np.sqrt(1 - COSINES * COSINES)
 
@@ -59,10 +56,9 @@ COARSE, FINE = 32, 128
 
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
-"""Reflects 2.5e-9 at normal incidence; used for anything less, since Mitsuba rejects an IOR of
-1."""
+"""Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
 LARGEST_IOR = 10.0
-"""No dielectric comes near it; a larger specular albedo is recorded as missed."""
+"""A larger specular albedo is recorded as missed."""
 
 MATCHING_TOLERANCE = 1e-5
 """Relative tolerance; a larger mismatch is recorded as a miss."""
@@ -73,11 +69,7 @@ STEP = 1.02
 
 @dataclass(frozen=True)
 class RoughPlastic:
-    """Parameters of Mitsuba's ``roughplastic``.
-
-    ``diffuse_reflectance`` and ``specular_reflectance`` have three components, ``int_ior`` is
-    relative to vacuum, as in Mitsuba, and ``alpha`` is the root-mean-square slope.
-    """
+    """Parameters of Mitsuba's ``roughplastic``; ``alpha`` is the root-mean-square slope."""
 
     diffuse_reflectance: tuple[float, float, float]
     alpha: float
@@ -136,10 +128,7 @@ def specular_of(plastic: RoughPlastic) -> np.ndarray:
 def of_smooth_plastic(
     level: float, int_ior: float, ext_ior: float, nonlinear: bool
 ) -> tuple[float, float]:
-    """Return the diffuse albedo of Mitsuba's ``plastic`` for one reflectance, and the mirror's.
-
-    The latter is Fresnel's at normal incidence, ``((n_i - n_e) / (n_i + n_e))^2``.
-    """
+    """Return the diffuse albedo of Mitsuba's ``plastic`` for one reflectance, and its mirror's."""
     eta = int_ior / ext_ior
     theta, weight = nodes(1.0)
     cosine = np.cos(theta)
@@ -155,8 +144,7 @@ def of_smooth_plastic(
 def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
     """Return the IOR at which the specular part has an albedo, or the nearest one allowed.
 
-    The albedo rises with the IOR, and a smooth surface's is Fresnel's ``((ior - 1) / (ior +
-    1))^2``: the search begins at its inverse.
+    The search begins at the inverse of a smooth surface's ``((ior - 1) / (ior + 1))^2``.
     """
 
     def reached(log_ior):
@@ -184,10 +172,9 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
 
 
 def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
-    """Return the IOR, up to the plastic's own, whose albedos are nearest to given ones.
+    """Return the IOR, up to the plastic's own, whose albedos are nearest in the least squares.
 
-    A high index reflects more, and transmits less to the diffuse base and back: no index gives both
-    parts. The sum of squares over the parts and channels is minimised, over ``log(log(IOR))``.
+    A high index reflects more and transmits less to the base and back: no index gives both.
     """
 
     def distance(log_ior):
@@ -206,8 +193,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
     while is_rising and low > smallest:
         low, high = max(low - 1, smallest), low
         is_rising = slope(low) >= 0
-    # If the slope rises even at the smallest IOR, that one is nearest; if it never rises, the
-    # highest is: there is no minimum in between.
+    # Without a change of sign the smallest or the highest IOR is nearest.
     if low < high and not is_rising:
         from scipy.optimize import brentq  # loaded late: see ior_of_lobe
 
@@ -226,14 +212,10 @@ def nodes(alpha: float) -> tuple[np.ndarray, np.ndarray]:
     return theta, 2 * np.pi * np.sin(theta) * jacobian * weights * end / 2
 
 
-@lru_cache
-def _legendre(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes in (-1, 1) and weights of the Gauss-Legendre rule, computed once."""
-    return np.polynomial.legendre.leggauss(size)
+_legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
 def _fresnel(cosine: np.ndarray, eta: float) -> np.ndarray:
-    """Return the reflectance of a smooth dielectric for unpolarised light."""
     inside = np.sqrt(np.maximum(1 - (1 - cosine**2) / eta**2, 0))
     across = (cosine - eta * inside) / (cosine + eta * inside)
     along = (eta * cosine - inside) / (eta * cosine + inside)
@@ -305,8 +287,6 @@ def _rule(variant: str, size: int) -> tuple:
 def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic, tuple[Miss, ...]]:
     """Return the :class:`RoughPlastic` that corresponds to a :class:`Phong`, and its misses.
 
-    It uses the current variant of Mitsuba, whose plugin determines the albedo:
-
     >>> grey = (0.5, 0.5, 0.5)
     >>> plastic, misses = to_roughplastic(Phong(grey, (0.2, 0.2, 0.2), 12), Convention.MATCHED)
     >>> misses, round(plastic.alpha, 9)
@@ -351,8 +331,6 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
 @lru_cache(maxsize=KEPT)
 def to_phong(plastic: RoughPlastic, convention: Convention) -> Phong:
     """Return the :class:`Phong` that corresponds to a :class:`RoughPlastic`; nothing is missed.
-
-    By name, ``n = 2 / alpha^2 - 2`` and ``k_d = rho``:
 
     >>> plastic = RoughPlastic(diffuse_reflectance=(0.5, 0.4, 0.3), alpha=0.5, int_ior=1.5)
     >>> phong = to_phong(plastic, Convention.LITERAL)

@@ -6,7 +6,7 @@ light through or must be measured, are in :mod:`reference.pairing.nearest`. Valu
 :mod:`reference.scene.values`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -52,13 +52,6 @@ PLASTICS = (1.3, 1.8)
 """Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
 
 
-def may_differ_from_0(props: mi.Properties, defaults: Mapping[str, float]) -> bool:
-    """Return whether any of some parameters, given with defaults, may be other than 0."""
-    return any(
-        values.may_be_nonzero(props.get(name, default)) for name, default in defaults.items()
-    )
-
-
 def give_default(graph: Graph) -> None:
     """Give shapes without a BSDF Mitsuba's default, so it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -66,12 +59,6 @@ def give_default(graph: Graph) -> None:
             glows = graph.children(shape, mi.ObjectType.Emitter)
             default = properties("diffuse", reflectance=0.0 if glows else 0.5)
             graph.attach(shape, "bsdf", graph.add(BSDF, default))
-
-
-def check(graph: Graph) -> None:
-    """Reject coefficients that are not reflectances."""
-    for index in graph.nodes(BSDF):
-        values.check_colours(graph, index, COLOURS.get(graph.plugin(index), ()))
 
 
 @dataclass(frozen=True)
@@ -186,7 +173,9 @@ def to_physical(graph: Graph, convention: Convention, replaced: Replacements) ->
         if plugin == "diffuse":
             replaced.bsdf(label, "phong", plugin, {"reflectance": _base(given)})
         else:
-            note = _unreal(parameters["int_ior"] / parameters["ext_ior"])
+            (low, high), ior = PLASTICS, parameters["int_ior"] / parameters["ext_ior"]
+            note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
+            note = "" if low <= ior <= high else note
             replaced.bsdf(label, "phong", plugin, parameters, note)
         props = properties(plugin, **parameters)
         is_twosided = given.get("twosided", False)
@@ -209,16 +198,7 @@ def physical_partner(
 
 
 def _base(given: mi.Properties) -> str:
-    """Return the coefficient of a phong without a lobe that becomes its reflectance."""
     return "k_d" if "k_d" in given and values.may_be_nonzero(given["k_d"]) else "k_a"
-
-
-def _unreal(index: float) -> str:
-    """Return a note on an index of refraction that no real plastic has, or an empty string."""
-    low, high = PLASTICS
-    if low <= index <= high:
-        return ""
-    return f"no real plastic has the index {index:.3g}: they have {low:g} to {high:g}"
 
 
 def phong(graph: Graph, index: int) -> Phong:
@@ -262,9 +242,7 @@ def alike(
 
 
 def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:
-    if material.normalised:
-        return material
-    if values.is_zero(material.k_s):
+    if material.normalised or values.is_zero(material.k_s):
         return replace(material, normalised=True)
     n = values.plain(material.n)
     if n is None:
@@ -297,9 +275,7 @@ def mask(context: Context, index: int) -> NearestPhong:
         name: values.share(graph, getattr(inner, name), opacity) for name in ("k_a", "k_d", "k_s")
     }
     passed = values.total(
-        graph,
-        values.rest(graph, 1.0, opacity),
-        values.share(graph, inner.transmittance, opacity),
+        graph, values.rest(graph, 1.0, opacity), values.share(graph, inner.transmittance, opacity)
     )
     return replace(inner, **reflected, transmittance=passed)
 

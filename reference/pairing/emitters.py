@@ -30,9 +30,11 @@ import numpy as np
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.lights import INVERSE_SQUARE
 from reference.pairing.factors import INTENSITY_FACTOR, Convention, Replacements
-from reference.pairing.lights import EMITTER, LightNode, heuristic, is_heuristic
+from reference.pairing.lights import LightNode, heuristic, is_heuristic
 from reference.scene import values
 from reference.scene.graph import Graph, properties
+
+EMITTER = mi.ObjectType.Emitter
 
 Cone = Callable[[np.ndarray], Any]
 
@@ -42,8 +44,8 @@ def to_heuristic(
 ) -> Any:
     """Replace physical lights by heuristic ones, and return the radiance that becomes ``I_a``.
 
-    ``geometry()`` returns the Mitsuba scene, for the size and place of area lights. The environment
-    stays as a background. With ``hide_emitters`` the shapes of area lights are taken out.
+    ``geometry()`` returns the Mitsuba scene. The environment stays as a background. With
+    ``hide_emitters`` the shapes of area lights are taken out.
     """
     ambient = None
     for shape, key, index in list(_physical(graph)):
@@ -64,11 +66,7 @@ def to_heuristic(
 
 
 def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements) -> None:
-    """Replace heuristic lights by physical ones.
-
-    ``surface()`` returns the `GBuffer` for the mean irradiance, which is used if the attenuation is
-    not the inverse square.
-    """
+    """Replace heuristic lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
     for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
         light = LightNode(graph, index, surface=surface, replaced=replaced)
         TO_PHYSICAL[light.plugin](light)
@@ -92,8 +90,7 @@ def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
 
 def _point_to_heuristic(light: LightNode) -> None:
     position, intensity = mi.ScalarPoint3d(*light.position()), light.value("intensity", 1.0)
-    props = heuristic("heuristic_point", position=position, intensity=intensity)
-    light.replace(props, INTENSITY_FACTOR)
+    light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
 
 
 def _point_to_physical(light: LightNode) -> None:
@@ -107,10 +104,8 @@ def _point_to_physical(light: LightNode) -> None:
 def level(light: LightNode, cone: Cone, derived_cone: Cone, flux_ratio: float) -> tuple[float, str]:
     """Return the factor from ``I_p0`` of a point or spot to Mitsuba's intensity, and its rule.
 
-    Fluxes are equal, without a note, if ``f_att`` is the inverse square; otherwise mean irradiances
-    over the visible surface. The cones are factors of the light and of Mitsuba's in directions of
-    travel (N, 3), ``flux_ratio`` is the light's flux over Mitsuba's, for the same intensity on the
-    axis.
+    The cones are factors of the light and of Mitsuba's in directions of travel (N, 3),
+    ``flux_ratio`` is the light's flux over Mitsuba's, for the same intensity on the axis.
     """
     defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
     k0, k1, k2 = (light.number(key, default) for key, default in defaults)
@@ -133,8 +128,7 @@ def level(light: LightNode, cone: Cone, derived_cone: Cone, flux_ratio: float) -
 
 def _directional_to_heuristic(light: LightNode) -> None:
     direction, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
-    props = heuristic("heuristic_directional", direction=direction, intensity=intensity)
-    light.replace(props, INTENSITY_FACTOR)
+    light.replace(heuristic("heuristic_directional", direction=direction, intensity=intensity))
 
 
 def _directional_to_physical(light: LightNode) -> None:
@@ -158,11 +152,8 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
         fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
         return np.sum(weight * (fitted - target) ** 2)
 
-    from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
-
     # In log(1 + m), because sharp spots differ little from one exponent to the next.
-    found = minimize_scalar(distance, bounds=(0, np.log(LARGEST_EXPONENT)), method="bounded")
-    return float(np.expm1(found.x))
+    return float(np.expm1(_least(distance, 0.0, np.log(LARGEST_EXPONENT))))
 
 
 def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
@@ -187,7 +178,6 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the minimum of a function that has only one, including the ends of the interval."""
     from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
 
     found = minimize_scalar(function, bounds=(low, high), method="bounded").x
@@ -272,10 +262,7 @@ def _spot_to_physical(light: LightNode) -> None:
 
 
 def add_glowing_shapes(graph: Graph, replaced: Replacements) -> None:
-    """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance.
-
-    Call it while the shapes still have their ``phong``.
-    """
+    """Give each shape whose ``phong`` has a ``k_i`` an area light of that radiance."""
     for shape in graph.nodes(mi.ObjectType.Shape):
         for _, bsdf in graph.children(shape, mi.ObjectType.BSDF):
             radiance = graph.props(bsdf).get("k_i", 0.0)
@@ -290,16 +277,15 @@ def add_environment(
 ) -> None:
     """Add the constant environment that corresponds to ``I_a`` to the physical half of a graph.
 
-    A physical surface has one diffuse reflectance, whereas the model has ``k_a`` and ``k_d``. The
-    ``matched`` radiance is ``I_a k_a / k_d``, by least squares if materials differ; the ``literal``
-    one is ``I_a``.
+    A physical surface has one diffuse reflectance. The ``matched`` radiance is ``I_a k_a / k_d``,
+    by least squares if materials differ; the ``literal`` one is ``I_a``.
     """
     ratio, exact = np.ones(3), True
     if convention is Convention.MATCHED:
         ratio, exact = _ambient_ratio(graph)
     known = values.plain(ambient)
     if known is not None and (ratio != 1).any():
-        ambient = values.scaled(known, ratio)
+        ambient = tuple((np.multiply(known, ratio)).tolist())
     light = physical.add(mi.ObjectType.Emitter, properties("constant", radiance=ambient))
     physical.attach(0, "environment", light)
     note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"

@@ -53,11 +53,10 @@ class Pairing(Record):
 class Pair:
     """Two scenes that show the same thing, and how each was derived.
 
-    ``heuristic`` and ``physical`` are the graphs of the two halves, to be copied before an edit. In
-    both, camera rays do not see lights and environment with ``hide_emitters``. ``max_depth``,
-    ``integrator`` and ``rr_depth`` are the scene's own: -1 for no limit, None if omitted.
-    ``media`` are labels and plugins of participating media, ``shading`` names the declaration that
-    shades the heuristic half (:mod:`heuristic.heuristics`).
+    ``heuristic`` and ``physical`` are graphs, to be copied before an edit. ``max_depth``,
+    ``integrator`` and ``rr_depth`` are the scene's own: -1 for no limit, None if omitted. ``media``
+    are labels and plugins of participating media, ``shading`` names the declaration that shades the
+    heuristic half (:mod:`heuristic.heuristics`).
     """
 
     name: str
@@ -88,12 +87,11 @@ def pair(
 ) -> Pair:
     """Derive both halves of a scene, for the current variant.
 
-    ``resolution`` replaces the film's. FLAT and GOURAUD make meshes of the heuristic half's shapes,
-    by ``tessellation`` (:mod:`heuristic.tessellation`); if that is given, PHONG gets meshes too.
-    ``prune`` lets the kernel leave out the terms that no material has. ``heuristic`` names the
-    declaration that shades the heuristic half (:mod:`heuristic.heuristics`); ``with_partners`` lets
-    its materials know their physical partners (:mod:`reference.pairing.partners`), as they do for
-    every user's heuristic.
+    FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
+    (:mod:`heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune`` lets the
+    kernel leave out the terms that no material has. ``heuristic`` names the declaration that shades
+    the heuristic half; ``with_partners`` lets its materials know their physical partners
+    (:mod:`reference.pairing.partners`), as they do for every user's heuristic.
     """
     register()
     graph = source.parse()
@@ -169,7 +167,6 @@ def _paired(
 
 
 def _bare(graph):
-    """Return a copy of a graph without materials, which can be slow to make."""
     copy = graph.copy()
     for shape in copy.nodes(SHAPE):
         for kind in (BSDF, MEDIUM):
@@ -194,7 +191,6 @@ def _set_integrator(graph, ambient, settings, interpolation, prune, model):
 
 
 def _energy_warnings(graph):
-    """Name the materials that reflect more light than they receive at normal incidence."""
     phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
     for index in phongs:
         try:
@@ -214,9 +210,8 @@ def replace_shapes(
 ) -> None:
     """Replace every shape of a graph by a mesh of the same place, name, material and light.
 
-    ``scene`` has the same shapes, instantiated; ids identify them. The graph keeps the folder that
-    the meshes are written to until it is deleted. Gouraud shading needs one normal per vertex,
-    hence separate faces if the mesh has ``face_normals``.
+    ``scene`` has the same shapes, instantiated; ids identify them. Gouraud shading needs one normal
+    per vertex, hence separate faces if the mesh has ``face_normals``.
     """
     # Loaded late: few scenes are made into triangles.
     from heuristic import tessellation

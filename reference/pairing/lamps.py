@@ -14,7 +14,7 @@ import numpy as np
 from reference.pairing import probe
 from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
 from reference.pairing.lights import LightNode, heuristic
-from reference.scene.graph import Graph, Reference, properties
+from reference.scene.graph import Reference, properties
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 
@@ -48,17 +48,21 @@ FLAT = 1 - 1e-4
 
 
 def _area(light: LightNode) -> None:
-    """Replace the light by emission of its shape and a spot or point at its centroid."""
     graph, shape, radiance = light.graph, light.shape, light.value("radiance", 1.0)
     if light.hide_emitters:
         # Mitsuba's integrators look through it, and the heuristic casts no shadows.
         graph.remove(shape)
-    else:
-        _glow(graph, shape, radiance)
+    else:  # its own copy of its phong shines
+        ((key, bsdf),) = graph.children(shape, BSDF)
+        props = mi.Properties(graph.props(bsdf))
+        props.set_id(f"{graph.label(shape)}_glowing")
+        props["k_i"] = radiance
+        graph.attach(shape, key, graph.add(BSDF, props))
     identifier = graph.props(shape).id()
     made = next(found for found in light.geometry().shapes() if found.id() == identifier)
     centroid, area, normal, radius = _extent(made)
-    if _varies(graph, radiance):
+    is_texture = isinstance(radiance, Reference)
+    if is_texture and graph.instantiate(radiance.index()).is_spatially_varying():
         radiance = probe.surface_mean(graph, made)
     flatness = float(np.linalg.norm(normal))
     if flatness > FLATNESS:
@@ -79,19 +83,11 @@ def _area(light: LightNode) -> None:
     light.replaced.emitter(graph.label(shape), "area", plugin, factor, False, note)
 
 
-def _varies(graph: Graph, value: Any) -> bool:
-    """Return whether a value is a texture that differs from point to point."""
-    if not isinstance(value, Reference):
-        return False
-    return graph.instantiate(value.index()).is_spatially_varying()
-
-
 ROOM = 1.02
 """Factor on the radius of a lamp: the grid's places lie up to a 64th inside its edges."""
 
 
 def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
-    """Return centroid, area, mean normal and radius of a shape, by its sampling on a grid."""
     cells = (np.arange(64) + 0.5) / 64
     x, y = (axis.ravel() for axis in np.meshgrid(cells, cells))
     sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
@@ -103,17 +99,7 @@ def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
     return centroid.tolist(), area, normal.tolist(), float(radius)
 
 
-def _glow(graph: Graph, shape: int, radiance: Any) -> None:
-    """Give a shape its own copy of its phong, with ``k_i`` set to a radiance."""
-    ((key, bsdf),) = graph.children(shape, BSDF)
-    props = mi.Properties(graph.props(bsdf))
-    props.set_id(f"{graph.label(shape)}_glowing")
-    props["k_i"] = radiance
-    graph.attach(shape, key, graph.add(BSDF, props))
-
-
 def _even_cone(light: LightNode) -> None:
-    """Replace a light by the even cone of the same solid angle and flux, as its sampling shows."""
     origin, axis = light.column(3), light.column(2)
     beam = probe.beam(light.graph, light.emitter, origin, axis)
     if beam is None:
@@ -150,7 +136,6 @@ def _daylight(light: LightNode) -> Any:
 
 
 def _only(light: LightNode, off: str) -> mi.Emitter:
-    """Return the light with one of its two parts switched off."""
     copy = light.graph.copy()
     copy.props(light.index)[off] = 0.0
     return copy.instantiate(light.index)

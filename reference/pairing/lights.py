@@ -1,26 +1,17 @@
 """The kinds of lights, and a light of a graph that the rules of pairing read and replace."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from heuristic.lights import (
-    INVERSE_SQUARE,
-    PLUGINS,
-    DirectionalLight,
-    Light,
-    PointLight,
-    SpotLight,
-)
+from heuristic.lights import INVERSE_SQUARE, PLUGINS, DirectionalLight, Light, PointLight, SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from reference.scene import values
 from reference.scene.graph import Graph, properties
-
-EMITTER = mi.ObjectType.Emitter
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
@@ -29,9 +20,9 @@ FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), st
 class LightNode:
     """A light of a graph that becomes one of the halves; rules read, replace and record it.
 
-    ``shape`` is the node of the shape that shines, None for lights without one. ``geometry()``
-    returns the Mitsuba scene without materials, for the size and place of shapes, ``surface()`` the
-    `GBuffer` for mean irradiances. With ``hide_emitters`` camera rays look through lights.
+    ``shape`` is the node of the shape that shines, if any. ``geometry()`` returns the Mitsuba scene
+    without materials, ``surface()`` the visible `GBuffer`. With ``hide_emitters`` camera rays look
+    through lights.
     """
 
     graph: Graph
@@ -87,12 +78,12 @@ class LightNode:
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
         """Return the intensity of a heuristic light times a factor."""
         colour = values.colour(self.graph, self.index, "intensity", 1.0)
-        return values.scaled(colour, factor * self.number("scale", 1.0))
+        return tuple((np.multiply(colour, factor * self.number("scale", 1.0))).tolist())
 
     def replace(
         self,
         props: mi.Properties,
-        factor: float,
+        factor: float = INTENSITY_FACTOR,
         exact: bool = True,
         note: str = "",
         lost: str = "",
@@ -140,11 +131,7 @@ class LightKind:
 
     def has(self, name: str) -> bool:
         """Return whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
-        return self.model is not None and _has(self.model, name)
-
-
-def _has(model: Any, name: str) -> bool:
-    return name in {entry.name for entry in fields(model)}
+        return self.model is not None and name in vars(self.model)["__dataclass_fields__"]
 
 
 def _at_point(light: LightNode) -> dict[str, Any]:
@@ -189,16 +176,7 @@ def is_heuristic(plugin: str) -> bool:
     return plugin in PLUGINS
 
 
-def check(graph: Graph) -> None:
-    """Reject intensities that are negative or not finite."""
-    for index in graph.nodes(EMITTER):
-        plugin = graph.plugin(index)
-        colour = "intensity" if is_heuristic(plugin) else of(plugin).colour
-        if colour:
-            values.check_colours(graph, index, (colour,))
-
-
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
     """Return the properties of a heuristic light with the fall-off of Mitsuba's."""
-    falloff = FALLOFF_OF_MITSUBA if _has(PLUGINS[plugin], "attenuation") else {}
+    falloff = FALLOFF_OF_MITSUBA if of(plugin).has("attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)

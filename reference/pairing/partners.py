@@ -147,7 +147,6 @@ def _measured(context: Context, index: int) -> Partner:
 
 
 def _alpha(context: Context, index: int) -> Any:
-    """Return the roughness of a BSDF, also of a smooth one."""
     rough = context.plugin(index).startswith("rough")
     along = context.value(index, "alpha_u", 0.1)
     return _at_least(context.value(index, "alpha", along if rough else 0.0))

@@ -8,7 +8,7 @@ import mitsuba as mi
 from heuristic.errors import InputError
 from reference.pairing import bsdfs, lights
 from reference.records import Record
-from reference.scene import checks
+from reference.scene import checks, values
 from reference.scene.graph import Graph, Reference, properties
 
 FILM, INTEGRATOR, SAMPLER, SENSOR, SHAPE = (
@@ -61,8 +61,12 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
     """
     _open_merged(graph)
     bsdfs.give_default(graph)
-    bsdfs.check(graph)
-    lights.check(graph)
+    for index in graph.nodes(mi.ObjectType.BSDF):
+        values.check_colours(graph, index, bsdfs.COLOURS.get(graph.plugin(index), ()))
+    for index in graph.nodes(mi.ObjectType.Emitter):
+        plugin = graph.plugin(index)
+        colour = "intensity" if lights.is_heuristic(plugin) else lights.of(plugin).colour
+        values.check_colours(graph, index, (colour,))
     checks.require_files(graph)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):
@@ -98,7 +102,6 @@ def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
 
 
 def _size(film):
-    """Return a film's width and height, or Mitsuba's defaults if omitted."""
     width, height = checks.FILM_SIZE
     return int(film.get("width", width)), int(film.get("height", height))
 
@@ -126,7 +129,6 @@ def keep_sensor(graph: Graph, number: int) -> int:
 
 
 def _prepare_film(graph, sensor, resolution, settings):
-    """Set the film to linear RGB floats, and to the requested resolution."""
     films = graph.children(sensor, FILM)
     if not films:
         films = [("film", graph.add(FILM, properties("hdrfilm")))]
@@ -183,7 +185,6 @@ def _give_weights(graph, settings):
 
 
 def _take_integrator(graph, settings):
-    """Read the scene's integrator, inside those that only add channels, and remove it."""
     for key, outer in graph.children(0, INTEGRATOR):
         graph.detach(0, key)
         index = outer

@@ -46,11 +46,10 @@ MEAN = "I_a is the mean radiance over the sphere"
 
 @dataclass(frozen=True)
 class Albedos:
-    """A BSDF's albedos at normal incidence, and the lobe's width ``alpha``.
+    """A BSDF's albedos at normal incidence, arrays or values of a graph, and its lobe's width.
 
-    The albedos are arrays of one value per channel or wavelength, or values of a graph: of all
-    reflection, its diffuse part and its lobe, of light that passes straight or refracted, and of
-    light scattered through.
+    Of all reflection, its diffuse part and its lobe, of light that passes straight or refracted,
+    and of light scattered through.
     """
 
     reflected: Any
@@ -177,7 +176,6 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
 
 
 def _width(bs, weight, up, diffuse):
-    """Return the root mean square slope of the lobe without the diffuse part, by its median."""
     weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
     cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
     density = np.array(bs.pdf, float)
@@ -214,8 +212,7 @@ def beam(
 ) -> tuple[float, Any] | None:
     """Return cutoff (degrees) and intensity of the even cone with a light's solid angle and flux.
 
-    Directions are spread evenly over a cone about the axis, first the hemisphere, then the
-    narrowest cone that holds all light found there. None if it sends nothing.
+    The search narrows from the hemisphere to the cone that holds all light. None if there is none.
     """
     widest = 0.0  # cosine of the cone's half angle
     for _ in range(4):
@@ -288,11 +285,6 @@ def _channel_means(spectrum):
 
 class AlbedoTable:
     """The albedo of a uniform, isotropic BSDF over the cosine of the view direction, RGB.
-
-    If nothing stands between a surface and a constant environment of radiance ``L``, the reflected
-    radiance is ``L a(mu)``, with the albedo for the view direction of cosine ``mu``. It is
-    tabulated once, by Mitsuba's sampling of the BSDF on a rank-1 lattice, and looked up at each
-    camera ray, without Monte Carlo in the image.
 
     Nodes are even in ``sqrt(mu)``: Fresnel's terms bend most towards grazing. A BSDF that also
     reflects on its back does so in the same way.

@@ -232,7 +232,6 @@ def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
 
 
 def _put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    """Replace the lights under some keys of the scene by those of the heuristic half."""
     own = dict(facts.pair.heuristic.children(0, EMITTER))
     for key in keys:
         graph.attach(0, key, graft(graph, facts.pair.heuristic, own[key]))
@@ -256,13 +255,11 @@ def _coned(facts: Facts) -> tuple[bool, str]:
 
 
 def _shining(facts: Facts) -> list[int]:
-    """Return the shapes of the physical half that are lights."""
     graph = facts.pair.physical
     return [shape for shape in graph.nodes(SHAPE) if graph.children(shape, EMITTER)]
 
 
 def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
-    """Replace area lights by the heuristic half's points and spots."""
     for shape in shapes:
         for key, _ in graph.children(shape, EMITTER):
             graph.detach(shape, key)
@@ -274,7 +271,6 @@ def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
 
 
 def _surroundings(facts: Facts) -> list[str]:
-    """Return the keys of the physical half's lights that have no single point or direction."""
     graph = facts.pair.physical
     children = graph.children(0, EMITTER)
     return [key for key, index in children if not lights.of(graph.plugin(index)).exact]

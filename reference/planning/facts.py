@@ -19,7 +19,7 @@ from heuristic import meshes
 from heuristic.heuristics import Interpolation
 from heuristic.materials import COEFFICIENTS
 from reference.pairing import lights
-from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, may_differ_from_0
+from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES
 from reference.pairing.halves import Pair
 from reference.pairing.lights import LightNode
 from reference.scene import values
@@ -64,10 +64,9 @@ class Form(Enum):
 
 @dataclass(frozen=True)
 class Geometry:
-    """The form of a shape, whether its normals point outwards, and the plane it lies in.
+    """The form of a shape, and the ``plane`` ``(point, normal)`` of a flat one, in doubles.
 
-    ``plane`` is ``(point, normal)`` of a flat shape, in doubles, else None. ``has_true_normals`` is
-    whether shading normals are known to be those of the surface.
+    ``has_true_normals`` is whether shading normals are known to be those of the surface.
     """
 
     form: Form
@@ -147,23 +146,13 @@ def _are_alike(normals: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ShapeFacts:
-    """The facts of one shape.
+    """The facts of one shape, between the corners ``low`` and ``high`` (3,) of its box.
 
-    Attributes
-    ----------
-    low, high
-        Corners of its bounding box, (3,) each.
-    outer, inner
-        Whether the side away from the body reflects, and the side towards it. The outer side of a
-        flat shape is the one that its normal points to.
-    shines_outwards
-        Whether its normals point away from the body; an area light shines on their side.
-    plane
-        ``(point, normal)`` of a flat shape, else None.
-    opaque
-        Whether its BSDF only reflects; no rule covers transmitted light.
-    sampled_as_hit
-        Whether the points that Mitsuba samples on it are those that rays hit, and face alike.
+    ``outer`` and ``inner`` are whether the side away from the body reflects, and the side towards
+    it; the outer side of a flat shape is the one that its normal points to. An area light
+    ``shines_outwards`` if its normals point away from the body. ``opaque`` is whether its BSDF only
+    reflects, ``sampled_as_hit`` whether the points that Mitsuba samples on it are those that rays
+    hit, and face alike.
     """
 
     name: str
@@ -257,7 +246,6 @@ def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool
 
 
 def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
-    """Return whether a BSDF only reflects, and whether it can on its front and on its back."""
     if bsdf is None:
         return False, True, True
     plugin, props = graph.plugin(bsdf), graph.props(bsdf)
@@ -265,29 +253,24 @@ def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
         inner = [_sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
         reflects = any(front or back for _, front, back in inner)
         return bool(inner) and all(one[0] for one in inner), reflects, reflects
-    reflectances = REFLECTANCES.get(plugin)
-    if reflectances is None or may_differ_from_0(props, TRANSMITTANCES.get(plugin, {})):
+    reflectances, transmittances = REFLECTANCES.get(plugin), TRANSMITTANCES.get(plugin, {})
+    passes, reflects = (
+        any(values.may_be_nonzero(props.get(name, usual)) for name, usual in (of or {}).items())
+        for of in (transmittances, reflectances)
+    )
+    if reflectances is None or passes:
         return False, True, True
-    reflects = not reflectances or may_differ_from_0(props, reflectances)
+    reflects |= not reflectances
     return True, reflects, reflects and bool(props.get("twosided", False))
 
 
 @dataclass(frozen=True)
 class CameraFacts:
-    """Where the rays of a camera begin: a set of points, not one.
+    """Where the rays of a camera begin: on the near clip plane, or one as wide as the picture.
 
-    A perspective camera's rays begin on its near clip plane, those of a thin lens on that plane
-    too, and those of an orthographic camera on a plane as wide as the picture.
-
-    Attributes
-    ----------
-    origins
-        Corners of a convex set that holds all origins, (N, 3); None if unknown, as for a sensor on
-        a shape, and no rule may rely on the camera's position.
-    axis
-        Unit normal of the plane that the set lies in, (3,).
-    is_still
-        Whether the shutter opens only for an instant.
+    ``origins`` (N, 3) are corners of a convex set that holds them all, None if unknown, as for a
+    sensor on a shape, and then no rule may rely on the camera's position. ``axis`` is the unit
+    normal of the set's plane; ``is_still`` is whether the shutter opens only for an instant.
     """
 
     plugin: str
@@ -340,11 +323,7 @@ class CameraFacts:
 
 @dataclass(frozen=True)
 class LightFacts:
-    """The facts of one light.
-
-    ``position`` belongs to a point or spot, ``toward`` the direction to a directional light,
-    ``shape`` the name of the shape of an area light; the others are None.
-    """
+    """The facts of one light: its position, or the direction to it, or the name of its shape."""
 
     name: str
     kind: str
@@ -355,10 +334,7 @@ class LightFacts:
 
 @dataclass(frozen=True)
 class Facts:
-    """Facts about a pair in the current variant; shapes, lights and camera of the physical half.
-
-    ``rule_results`` holds the results of the rules of pruning so far, by name.
-    """
+    """Facts about a pair in the current variant; shapes, lights and camera of the physical half."""
 
     pair: Pair
     shapes: tuple[ShapeFacts, ...]

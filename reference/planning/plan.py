@@ -47,12 +47,7 @@ from reference.planning.effects import (
     PrunedEffect,
 )
 from reference.planning.facts import BSDF, Facts
-from reference.planning.rules import (
-    LIGHT_BY_LIGHT,
-    RULES,
-    TABULATED_ENVIRONMENT,
-    RuleResult,
-)
+from reference.planning.rules import LIGHT_BY_LIGHT, RULES, TABULATED_ENVIRONMENT, RuleResult
 from reference.records import Amount, Count, Record, Size
 from reference.rendering import direct
 from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER
@@ -245,7 +240,6 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
 
 
 def _reference(facts: Facts) -> Plan:
-    """Return the cheapest correct plan, by the table of the module's docstring."""
     pair, graph = facts.pair, facts.pair.physical
     stock = Plan(
         effects=tuple(effect.decide(facts) for effect in EFFECTS),

@@ -13,15 +13,7 @@ import numpy as np
 
 from reference.pairing import lights
 from reference.pairing.halves import Pair
-from reference.planning.facts import (
-    BSDF,
-    EMITTER,
-    ROUNDING,
-    SHAPE,
-    Facts,
-    LightFacts,
-    ShapeFacts,
-)
+from reference.planning.facts import BSDF, EMITTER, ROUNDING, SHAPE, Facts, LightFacts, ShapeFacts
 from reference.records import Record
 
 FAR = 1e6
@@ -36,10 +28,7 @@ MOST_LIGHTS = 4096
 
 @dataclass(frozen=True)
 class Premise:
-    """An assumption of a proof.
-
-    ``against(facts)`` returns an objection as text; None if ``sentence`` is known to hold.
-    """
+    """An assumption of a proof; ``against(facts)`` returns an objection if it may not hold."""
 
     sentence: str
     against: Callable[[Facts], str | None]
@@ -68,11 +57,7 @@ class RuleResult(Record):
 
 @dataclass(frozen=True)
 class PruningRule:
-    """A rule of pruning.
-
-    ``name`` is what is done if it applies, ``absent`` what is absent then, as evidence, and
-    ``proof`` why, given the premises, which stand in the order of their checks.
-    """
+    """A rule of pruning: what is done if it applies, what is ``absent`` then, and why."""
 
     name: str
     absent: str
@@ -234,15 +219,10 @@ def loses_light(integrator: str, pair: Pair) -> bool:
 
 
 class Boxes:
-    """The bounding boxes of N shapes, and the half spaces that their reflecting sides look into.
+    """The bounding boxes of N shapes, from ``low`` to ``high`` (N, 3).
 
-    Attributes
-    ----------
-    low, high
-        (N, 3).
-    is_before
-        (N, N): whether box j reaches in front of the only reflecting side of shape i, by more than
-        rounding; always if shape i may receive light from anywhere.
+    ``is_before`` (N, N) is whether box j reaches in front of the only reflecting side of shape i,
+    by more than rounding; always if shape i may receive light from anywhere.
     """
 
     def __init__(self, shapes: Sequence[ShapeFacts]):
@@ -263,8 +243,7 @@ class Boxes:
     def hidden_from(self, light: LightFacts) -> tuple[str, str] | None:
         """Return an obstacle that may stand between a light and a receiver, and that receiver.
 
-        The ways of light to a receiver lie in a box around both; from a directional light, around
-        the receiver and its own box moved far towards the light.
+        The ways of parallel light lie in a box around the receiver and its box moved far away.
         """
         low, high = self.low, self.high
         shining = np.array([shape.name == light.shape for shape in self.shapes], bool)
@@ -409,8 +388,7 @@ TABULATED_ENVIRONMENT = PruningRule(
         ),
         Premise("Nothing is textured, and the BSDF is known to be isotropic.", _uneven),
         Premise(
-            "The variant is RGB.",
-            lambda facts: None if mi.is_rgb else f"variant {mi.variant()}",
+            "The variant is RGB.", lambda facts: None if mi.is_rgb else f"variant {mi.variant()}"
         ),
         Premise("No light can be hidden, by the premises of leaving out shadow rays.", _hidden),
         Premise(

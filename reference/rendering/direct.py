@@ -120,7 +120,6 @@ def _beyond_lamps(scene, ray, active):
 
 
 def _has_delta(scene):
-    """Return whether a BSDF of the scene reflects or transmits in single directions."""
     bsdfs = (shape.bsdf() for shape in scene.shapes())
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 

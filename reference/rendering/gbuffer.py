@@ -29,16 +29,9 @@ class ObjectIds:
 
 @dataclass(frozen=True)
 class GBuffer:
-    """The first surface on a regular grid of camera rays, in world space.
+    """The first surface on a regular grid of camera rays, in world space, where ``hit`` (H, W).
 
-    Attributes
-    ----------
-    position, normal
-        (H, W, 3); the unit shading normal of the visible side. Zero where nothing is hit.
-    hit
-        (H, W), whether the ray hits a surface.
-    shape, bsdf
-        The shape and the material of the surface.
+    ``position`` and ``normal`` (H, W, 3), the shading normal of the visible side, are 0 elsewhere.
     """
 
     position: np.ndarray
@@ -117,7 +110,6 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0
 
 
 def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
-    """Name a material without an id, or with another's, after the first shape that shows it."""
     seen, unseen, times = materials.places >= 0, len(shapes.names), Counter(materials.names)
     first = np.full(len(materials.names), unseen)
     np.minimum.at(first, materials.places[seen], shapes.places[seen])
@@ -142,10 +134,7 @@ def _object_ids(pointers, seen):
 def pixel_rays(
     scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray, sensor: int = 0
 ) -> Any:
-    """Return the camera rays through the centres of the cells in columns ``x`` and rows ``y``.
-
-    ``size`` is the width and height of the film in cells.
-    """
+    """Return the camera rays through the cells in columns ``x`` and rows ``y`` of a film."""
     places = (np.ravel(place) + 0.5 for place in (x, y))
     across, down = (mi.Float(place / side) for place, side in zip(places, size, strict=True))
     film = mi.Point2f(across, down)

@@ -76,9 +76,8 @@ class Times(Record):
 class Renderer:
     """One half of a pair, ready to render passes in the variant that it was made in.
 
-    ``integrator`` None takes the scene's own; ``spp`` are samples per pixel and pass; ``label`` is
-    its name in messages; ``size`` is a width and height to render in place of the film's, of the
-    same shape.
+    ``integrator`` None takes the scene's own; ``spp`` are samples per pixel and pass; ``size`` is a
+    width and height in place of the film's, of the same shape.
     """
 
     def __init__(
@@ -103,11 +102,7 @@ class Renderer:
         self._replayed = None if self._is_users else dr.freeze(_rendered)
 
     def render(self, seed: int) -> Any:
-        """Render one pass and return it as a tensor (H, W, 3), noting the time.
-
-        ``InputError`` has Mitsuba's own reason if it cannot render the scene, ``NonFiniteError``
-        the first pixel that is NaN or infinite. A user's heuristic may not give negative light.
-        """
+        """Render one pass and return it as a tensor (H, W, 3), noting the time."""
         if self.size:
             resize(self.scene, self.size)
         width, height = image_size(self.scene)
@@ -161,11 +156,7 @@ class Renderer:
         return other
 
     def _image(self, seed):
-        """Render; later passes replay the kernels of the first if Dr.Jit can.
-
-        It cannot if a plugin has arrays that it does not know of, such as Mitsuba's spectral
-        tables.
-        """
+        """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
         given = self.scene, self.integrator, self.spp, seed
         if self._replayed is not None:
             try:
@@ -256,8 +247,7 @@ class Stream(IntEnum):
 def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
     """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
 
-    Both halves, and all compared methods, take the same seed for a pass. So their camera rays
-    cancel, while runs of different seeds have no pass in common.
+    Both halves take the same, so their camera rays cancel; runs of other seeds share no pass.
     """
     sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
     return int(sequence.generate_state(1)[0])
@@ -355,11 +345,7 @@ def require_memory(name: str, width: int, height: int) -> None:
 
 
 def available_memory() -> int | None:
-    """Return the bytes that this process may still take; None if unknown.
-
-    Linux says what programs can take without swapping, and what the process's control group leaves,
-    without the pages of files that can be dropped.
-    """
+    """Return the bytes that this process may take: of the machine, and of its control group."""
     found = []
     with suppress(OSError, ValueError, KeyError):
         found.append(1024 * _numbers(Path("/proc/meminfo"))["MemAvailable:"])
@@ -376,6 +362,5 @@ def available_memory() -> int | None:
 
 
 def _numbers(file: Path) -> dict[str, int]:
-    """Return the numbers of a file of lines that begin with a name and a number."""
     lines = (line.split() for line in file.read_text(encoding="utf-8").splitlines())
     return {words[0]: int(words[1]) for words in lines if len(words) > 1}

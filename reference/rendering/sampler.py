@@ -104,7 +104,6 @@ def _define() -> None:
             return mi.Point2f(_under_one(x * (1 / columns)), _under_one(y * (1 / rows)))
 
         def _stratum(self, active):
-            """Return the stratum of each sample in the next dimension, and its random numbers."""
             permutation, turn = mi.sample_tea_32(self.pixel, self.dimension)
             self.dimension += 1
             stratum = turned(self.index, self.sample_count(), permutation, turn, active)

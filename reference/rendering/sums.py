@@ -31,20 +31,11 @@ MEAN, DEVIATION, NOISE = ("mean",), ("mean", "squares"), ("mean", "squares", "si
 
 @dataclass(frozen=True)
 class Grouped:
-    """Means of groups of passes at some pixels.
+    """Means of groups of passes at P pixels, in K groups.
 
-    Attributes
-    ----------
-    means
-        (K, P, 3): the mean of each group, in doubles. Group k holds passes k, k + 8, k + 16, …
-    sizes
-        (K,): passes of each group.
-    places
-        (P,): the pixels, counted in reading order.
-    blocks
-        (P,): the block of each pixel, numbered from 0 to ``sampled - 1``.
-    sampled, total
-        Blocks that were sampled, and blocks with a counted pixel.
+    Group k holds passes k, k + 8, … ``means`` (K, P, 3) are doubles, ``sizes`` (K,) counts passes,
+    ``places`` (P,) are the pixels in reading order, ``blocks`` (P,) the block of each, from 0 to
+    ``sampled - 1``, of ``total`` blocks with a counted pixel.
     """
 
     means: np.ndarray
@@ -65,13 +56,8 @@ class Grouped:
 class Estimate:
     """An image from ``passes`` independent passes; arrays are (H, W, 3), linear.
 
-    Attributes
-    ----------
-    standard_error
-        Standard error of ``mean``: the sample standard deviation over the root of ``passes``.
-    noise
-        An image with the distribution of ``mean``'s error: the sum of the passes with alternating
-        signs, divided by their number.
+    ``standard_error`` is the sample standard deviation over the root of ``passes``; ``noise`` has
+    the distribution of ``mean``'s error: the passes with alternating signs, over their number.
     """
 
     mean: np.ndarray
@@ -84,13 +70,8 @@ class Estimate:
 class DifferenceEstimate(Estimate):
     """The mean difference of two halves, and how its noise is distributed.
 
-    Attributes
-    ----------
-    third
-        (H, W, 3): third cumulant of ``mean``, without bias from 4 passes on; 0 with fewer.
-        Negative where single contributions to the reference are large.
-    grouped
-        Means of groups of passes at a sample of pixels.
+    ``third`` (H, W, 3) is the third cumulant of ``mean``, without bias from 4 passes on, 0 with
+    fewer: negative where single contributions to the reference are large.
     """
 
     third: np.ndarray

@@ -88,7 +88,6 @@ def _refusal(graph: Graph, index: int, objection: str) -> InputError:
 
 
 def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
-    """Yield what would be allowed in place of a wrong value."""
     if isinstance(value, bool):
         return
     if _is_transform(value):
@@ -131,7 +130,6 @@ def _is_transform(value: Any) -> bool:
 
 
 def _is_invertible(matrix: np.ndarray) -> bool:
-    """Return whether the inverse exists in single precision."""
     even = matrix
     for axis in (1, 0):
         lengths = np.linalg.norm(even, axis=axis, keepdims=True)
@@ -145,7 +143,6 @@ def _is_invertible(matrix: np.ndarray) -> bool:
 
 
 def _missing(graph: Graph, index: int) -> Iterator[str]:
-    """Yield what an element lacks, if Mitsuba would end the process instead of rejecting it."""
     plugin, props = graph.plugin(index), graph.props(index)
     if plugin == "bitmap" and not any(key in props for key in PICTURES):
         yield f"it has no picture: give one of {', '.join(PICTURES)}."
@@ -157,7 +154,6 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
 
 
 def _conflicts(plugin: str, props: mi.Properties) -> Iterator[str]:
-    """Yield conflicts between parameters that are allowed individually."""
     if plugin == "cylinder" and "p0" in props and "p1" in props:
         ends = [np.ravel(np.asarray(props[key], float)) for key in ("p0", "p1")]
         if (ends[0] == ends[1]).all():

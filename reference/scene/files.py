@@ -76,7 +76,6 @@ class Files:
                     self.read(place, (*outer, path.resolve()), resolver)
 
     def _filled(self, value: str) -> str:
-        """Return a value with placeholders filled in, the longest names first, as Mitsuba does."""
         for name in sorted(self.parameters, key=len, reverse=True) if "$" in value else ():
             parts = re.split(rf"(?<!\\)\${re.escape(name)}", value)
             value = self.parameters[name].join(parts)
@@ -127,7 +126,6 @@ def _content(path: Path, before: int) -> bytes:
 
 
 def _elements(path: Path, content: bytes) -> list[Element]:
-    """Return the elements of a file's text with their attributes, in order."""
     elements: list[Element] = []
     depth = 0
 
@@ -225,7 +223,6 @@ def _text(path: Path) -> str:
 
 
 def _defines_scene(path: Path) -> bool:
-    """Return whether a Python file defines the name, without running it."""
     try:
         body = ast.parse(_text(path)).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -256,7 +253,6 @@ def damage(graph: Graph, index: int) -> str:
 
 @lru_cache(maxsize=1024)
 def _damage_of_file(plugin: str, path: str, number: int, stamp: tuple) -> str:
-    """Return the fault of a file, whose content the stamp identifies."""
     return _torn_tensor(Path(path)) if plugin == "measured" else _wrong_mesh(plugin, path, number)
 
 

@@ -122,7 +122,6 @@ class Graph:
         return made[0] if isinstance(made, list) else made
 
     def _culprits(self, error: Exception) -> str:
-        """Name the files that cannot be read, if a message does not."""
         files = {index: path for index in self.nodes_in_use() if (path := self.file(index))}
         if any(path.name in str(error).rpartition("plugin of type")[2] for path in files.values()):
             return ""
@@ -135,7 +134,6 @@ class Graph:
         return f" (the file {', '.join(broken)})" if broken else ""
 
     def _require_extents(self, scene):
-        """Reject shapes that extend to infinity, which rays never hit."""
         for shape in scene.shapes():
             box = shape.bbox()
             ends = np.array([np.ravel(box.min), np.ravel(box.max)])
@@ -275,7 +273,6 @@ def resolving(resolver: Any) -> Iterator[None]:
 
 
 def _is_python(node):
-    """Return whether a node's plugin is written in Python, including a user's."""
     is_unknown = node.type == mi.ObjectType.Unknown
     return is_unknown or node.props.plugin_name() in PLUGINS
 

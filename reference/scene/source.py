@@ -63,9 +63,8 @@ class Source:
 
     ``content`` is the path of a Mitsuba XML file, a dictionary for ``mitsuba.load_dict``, or a
     function that returns one, ``parameters`` are values for the ``$name`` placeholders of a file,
-    and ``edits`` change the graph, in order. What was read is kept, and shared by all that are
-    edited from one: ``graphs`` by variant, ``made`` the dictionary that the function returned, and
-    ``messages``, what Mitsuba said meanwhile.
+    and ``edits`` change the graph. ``graphs`` by variant, the dictionary ``made`` by the function,
+    and Mitsuba's ``messages`` are shared by all that are edited from one.
     """
 
     name: str
@@ -96,10 +95,9 @@ class Source:
         return graph
 
     def files(self) -> tuple[Path, ...]:
-        """Return the files that the scene reads, each where Mitsuba finds it, sorted.
+        """Return the files that the scene reads: its own, its includes, and those it names.
 
-        These are the scene's own file or script, its includes, and every file that an element
-        names. The tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
+        The tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
         found = {self.content.path.resolve()} if isinstance(self.content, Script) else set()
@@ -141,7 +139,6 @@ class Source:
         return graph
 
     def _require_placeholders(self, known: set[str]) -> None:
-        """Ensure that the file has a placeholder for each given value."""
         for name in sorted(set(self.parameters) - known):
             raise InputError(
                 f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
@@ -207,11 +204,7 @@ def count_messages(messages: Iterable[str]) -> tuple[str, ...]:
 
 
 def digest(source: Source) -> str:
-    """Return a digest of a scene in the current variant, and of every file that it reads.
-
-    It holds the graph with all values at full precision, objects that a script made, and the
-    content of :meth:`Source.files`.
-    """
+    """Return a digest of a scene's graph in the current variant, and of every file it reads."""
     found = hashlib.sha256()
     graph = source.parse()
     for index in graph.nodes_in_use():

@@ -13,7 +13,6 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import Colour
 from heuristic.errors import InputError
 from reference.scene.graph import Graph, Reference, properties
 
@@ -89,11 +88,6 @@ def is_zero(value: Any) -> bool:
 def may_be_nonzero(value: Any) -> bool:
     """Return whether a parameter can be non-zero; textures and spectra can."""
     return not (isinstance(value, (Real, *COLOURS)) and is_zero(value))
-
-
-def scaled(components: Colour, factor: Colour) -> tuple[float, ...]:
-    """Return a colour times a factor, which is a number or one value per channel."""
-    return tuple(float(value) for value in np.multiply(components, factor))
 
 
 def product(graph: Graph, a: Any, b: Any) -> Any:
