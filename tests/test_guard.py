@@ -140,8 +140,7 @@ def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
 
 
 @pytest.mark.guarantee(
-    "plans",
-    "Noise alone makes the guard disagree in at most one scene in a thousand.",
+    "plans", "Noise alone makes the guard disagree in at most one scene in a thousand."
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [normal, fireflies])

@@ -95,10 +95,7 @@ def monte_carlo_albedo(plastic, size=400, batches=6):
     return found.mean(axis=0), found.std(axis=0, ddof=1) / sqrt(batches)
 
 
-@pytest.mark.guarantee(
-    "pairing",
-    "A matched `roughplastic` has the albedos of its Phong material.",
-)
+@pytest.mark.guarantee("pairing", "A matched `roughplastic` has the albedos of its Phong material.")
 def test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to(rgb):
     """``k_d`` and ``2 k_s / (n + 2)``, within 5 standard errors of an independent quadrature."""
     for phong in REACHABLE:

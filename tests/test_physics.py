@@ -27,12 +27,7 @@ def scene(shape, light, viewer=(-3, 0, 1), fov=40.0, size=48):
             "type": "perspective",
             "fov": fov,
             "to_world": look_at(viewer),
-            "film": {
-                "type": "hdrfilm",
-                "width": size,
-                "height": size,
-                "rfilter": {"type": "box"},
-            },
+            "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}},
         },
         "shape": shape,
         "light": light,

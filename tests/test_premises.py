@@ -24,16 +24,7 @@ from reference.planning.rules import (
 )
 from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
-from tests.misplanned import (
-    DIFFUSE,
-    SCENES,
-    TWO_SIDED,
-    lamp,
-    prune_blindly,
-    scene,
-    sphere,
-    tube,
-)
+from tests.misplanned import DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere, tube
 
 SPP, PASSES = 256, 4
 

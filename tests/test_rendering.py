@@ -25,12 +25,7 @@ def scene(size=24, **lights):
             "type": "perspective",
             "fov": 40.0,
             "to_world": look_at((0, -6, 3)),
-            "film": {
-                "type": "hdrfilm",
-                "width": size,
-                "height": size,
-                "rfilter": {"type": "box"},
-            },
+            "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}},
             "sampler": {"type": "multijitter"},
         },
         "sphere": {

@@ -161,11 +161,7 @@ WITNESSES = (
         lambda x, y: GREY * configuration.parallel_disc(np.hypot(x - 0.2, y), 0.4, HEIGHT),
     ),
     Witness(
-        "floor below a shining ball",
-        "E = π L (r / d)² cos θ",
-        CATALOGUE,
-        _below_a_ball,
-        _of_a_ball,
+        "floor below a shining ball", "E = π L (r / d)² cos θ", CATALOGUE, _below_a_ball, _of_a_ball
     ),
     Witness(
         "floor below a slanted spot",
