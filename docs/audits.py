@@ -5,8 +5,7 @@ from pathlib import Path
 
 import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
-from comparisons.audit.audit_record import Audit, Checked
-from comparisons.audit.checks import audit
+from comparisons.audit.checks import Audit, Checked, audit
 from reports.terminal.tables import markdown
 from reports.terminal.words import number
 

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import comparisons.compare
-from comparisons.audit.audit_record import Audit
-from comparisons.audit.checks import Kind
+from comparisons.audit.checks import Audit, Kind
 from comparisons.audit.checks import audit as examined
 from comparisons.case import RGB, Scene, open_case
 from comparisons.check.moved import LEVEL

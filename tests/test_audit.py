@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.audit import checks
+from comparisons.audit import checks, furnace
 from comparisons.audit.subjects import (
     DISTANCES,
     EXTREMES,
     ScatteringSubject,
     ShadingSubject,
-    random_and_mirrored,
 )
 from heuristic import Range, heuristics
 from heuristic.errors import InputError
@@ -254,7 +253,7 @@ def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
     found, _ = checked(subject)
     assert found["gradient"].verdict == "not asked"
     assert found["values"].verdict == "holds"
-    pairs = random_and_mirrored()
+    pairs = furnace.random_and_mirrored()
     for material in subject.materials:
         built_in = named("phong").response(material, *pairs)
         own = subject.response(material, *pairs)

@@ -8,8 +8,7 @@ import pytest
 from scipy import stats
 
 from comparisons.case import open_case
-from comparisons.check import baseline
-from comparisons.check.measurement import made_small, measure_scene
+from comparisons.check.measurement import baseline_of, made_small, measure_scene, read_baseline
 from comparisons.check.moved import check, differences, moved
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
@@ -149,11 +148,11 @@ def text():
     mi.set_variant("llvm_ad_rgb")
     found = measured(SCENES["fig-8-9"].make, 0, (9, 3), 32)
     options = {"variant": "llvm_ad_rgb", "seed": 0, "resolution": [9, 3]}
-    return baseline.of("fig-8-9", options, found).text()
+    return baseline_of("fig-8-9", options, found).text()
 
 
 def test_a_baseline_reads_as_it_was_written(text):
-    again = baseline.parse(text, "x.json")
+    again = read_baseline(text, "x.json")
     assert again.text() == text
     assert again.measured().reference.means().shape == (3, 4, 3)
     assert len(text.splitlines()) < 90
@@ -181,17 +180,17 @@ def test_a_file_that_is_no_baseline_is_refused(text):
     for old, new, expected in REFUSED:
         assert old in text
         with pytest.raises(InputError, match=expected) as refused:
-            baseline.parse(text.replace(old, new, 1), "x.json")
+            read_baseline(text.replace(old, new, 1), "x.json")
         assert str(refused.value).startswith("x.json: ")
         assert "--update" in str(refused.value)
     with pytest.raises(InputError, match="array"):
-        baseline.parse("[]", "x.json")
+        read_baseline("[]", "x.json")
 
 
 def test_a_baseline_of_the_version_before_is_read(text):
     old = text.replace('"record_version": 3', '"format": "fotismos baseline 1"')
     assert old != text
-    assert baseline.parse(old, "x.json").text() == text
+    assert read_baseline(old, "x.json").text() == text
 
 
 def test_a_metric_that_was_declared_later_is_not_tested(rgb):

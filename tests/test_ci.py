@@ -259,10 +259,8 @@ def test_causes_name_the_half_the_place_the_colour_and_the_object():
     causes = " ".join(found.causes())
     assert "Only the reference moved" in causes
     assert "in 1 of 16 blocks, most in row 2, column 3." in causes
-    assert "Only red moved in the reference" in causes
     level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
     assert "1.3 times the light everywhere" in level
-    assert "look at a colour" not in level
     assert check_of(redder, redder).causes()[0].startswith("Both halves moved: look at what")
     places = np.zeros((16, 16), int)
     places[4:8, 8:10] = 1  # half of the block that moved

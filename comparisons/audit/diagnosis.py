@@ -6,24 +6,22 @@ sum of a *changed* model has made that mistake, whatever its coefficients; each 
 not 1 is a further mistake. A shader that equals neither is another model, and nothing is reported.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import permutations, product
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from comparisons.audit.subjects import shaded
 from comparisons.departure.colour import from_srgb, to_srgb
 from comparisons.hard.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from comparisons.pictures.picture_warnings import MISREADINGS, Misreading, factor_of_pi
 from heuristic import heuristics
-from heuristic.heuristics import Heuristic, ShadingArguments
+from heuristic.heuristics import Heuristic
 from heuristic.lights import INVERSE_SQUARE, PointLight
-from heuristic.materials import PairedMaterial
 from heuristic.user_shaders import DEFAULT_VARIANT
 
 Array = np.ndarray
@@ -60,31 +58,23 @@ class Model:
     incident: Callable[[Array], Array] = clamped
     lobe: Callable[[Array, Array, Array], Array] = lobe
 
-    def terms(self) -> Array:
-        """Return emission, ambient, diffuse and specular light (4, P, 3), the terms of 8.10."""
-        diffuse = specular = np.zeros_like(self.k_d)
-        for toward, _, intensity in self.lights:
-            incidence = dot(self.normal, toward)
-            along = self.along(self.normal, toward, self.view)
-            diffuse = diffuse + intensity * self.incident(incidence)
-            specular = specular + intensity * self.lobe(along, self.n, incidence)
-        return np.stack(
-            [self.k_i, self.ambient * self.k_d, self.k_d * diffuse, self.k_s * specular]
-        )
+    def terms(self, **changes: Any) -> Array:
+        """Return emission, ambient, diffuse and specular light (4, P, 3), the terms of 8.10.
 
-    def relit(self, change: Callable[..., tuple[Array, Array, Array]]) -> "Model":
-        """Return the model with each light's direction, distance and intensity changed."""
-        return replace(self, lights=tuple(change(*light) for light in self.lights))
+        ``changes`` are other values of the model's fields.
+        """
+        m = replace(self, **changes)
+        diffuse = specular = np.zeros_like(m.k_d)
+        for toward, _, intensity in m.lights:
+            incidence = dot(m.normal, toward)
+            along = m.along(m.normal, toward, m.view)
+            diffuse = diffuse + intensity * m.incident(incidence)
+            specular = specular + intensity * m.lobe(along, m.n, incidence)
+        return np.stack([m.k_i, m.ambient * m.k_d, m.k_d * diffuse, m.k_s * specular])
 
 
-@dataclass(frozen=True)
-class Mistake:
-    """A change of the model, and its description, with ``{}`` for the number it changes ``by``."""
-
-    words: str
-    change: Callable[..., Model]
-    by: tuple[float, float] | None = None
-
+Mistake = tuple[str, Callable[..., dict[str, Any]]]
+"""Its description, and the fields of a model that it changes."""
 
 TermFit = tuple[Array, float]
 """Coefficients (3, 4) of the terms by channel, and the remaining relative RMS difference."""
@@ -120,37 +110,40 @@ def _describe(heuristic: Heuristic) -> Iterator[str]:
 
 def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | None:
     """Return the mistake that explains the values seen, and its fit; no words if there is none."""
-    readings = [("", seen), *((f"its {each.symptom}", each.undo(seen)) for each in ENCODINGS)]
-    fixed = [("", model.terms())]
-    fixed += [(each.words, each.change(model).terms()) for each in MISTAKES if each.by is None]
-    for words, terms in fixed:  # one mistake before two
-        for read, values in readings if not words else readings[:1]:
-            if (fit := _fit(terms, values, counts))[1] < ALIKE:
-                return words or read, fit
-    scaled = [_best(each, each.by, model, seen, counts) for each in MISTAKES if each.by]
+    right = model.terms()
+    changed = [(words, model.terms(**change(model))) for words, change in MISTAKES]
+    encoded = [(f"its {each.symptom}", each.undo(seen)) for each in ENCODINGS]
+
+    def first(candidates: Iterable[tuple[str, Array, Array]]) -> tuple[str, TermFit] | None:
+        fits = ((words, _fit(terms, values, counts)) for words, terms, values in candidates)
+        return next((pair for pair in fits if pair[1][1] < ALIKE), None)
+
+    single = [("", right, seen), *((words, right, values) for words, values in encoded)]
+    single += [(words, terms, seen) for words, terms in changed]
+    if explanation := first(single):  # one mistake before two
+        return explanation
+    scaled = [_best(each, model, seen, counts) for each in SCALED]
     if alike := [pair for pair in scaled if pair[1][1] < ALIKE]:
         return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))))
-    for read, values in readings[1:]:
-        for words, terms in fixed[1:]:
-            if (fit := _fit(terms, values, counts))[1] < ALIKE:
-                return f"{words}; and {read}", fit
-    return None
+    return first(
+        (f"{words}; and {read}", terms, values)
+        for read, values in encoded
+        for words, terms in changed
+    )
 
 
-def _best(
-    each: Mistake, by: tuple[float, float], model: Model, seen: Array, counts: Array
-) -> tuple[str, TermFit]:
-    """Return a mistake, described with the number that fits best."""
+def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[str, TermFit]:
+    """Return a mistake by some number, described with the one that fits best."""
+    words, change = mistake
 
     def fit(log: float) -> TermFit:
-        return _fit(each.change(model, np.exp(log)).terms(), seen, counts)
+        return _fit(model.terms(**change(model, np.exp(log))), seen, counts)
 
-    low, high = np.log(by)
-    grid, step = np.linspace(low, high, 24, retstep=True)
+    grid, step = np.linspace(-LARGEST_LOG, LARGEST_LOG, 32, retstep=True)
     start = grid[np.argmin([fit(log)[1] for log in grid])]
     bounds = start - step, start + step
     best = minimize_scalar(lambda log: fit(log)[1], bounds=bounds, options={"xatol": 1e-5}).x
-    return each.words.format(f"{np.exp(best):.3g}"), fit(best)
+    return words.format(f"{np.exp(best):.3g}"), fit(best)
 
 
 def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
@@ -227,77 +220,37 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
 
 def evaluate(heuristic: Heuristic, model: Model) -> Array:
     """Return a heuristic's values (P, 3) at a model's points."""
-
-    def vector(values: Array) -> mi.Vector3f:
-        return mi.Vector3f(np.ascontiguousarray(values.T, np.float32))
-
-    def spectrum(values: Array) -> mi.Spectrum:
-        return mi.Spectrum(*(mi.Float(np.float32(each)) for each in values.T))
-
-    base = spectrum(model.k_d)
-    material = PairedMaterial(
-        k_i=spectrum(model.k_i),
-        k_a=base,
-        k_d=base,
-        k_s=spectrum(model.k_s),
-        n=mi.Float(np.float32(model.n[:, 0])),
-        form=heuristic.form or "phong",
-        base_color=base,
-        alpha=dr.opaque(mi.Float, 0.3),
-        ior=dr.opaque(mi.Float, 1.5),
-        metallic=dr.opaque(mi.Float, 0),
-    )
+    names = {"k_i": "k_i", "k_a": "k_d", "k_d": "k_d", "k_s": "k_s", "base_color": "k_d"}
+    colours = {name: getattr(model, field).T for name, field in names.items()}
     lights = [
         PointLight(place, mi.Spectrum(intensity), INVERSE_SQUARE)
         for place, intensity in zip(LAMPS, INTENSITIES, strict=True)
     ]
-    arguments = ShadingArguments(
-        vector(model.position), vector(model.normal), vector(model.view), material, lights,
-        mi.Spectrum(model.ambient.tolist()),
-        lambda toward, distance: dr.full(mi.Bool, True, POINTS),
+    values = shaded(
+        heuristic, (model.position.T, model.normal.T, model.view.T),
+        colours | {"n": model.n[:, 0], "alpha": 0.3, "ior": 1.5}, lights, model.ambient.tolist(),
     )  # fmt: skip
-    parameters = {each.name: mi.Float(each.default) for each in heuristic.parameters}
-    value = mi.Spectrum(heuristic.evaluate(arguments, mi.Point2f(0.5), parameters, None))
-    return np.broadcast_to(np.array(value, float).reshape(3, -1).T, (POINTS, 3))
+    return np.broadcast_to(np.array(values, float).reshape(3, -1).T, (POINTS, 3))
 
 
 # --- Known mistakes ----------------------------------------------------------------------------
-
-
-def _changed(**changes: Callable[[Model], Any]) -> Callable[[Model], Model]:
-    """Return a change of the model's fields, each by a function of the model."""
-
-    def change(model: Model) -> Model:
-        fields: dict[str, Any] = {name: new(model) for name, new in changes.items()}
-        return replace(model, **fields)
-
-    return change
 
 
 def _spaces() -> Iterator[Mistake]:
     """Yield a mistake for each other space whose axes are the world's, swapped or reversed."""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         if (order, signs) != ((0, 1, 2), (1, 1, 1)):
-            axes = ", ".join(
-                f"{'-' if sign < 0 else ''}{'xyz'[place]}"
-                for place, sign in zip(order, signs, strict=True)
-            )
-            yield Mistake(
+            pairs = zip(order, signs, strict=True)
+            axes = ", ".join(f"{'-' if sign < 0 else ''}{'xyz'[place]}" for place, sign in pairs)
+            yield (
                 f"the normal is in another space: it looks like ({axes})",
-                partial(_in_space, order, signs),
+                lambda m, order=order, signs=signs: {"normal": m.normal[:, list(order)] * signs},
             )
 
 
-def _in_space(order: tuple[int, ...], signs: tuple[int, ...], model: Model) -> Model:
-    return replace(model, normal=model.normal[:, list(order)] * signs)
-
-
-def _encode(normal: Array) -> Array:
-    return 0.5 * normal + 0.5
-
-
-def _recoloured(undo: Callable[[Array], Array]) -> Callable[[Model], Model]:
-    return _changed(k_d=lambda model: undo(model.k_d), k_s=lambda model: undo(model.k_s))
+def _relit(model: Model, change: Callable[..., tuple[Array, Array, Array]]) -> dict[str, Any]:
+    """Return the lights, with each one's direction, distance and intensity changed."""
+    return {"lights": tuple(change(*light) for light in model.lights)}
 
 
 def _without_gate(cosine: Array, n: Array, incidence: Array) -> Array:
@@ -310,51 +263,56 @@ def _mirrored_behind(normal: Array, toward: Array, view: Array) -> Array:
 
 BEHIND = "light from behind counts: N.L has lost its sign"
 
-MISTAKES = (
-    Mistake("the light vector is reversed: it leads from the light to the surface",
-            lambda model: model.relit(lambda to, away, light: (-to, away, light))),
-    Mistake("the view vector or the mirrored one is reversed (GLSL's reflect takes the direction in"
-            " which light travels)", _changed(view=lambda model: -model.view)),
-    Mistake("the lobe is about the half vector, with the exponent for the mirrored one: too wide",
-            _changed(along=lambda model: halfway)),
-    Mistake("the intensity falls off with the square of the distance a second time",
-            lambda model: model.relit(lambda to, away, light: (to, away, light / away**2))),
-    Mistake("the fall-off with the square of the distance is missing",
-            lambda model: model.relit(lambda to, away, light: (to, away, light * away**2))),
-    Mistake("the view vector is the position reversed, which is right only in view space",
-            _changed(view=lambda model: unit(-model.position))),
-    Mistake("the view vector is the position reversed, and not normalised",
-            _changed(view=lambda model: -model.position)),
-    Mistake("the normal is encoded as N / 2 + 1/2",
-            _changed(normal=lambda model: _encode(model.normal))),
-    Mistake("the normal is encoded as N / 2 + 1/2, and then normalised",
-            _changed(normal=lambda model: unit(_encode(model.normal)))),
-    Mistake(BEHIND, _changed(incident=lambda model: np.abs)),
-    Mistake(BEHIND, _changed(incident=lambda model: np.abs, along=lambda model: _mirrored_behind,
-                             lobe=lambda model: _without_gate)),
-    Mistake("lights below the horizon cause highlights",
-            _changed(lobe=lambda model: _without_gate)),
-    Mistake("the lobe is multiplied by N.L, as in a BRDF; the textbook's is not",
-            _changed(lobe=lambda model: lambda *words: lobe(*words) * clamped(words[-1]))),
-    Mistake("only the first light is used", _changed(lights=lambda model: model.lights[:1])),
-    Mistake("the lobe is normalised by n + 2, which the paired k_s already includes",
-            _changed(k_s=lambda model: model.k_s * (model.n + 2))),
-    Mistake("the lobe is normalised by n + 8, which the paired k_s already includes",
-            _changed(k_s=lambda model: model.k_s * (model.n + 8))),
-    Mistake("the material's colours are decoded, but are already linear", _recoloured(from_srgb)),
-    Mistake("the material's colours are decoded by a power of 2.2, but are already linear",
-            _recoloured(lambda colour: colour**2.2)),
-    Mistake("the material's colours are sRGB-encoded", _recoloured(to_srgb)),
+MISTAKES: tuple[Mistake, ...] = (
+    ("the light vector is reversed: it leads from the light to the surface",
+     lambda m: _relit(m, lambda to, away, light: (-to, away, light))),
+    ("the view vector or the mirrored one is reversed (GLSL's reflect takes the direction in"
+     " which light travels)", lambda m: {"view": -m.view}),
+    ("the lobe is about the half vector, with the exponent for the mirrored one: too wide",
+     lambda m: {"along": halfway}),
+    ("the intensity falls off with the square of the distance a second time",
+     lambda m: _relit(m, lambda to, away, light: (to, away, light / away**2))),
+    ("the fall-off with the square of the distance is missing",
+     lambda m: _relit(m, lambda to, away, light: (to, away, light * away**2))),
+    ("the view vector is the position reversed, which is right only in view space",
+     lambda m: {"view": unit(-m.position)}),
+    ("the view vector is the position reversed, and not normalised",
+     lambda m: {"view": -m.position}),
+    ("the normal is encoded as N / 2 + 1/2", lambda m: {"normal": 0.5 * m.normal + 0.5}),
+    ("the normal is encoded as N / 2 + 1/2, and then normalised",
+     lambda m: {"normal": unit(0.5 * m.normal + 0.5)}),
+    (BEHIND, lambda m: {"incident": np.abs}),
+    (BEHIND, lambda m: {"incident": np.abs, "along": _mirrored_behind, "lobe": _without_gate}),
+    ("lights below the horizon cause highlights", lambda m: {"lobe": _without_gate}),
+    ("the lobe is multiplied by N.L, as in a BRDF; the textbook's is not",
+     lambda m: {"lobe": lambda *words: lobe(*words) * clamped(words[-1])}),
+    ("only the first light is used", lambda m: {"lights": m.lights[:1]}),
+    ("the lobe is normalised by n + 2, which the paired k_s already includes",
+     lambda m: {"k_s": m.k_s * (m.n + 2)}),
+    ("the lobe is normalised by n + 8, which the paired k_s already includes",
+     lambda m: {"k_s": m.k_s * (m.n + 8)}),
+    ("the material's colours are decoded, but are already linear",
+     lambda m: {"k_d": from_srgb(m.k_d), "k_s": from_srgb(m.k_s)}),
+    ("the material's colours are decoded by a power of 2.2, but are already linear",
+     lambda m: {"k_d": m.k_d**2.2, "k_s": m.k_s**2.2}),
+    ("the material's colours are sRGB-encoded",
+     lambda m: {"k_d": to_srgb(m.k_d), "k_s": to_srgb(m.k_s)}),
     *_spaces(),
-    Mistake("the exponent is {} times the material's",
-            lambda model, by: replace(model, n=model.n * by), (0.05, 20)),
-    Mistake("the normal is not normalised: it has a length of {}",
-            lambda model, by: replace(model, normal=model.normal * by), (0.2, 5)),
-    Mistake("the light vector is not normalised: it has a length of {}",
-            lambda model, by: model.relit(lambda to, *light: (to * by, *light)), (0.2, 5)),
-    Mistake("the view vector is not normalised: it has a length of {}",
-            lambda model, by: replace(model, view=model.view * by), (0.2, 5)),
 )  # fmt: skip
+
+LARGEST_LOG = 3.0
+"""Numbers of mistakes are searched for between its exponential and its inverse, 20 and 1/20."""
+
+SCALED: tuple[Mistake, ...] = (
+    ("the exponent is {} times the material's", lambda m, by: {"n": m.n * by}),
+    ("the normal is not normalised: it has a length of {}",
+     lambda m, by: {"normal": m.normal * by}),
+    ("the light vector is not normalised: it has a length of {}",
+     lambda m, by: _relit(m, lambda to, *light: (to * by, *light))),
+    ("the view vector is not normalised: it has a length of {}",
+     lambda m, by: {"view": m.view * by}),
+)  # fmt: skip
+"""Mistakes by some number, which their words show."""
 
 ENCODINGS = (
     *MISREADINGS,

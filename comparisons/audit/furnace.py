@@ -15,6 +15,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+UP = np.array([[0.0], [0.0], [1.0]])
+
 Response = Callable[[NDArray, NDArray], NDArray]
 """Of directions (3, N) to the light and the viewer: values (C, N)."""
 
@@ -105,3 +107,29 @@ def asymmetries(response: Response, a: NDArray, b: NDArray) -> NDArray:
     mean = (there + back) / 2
     counted = mean > 1e-3 * mean.max()
     return np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
+
+
+def describe(light: np.ndarray, view: np.ndarray, place: int) -> str:
+    """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
+    light, view = (each[:, place % each.shape[1]] for each in (light, view))
+    polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
+    about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
+    return (
+        f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"
+    )
+
+
+def random_and_mirrored() -> tuple[np.ndarray, np.ndarray]:
+    """Return random directions (3, 512) to lights and viewers; half face each other's mirror."""
+    light, view = random_pairs(256)
+    mirrored = light * [[-1], [-1], [1]]
+    return np.hstack([light, light]), np.hstack([view, mirrored])
+
+
+def grazing() -> tuple[np.ndarray, np.ndarray]:
+    """Return lights and viewers (3, N) at the horizon and the normal, and lights below them."""
+    azimuth = np.deg2rad([0.0, 90.0, 180.0])
+    rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
+    views = np.concatenate([UP, *rows], axis=1)
+    lights = np.concatenate([views, -views], axis=1)
+    return np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])

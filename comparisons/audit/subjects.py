@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from comparisons.audit import furnace
+from comparisons.audit.furnace import UP
 from heuristic import heuristics, terms
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import Heuristic, ShadingArguments
@@ -26,8 +27,6 @@ ALPHAS = (0.1, 0.3, 0.6, 1.0)
 
 ROUNDING = 1e-5
 """A value below 0 by less than this, in units of display white, is a rounding error."""
-
-UP = np.array([[0.0], [0.0], [1.0]])
 
 CaseValues = tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray] | None]
 """Words, the values (C, N), and directions to light and viewer if they identify a value."""
@@ -81,34 +80,8 @@ class Subject(ABC):
         is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
         if is_wrong.any():
             channel, place = np.argwhere(is_wrong)[0]
-            where = f"{words}, {describe(*pairs, place)}" if pairs else words
+            where = f"{words}, {furnace.describe(*pairs, place)}" if pairs else words
             self.faults.append(f"{values[channel, place]:.3g} ({where})")
-
-
-def describe(light: np.ndarray, view: np.ndarray, place: int) -> str:
-    """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
-    light, view = (each[:, place % each.shape[1]] for each in (light, view))
-    polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
-    about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
-    return (
-        f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"
-    )
-
-
-def random_and_mirrored() -> tuple[np.ndarray, np.ndarray]:
-    """Return random directions (3, 512) to lights and viewers; half face each other's mirror."""
-    light, view = furnace.random_pairs(256)
-    mirrored = light * [[-1], [-1], [1]]
-    return np.hstack([light, light]), np.hstack([view, mirrored])
-
-
-def grazing() -> tuple[np.ndarray, np.ndarray]:
-    """Return lights and viewers (3, N) at the horizon and the normal, and lights below them."""
-    azimuth = np.deg2rad([0.0, 90.0, 180.0])
-    rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
-    views = np.concatenate([UP, *rows], axis=1)
-    lights = np.concatenate([views, -views], axis=1)
-    return np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
 
 
 # --- Heuristics --------------------------------------------------------------------------------
@@ -180,13 +153,13 @@ class ShadingSubject(Subject):
         return self._array(self.white[material], _sun(light), view)
 
     def hard_cases(self) -> Iterator[CaseValues]:
-        light, view = pairs = random_and_mirrored()
+        light, view = pairs = furnace.random_and_mirrored()
         for words, change in EXTREMES:
             yield words, self._array(MIDDLE | change, _sun(light), view), pairs
         for length in LENGTHS:
             values = self._array(MIDDLE, _sun(light), view, length * UP)
             yield f"a normal of length {length:g}", values, pairs
-        low = grazing()
+        low = furnace.grazing()
         values = self._array(MIDDLE, _sun(low[0]), low[1])
         yield "grazing, head on and from behind", values, low
         lights: dict[str, Any] = {
@@ -230,37 +203,52 @@ class ShadingSubject(Subject):
         normal: np.ndarray = UP,
         values: Mapping[str, Any] | None = None,
     ) -> Any:
-        count = max(view.shape[1], dr.width(getattr(light, "direction", 0.0)))
-        arguments = ShadingArguments(
-            dr.zeros(mi.Vector3f, count),
-            mi.Vector3f(np.broadcast_to(normal, (3, count))),
-            mi.Vector3f(np.broadcast_to(view, (3, count))),
-            _material(material, self.heuristic.form or "phong"),
-            [] if light is None else [light],
-            mi.Spectrum(0.0),
-            lambda toward, distance: dr.full(mi.Bool, True, count),
-        )
-        parameters = {
-            name: mi.Float(value) for name, value in (self.values | dict(values or {})).items()
-        }
-        uv = mi.Point2f(0.5, 0.5)
-        return mi.Spectrum(self.heuristic.evaluate(arguments, uv, parameters, self.prepared))
+        place, lights = (0 * UP, normal, view), [] if light is None else [light]
+        values = self.values | dict(values or {})
+        return shaded(self.heuristic, place, material, lights, 0.0, values, self.prepared)
+
+
+def shaded(
+    heuristic: Heuristic,
+    place: tuple[np.ndarray, np.ndarray, np.ndarray],
+    material: Mapping[str, Any],
+    lights: list[Any],
+    ambient: Any = 0.0,
+    values: Mapping[str, Any] | None = None,
+    prepared: Any = None,
+) -> Any:
+    """Return a heuristic's colours at points: position, normal and view, (3, N) or (3, 1) each.
+
+    Numbers of the ``material`` may differ from point to point, (N,), and colours (3, N). Nothing
+    hides a light. ``values`` are those of its parameters, if not the defaults.
+    """
+    count = max(each.shape[1] for each in place)
+    known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
+    # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
+    made = {name: _opaque(value) for name, value in (known | dict(material)).items()}
+    made |= {name: mi.Spectrum(made[name]) for name in COLOURS}
+    values = {each.name: each.default for each in heuristic.parameters} | dict(values or {})
+    position, normal, view = (mi.Vector3f(_single(np.broadcast_to(v, (3, count)))) for v in place)
+    arguments = ShadingArguments(
+        position, normal, view, PairedMaterial(**made, form=heuristic.form or "phong"), lights,
+        mi.Spectrum(ambient), lambda toward, distance: dr.full(mi.Bool, True, count),
+    )  # fmt: skip
+    parameters = {name: mi.Float(value) for name, value in values.items()}
+    return mi.Spectrum(heuristic.evaluate(arguments, mi.Point2f(0.5), parameters, prepared))
+
+
+def _opaque(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return (mi.Float if value.ndim == 1 else mi.Spectrum)(_single(value))
+    return value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, np.float32)
 
 
 def _sun(toward: np.ndarray) -> DirectionalLight:
     return DirectionalLight(mi.Vector3f(-toward), 1.0)
-
-
-def _material(values: Mapping[str, Any], form: str) -> PairedMaterial:
-    known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
-    # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
-    opaque = {
-        name: value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
-        for name, value in (known | dict(values)).items()
-    }
-    return PairedMaterial(
-        **opaque | {name: mi.Spectrum(opaque[name]) for name in COLOURS}, form=form
-    )
 
 
 def _within(parameter: heuristics.Parameter, value: float) -> float | None:
@@ -347,11 +335,11 @@ class ScatteringSubject(Subject):
         return furnace.of_bsdf(self.bsdfs[material])(light, view)
 
     def hard_cases(self) -> Iterator[CaseValues]:
-        light, view = grazing()
+        light, view = furnace.grazing()
         pairs = np.hstack([light, light]), np.hstack([view, -view])
         yield "grazing, head on and from behind", furnace.of_bsdf(self.bsdf)(*pairs), pairs
         yield "a direction of length 0", furnace.of_bsdf(self.bsdf)(np.zeros((3, 1)), UP), None
-        light, view = pairs = random_and_mirrored()
+        light, view = pairs = furnace.random_and_mirrored()
         for alpha in (1e-4, 1.0) if "alpha" in self.keys else ():
             yield f"alpha = {alpha:g}", furnace.of_bsdf(self._made(alpha=alpha))(light, view), pairs
 

@@ -14,8 +14,7 @@ from PIL import Image
 from comparisons import atomic
 from comparisons.atomic import content, require_regular
 from comparisons.case import SUFFIXES, Case, file_of, open_case
-from comparisons.check.baseline import FORMAT_0_1, Baseline, parse
-from comparisons.check.measurement import HALVES
+from comparisons.check.measurement import FORMAT_0_1, HALVES, Baseline, read_baseline
 from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
@@ -76,7 +75,7 @@ def read(path: Path) -> BaselineFile:
         text = content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
-    return BaselineFile(path, parse(text, str(path)))
+    return BaselineFile(path, read_baseline(text, str(path)))
 
 
 def was_ours(path: Path) -> bool:

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta, field, structs
 
 from comparisons.case import Case, open_case
-from comparisons.check import baseline
-from comparisons.check.measurement import HALVES, made_small, measure_scene
+from comparisons.check.measurement import HALVES, baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
 from comparisons.compare import compare
 from comparisons.departure.metrics import LEADING
@@ -24,7 +23,6 @@ from reference.rendering.renderer import Progress
 from reference.scene.graph import set_variant
 from reports.ci import baselines
 from reports.ci.baselines import BaselineFile
-from reports.ci.summary import moved_cells
 from reports.files import images
 from reports.page.scene_view import Before, SceneView
 from reports.run import results, scene
@@ -160,7 +158,7 @@ def update(
         made = structs.replace(made, message=added)
     if is_added or not found.passed:
         kept = found.now.pictures if with_pictures or old.images else None
-        new = old if found.passed else baseline.of(old.scene, old.options, found.now.measurement)
+        new = old if found.passed else baseline_of(old.scene, old.options, found.now.measurement)
         baselines.write(file.path, new, kept)
     return made
 
@@ -178,7 +176,7 @@ def create(
     measured = measure_scene(case.source, case.options, progress=progress)
     options = baselines.options_for(case.changed(spp=measured.spp).options.stated(), path)
     status: Literal["updated", "created"] = "updated" if path.exists() else "created"
-    new = baseline.of(scene, options, measured.measurement)
+    new = baseline_of(scene, options, measured.measurement)
     baselines.write(path, new, measured.pictures if with_pictures else None)
     return CheckRecord(
         baseline=path.as_posix(),
@@ -230,7 +228,7 @@ def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) ->
         sentences += [f"The change in the {half} by object: {shares}."] if shares else []
     return Before(
         sentences=tuple(filter(None, (*sentences, made.versions_line))),
-        moved=tuple(map(moved_cells, made.moved or ())),
+        moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,
         pictures=shown,
         command=program.command("check", made.baseline, "--update"),

@@ -22,7 +22,6 @@ from reports.terminal.tables import escaped, markdown, printed
 from reports.terminal.words import number, percent, visible
 
 if TYPE_CHECKING:
-    from comparisons.check.moved import Move
     from reports.ci.checks import CheckRecord
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
@@ -241,7 +240,7 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     for made in checks:
         cells: tuple[str, ...] = (made.message, "", "", "", "")
         if made.moved:
-            what, *numbers = moved_cells(made.moved[0])
+            what, *numbers = made.moved[0].cells()
             cells = (f"{what} ({len(made.moved)} in all)", *numbers)
         rows.append((made.name, made.status, *cells))
     table = markdown([rows[0], *([escaped(cell) for cell in row] for row in rows[1:])], right=3)
@@ -298,23 +297,11 @@ def moved_lines(made: CheckRecord) -> Iterator[str]:
     for move in moved[:SHOWN]:
         old, new = move.before, move.after
         change = f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}"
-        name, before, now, *certainty = moved_cells(move)
+        name, before, now, *certainty = move.cells()
         rows.append((name, before, now, change, *certainty))
     yield from printed(rows, right=2)
     if len(moved) > SHOWN:
         yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
-
-
-def moved_cells(move: Move) -> tuple[str, ...]:
-    """Return the cells of a move: its name, from, to, standard errors and p-value."""
-    errors = move.standard_errors
-    return (
-        move.quantity,
-        f"{move.before:.6g}",
-        f"{move.after:.6g}",
-        "no noise" if errors is None else f"{errors:+.1f}",
-        f"{move.p_corrected:.1g}",
-    )
 
 
 def _details(made: CheckRecord) -> Iterator[str]:

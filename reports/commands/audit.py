@@ -12,8 +12,7 @@ from reports import jobs
 from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.audit.audit_record import Audit
-    from comparisons.audit.checks import Kind
+    from comparisons.audit.checks import Audit, Kind
 
 
 def _parameter(text: str) -> tuple[str, float | bool | str]:

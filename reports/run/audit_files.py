@@ -6,7 +6,7 @@ from typing import Any
 
 import altair as alt
 
-from comparisons.audit.audit_record import Audit
+from comparisons.audit.checks import Audit
 from reference import records
 from reports.charts import vega
 from reports.charts.theme import FAINT, Spec

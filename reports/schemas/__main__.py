@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from comparisons.audit.audit_record import Audit
-from comparisons.check.baseline import Baseline
+from comparisons.audit.checks import Audit
+from comparisons.check.measurement import Baseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord

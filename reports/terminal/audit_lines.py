@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from comparisons.audit.audit_record import Audit, Checked
+from comparisons.audit.checks import Audit, Checked
 from heuristic.heuristics import in_file
 from reports.terminal import tables
 from reports.terminal.words import number
