@@ -167,14 +167,13 @@ def test_each_baseline_is_judged_alone(run, folder, tmp_path):
     assert (folder / "fifo.json").is_fifo()
 
 
-def test_whatever_goes_wrong_is_the_error_of_one(tmp_path, monkeypatch):
+def test_whatever_goes_wrong_is_the_error_of_one(tmp_path):
     for raised in (MemoryError(), RecursionError("too deep"), KeyError("x"), InputError("bad")):
 
         def read(path, raised=raised):
             raise raised
 
-        monkeypatch.setattr(baselines, "read", read)
-        made, view = checks.examine_one(tmp_path / "b.json", 0.01, None, tmp_path)
+        made, view = checks.judged(read, tmp_path / "b.json")
         assert (made.status, made.exit_code, view) == ("error", 2, None)
         assert str(raised) in made.message
     for raised in (KeyboardInterrupt, SystemExit):
@@ -182,9 +181,8 @@ def test_whatever_goes_wrong_is_the_error_of_one(tmp_path, monkeypatch):
         def leave(path, raised=raised):
             raise raised
 
-        monkeypatch.setattr(baselines, "read", leave)
         with pytest.raises(raised):
-            checks.examine_one(tmp_path / "b.json", 0.01, None, tmp_path)
+            checks.judged(leave, tmp_path / "b.json")
 
 
 def test_a_number_that_is_not_one_is_never_a_pass(folder, tmp_path, monkeypatch):

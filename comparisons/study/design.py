@@ -117,7 +117,9 @@ class StudyPart:
                 unit = qmc.Sobol(len(levels), rng=rng).random(self.count)
             else:
                 unit = rng.random((self.count, len(levels)))
-            rows = zip(*(each.at(u) for each, u in zip(levels, unit.T, strict=True)), strict=True)
+            # The last digits of a power depend on where an array begins in memory.
+            drawn = np.stack([each.at(u) for each, u in zip(levels, unit.T, strict=True)], axis=1)
+            rows = [[f"{value:.12g}" for value in row] for row in drawn]
         return [dict(zip(self.levels, map(float, row), strict=True)) for row in rows]
 
     @property

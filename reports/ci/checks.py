@@ -31,6 +31,9 @@ from reports.terminal.words import percent
 
 RECORD = "check.json"
 
+Judging = Callable[..., tuple["CheckRecord", SceneView | None]]
+"""A function that checks or writes the baseline at a path."""
+
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
 
@@ -271,16 +274,27 @@ def update_all(
 
 
 def _each(
-    pool: Pool, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]
+    pool: Pool, function: Judging, calls: Sequence[tuple[Any, ...]]
 ) -> list[tuple[CheckRecord, SceneView | None]]:
     """Return the result of each baseline, in order; its path is the first argument."""
-    found = {}
+    results = {}
     with progress.shown() as bar:
-        tasks = [Task(call[0].name, function, call, bar.of(call[0].stem)) for call in calls]
+        tasks = [
+            Task(call[0].name, judged, (function, *call), bar.of(call[0].stem)) for call in calls
+        ]
         for task, outcome in pool.each(tasks):
-            path, error = task.arguments[0], outcome.exception()
-            found[path] = (failed(path, error), None) if error else outcome.result()
-    return [found[call[0]] for call in calls]
+            path, error = task.arguments[1], outcome.exception()
+            results[path] = (failed(path, error), None) if error else outcome.result()
+    return [results[call[0]] for call in calls]
+
+
+def judged(function: Judging, path: Path, *words: Any) -> tuple[CheckRecord, SceneView | None]:
+    """Check or write one baseline in a process of a pool; an exception becomes its result."""
+    begin = perf_counter()
+    try:
+        return function(path, *words)
+    except Exception as error:
+        return failed(path, error, perf_counter() - begin), None
 
 
 def failed(path: Path, error: BaseException, seconds: float = 0.0) -> CheckRecord:
@@ -300,13 +314,9 @@ def failed(path: Path, error: BaseException, seconds: float = 0.0) -> CheckRecor
 def examine_one(
     path: Path, level: float, seed: int | None, folder: Path, progress: Progress | None = None
 ) -> tuple[CheckRecord, SceneView | None]:
-    """Check one baseline in a process of a pool; an exception becomes its result."""
-    begin = perf_counter()
-    try:
-        file = baselines.read(path)
-        return examine(file, file.open(seed), level, folder, progress)
-    except Exception as error:
-        return failed(path, error, perf_counter() - begin), None
+    """Check one baseline."""
+    file = baselines.read(path)
+    return examine(file, file.open(seed), level, folder, progress)
 
 
 def update_one(
@@ -317,22 +327,7 @@ def update_one(
     options: Mapping[str, Any],
     progress: Progress | None = None,
 ) -> tuple[CheckRecord, None]:
-    """Write one baseline in a process of a pool; ``scene`` is None if the file names it."""
-    begin = perf_counter()
-    try:
-        return _updated(path, scene, with_pictures, significance, options, progress), None
-    except Exception as error:
-        return failed(path, error, perf_counter() - begin), None
-
-
-def _updated(
-    path: Path,
-    scene: str | None,
-    with_pictures: bool,
-    significance: float,
-    options: Mapping[str, Any],
-    progress: Progress | None,
-) -> CheckRecord:
+    """Write one baseline; ``scene`` is None if the file names it."""
     if with_pictures:
         baselines.require_own_pictures(path)
     file, options = _readable(path, scene), baselines.options_for(options, path)
@@ -345,11 +340,11 @@ def _updated(
             )
         scene, options = baselines.scene_from(old.scene, path), dict(old.options) | options
         if Options.of(options) == Options.of(old.options):
-            return update(file, file.open(), significance, with_pictures, progress)
+            return update(file, file.open(), significance, with_pictures, progress), None
         with_pictures = with_pictures or bool(old.images)
     assert scene is not None, "a baseline that cannot be read comes with its scene"
     case = open_case(scene, Options.of(baselines.options_from(options, path)))
-    return create(path, baselines.scene_for(scene, path), case, with_pictures, progress)
+    return create(path, baselines.scene_for(scene, path), case, with_pictures, progress), None
 
 
 def _readable(path: Path, scene: str | None) -> BaselineFile | None:
