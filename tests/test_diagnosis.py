@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons.audit import diagnosis
-from comparisons.hard.textbook import halfway, mirrored
+from comparisons.textbook import halfway, mirrored
 from heuristic import heuristics
 from heuristic.errors import InputError
 from tests.test_glsl import opengl

@@ -17,8 +17,8 @@ from scipy.optimize import minimize_scalar
 
 from comparisons.audit.subjects import shaded
 from comparisons.departure.colour import from_srgb, to_srgb
-from comparisons.hard.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from comparisons.pictures.picture_warnings import MISREADINGS, Misreading, factor_of_pi
+from comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from heuristic import heuristics
 from heuristic.heuristics import Heuristic
 from heuristic.lights import INVERSE_SQUARE, PointLight

@@ -17,7 +17,7 @@ from reports.run import batch
 from reports.terminal.words import quiet_option, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.hard.hard_cases import HardCases
+    from comparisons.hard_cases import HardCases
     from comparisons.options import Options
 
 VERIFIED_AT = (64, 64)
@@ -111,11 +111,6 @@ def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
 
 def hard_cases() -> HardCases:
     """Evaluate the hard cases."""
-    from comparisons.case import RGB
-    from comparisons.hard.hard_cases import collect
-    from heuristic import plugins
-    from reference.scene.graph import set_variant
+    from comparisons.hard_cases import collect
 
-    set_variant(RGB)
-    plugins.register()
     return collect()

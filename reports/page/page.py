@@ -30,7 +30,7 @@ from reports.page.scene_view import Making, SceneView
 from reports.run.results import Failure, RunRecord
 
 if TYPE_CHECKING:  # few pages need these
-    from comparisons.hard.hard_cases import HardCases
+    from comparisons.hard_cases import HardCases
     from comparisons.verification import Verification
 
 #: The page's heading.

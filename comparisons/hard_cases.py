@@ -1,36 +1,21 @@
-"""Hard cases: where the textbook's formulas, and samplers, break, and by how much.
+"""Hard cases: where the textbook's formulas break in single precision, and by how much.
 
-A case has the exact value, a naive evaluation, ours, and a bound on the error that ours keeps and
-the naive one does not. Tests demand both of every case; the report prints them. For the kernel the
-naive evaluation is the textbook's formula in single precision.
-
-The samplers are on long paths inside a bright sphere of radius 1 and diffuse reflectance ρ, with a
-point light of intensity I at its centre. There the radiance is the same everywhere, because each
-reflection sends the same irradiance to all of it ::
-
-    L = ρ I / (π (1 − ρ))
-
-A path takes about 1 / (1 − ρ) reflections, and as many pairs of random numbers. If those depend on
-each other, the mean of an image is wrong, however many passes are taken: no standard error shows
-it. Naively the sampler is Mitsuba's; ours is :mod:`reference.rendering.sampler`.
+A case has the exact value, the textbook's formula in single precision (*naive*), the kernel
+(*ours*), and a bound on the error that ours keeps and the naive one does not. Tests demand both of
+every case; the report prints them.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from drjit.llvm import Array3f, Float
 from numpy.typing import ArrayLike, NDArray
 
 import heuristic
-from comparisons.hard import textbook
-from comparisons.hard.textbook import NAIVE, Setting, unit
-from reference.rendering.renderer import Renderer
-from reference.rendering.sampler import SAMPLER, register
+from comparisons import textbook
+from comparisons.textbook import NAIVE, Setting, unit
 
 ABSENT = 1e-3
 """Values below this share of the largest are judged by their absolute error."""
@@ -38,16 +23,26 @@ ABSENT = 1e-3
 
 @dataclass(frozen=True)
 class HardCase:
-    """A case: ``naive``, ``ours`` and ``exact`` return arrays of one shape."""
+    """A case; ``exactly`` replaces the formula in extended precision."""
 
     name: str
     group: str
     difficulty: str
     bound: float
-    naive: Callable[[], ArrayLike]
-    ours: Callable[[], ArrayLike]
-    exact: Callable[[], ArrayLike]
-    setting: Setting | None = None
+    setting: Setting
+    exactly: NDArray | None = None
+
+    def naive(self) -> NDArray:
+        """Return the values of the naive formula, (N,)."""
+        return textbook.shade(self.setting, NAIVE)
+
+    def ours(self) -> NDArray:
+        """Return the kernel's values, (N,)."""
+        return by_kernel(self.setting)
+
+    def exact(self) -> NDArray:
+        """Return the exact values, (N,)."""
+        return textbook.shade_exactly(self.setting) if self.exactly is None else self.exactly
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ HardCases = dict[str, list[HardOutcome]]
 
 
 def collect() -> HardCases:
-    """Evaluate all cases, in the current Mitsuba variant; a few seconds."""
+    """Evaluate all cases."""
     groups: HardCases = {}
     for case in CASES:
         groups.setdefault(case.group, []).append(evaluate(case))
@@ -99,8 +94,6 @@ def error(values: ArrayLike, exact: np.ndarray) -> float:
         return np.inf if difference.any() else 0.0
     return float((difference / scale).max())
 
-
-# --- The kernel ---------------------------------------------------------------------------------
 
 POINTS = 2001
 
@@ -134,11 +127,7 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
 
 
 def _case(name: str, group: str, bound: float, setting: Setting, words: str) -> HardCase:
-    setting = setting.rounded()
-    return HardCase(
-        name, group, words, bound, partial(textbook.shade, setting, NAIVE),
-        partial(by_kernel, setting), partial(textbook.shade_exactly, setting), setting,
-    )  # fmt: skip
+    return HardCase(name, group, words, bound, setting.rounded())
 
 
 LIGHT, NORMAL = (1.0, 2.0, 4.0), (0.1, 0.2, 0.9)
@@ -191,54 +180,6 @@ _RAYS = (_AGAINST * np.arange(1, 51)[:, None, None]).reshape(-1, 3).astype(float
 _ON_CONE = Setting(k_d=1.0, cutoff=135.0, direction=(-3.0, 0.0, 4.0), light=-_RAYS, normal=-_RAYS)
 """Integers at exactly 135 degrees from an axis: as far against it as across it."""
 
-
-# --- Samplers ----------------------------------------------------------------------------------
-
-REFLECTANCE = 0.9
-RADIANCE = REFLECTANCE / (np.pi * (1 - REFLECTANCE))
-SAMPLES, WIDTH = 256, 32
-
-BOUND = 0.005
-"""On the relative error: about four standard errors of :data:`SAMPLES`."""
-
-
-def sphere(reflectance: float, width: int, sampler: dict | None = None) -> dict:
-    """Return the scene as a dictionary, seen from inside, off its centre."""
-    view = mi.ScalarTransform4f().look_at((0.3, 0.1, 0.2), (1, 0.2, 0), (0, 1, 0))
-    film = {"type": "hdrfilm", "width": width, "height": width, "rfilter": {"type": "box"}}
-    sensor = {"type": "perspective", "fov": 60, "to_world": view, "film": film}
-    if sampler:
-        sensor["sampler"] = sampler
-    inside = {"type": "diffuse", "reflectance": reflectance}
-    return {
-        "type": "scene",
-        "integrator": {"type": "path"},
-        "sphere": {"type": "sphere", "flip_normals": True, "bsdf": inside},
-        "light": {"type": "point", "position": (0, 0, 0), "intensity": 1.0},
-        "sensor": sensor,
-    }
-
-
-@cache
-def mean(sampler: str, count: int) -> list[float]:
-    """Return the mean radiance that a sampler gives, with ``count`` samples per pixel and pass."""
-    register()
-    scene = mi.load_dict(sphere(REFLECTANCE, WIDTH, {"type": sampler, "sample_count": count}))
-    renderer = Renderer(scene, None, count, "image of the sphere")
-    images = (renderer.render(7919 * number) for number in range(SAMPLES // count))
-    return [float(np.mean([np.array(image).mean() for image in images]))]
-
-
-def _sampler(name: str, count: int) -> HardCase:
-    return HardCase(
-        f"{name} at {count} samples per pass", "Samplers",
-        f"Inside a sphere of ρ = {REFLECTANCE} a path takes about ten reflections, and its random"
-        " numbers depend on each other.",
-        BOUND, lambda: mean(name, count), lambda: mean(SAMPLER, count), lambda: [RADIANCE],
-    )  # fmt: skip
-
-
-# --- Rows --------------------------------------------------------------------------------------
 
 CASES = (
     _case("exponent 0 at the lobe's end", "Exponents", 2e-4,
@@ -303,6 +244,5 @@ CASES = (
           "The cosine rounds to -1, and the dark needle behind the light disappears."),
     replace(_case("a point exactly on the cone", "Lights", 1e-6, _ON_CONE,
                   "6.2 says ≥: coordinates on the cone are lit, however they round."),
-            exact=lambda: np.ones(len(_RAYS))),
-    _sampler("multijitter", 4), _sampler("multijitter", 16), _sampler("ldsampler", 16),
+            exactly=np.ones(len(_RAYS))),
 )  # fmt: skip
