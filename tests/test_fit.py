@@ -299,7 +299,7 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(fitted, rgb):
     nearest = fitted.record.nearest
     assert nearest.loss == pytest.approx(found[1], rel=1e-4)
     assert nearest.loss + nearest.parameter_error == pytest.approx(found[0], rel=1e-4)
-    if loss.name != "perceptual":
+    if fitted.record.loss["name"] != "perceptual":
         return
     # What is left is what Fresnel makes: roughplastic reflects more towards the rim.
     for departure in nearest.departure.values():

@@ -74,7 +74,7 @@ MISTAKES = (
     (part("light_angle = 95"), "light_angle = 95: give a number from 0 to 89 deg"),
     (part("alpha = {from = 0.1, to = 1}"), "from, steps, to"),
     (part("alpha = {from = 0.5, to = 0.1, steps = 3}"), "from 0.5 to 0.1"),
-    (part("alpha = {from = 0.1, to = 1, steps = 3, scale = 'cubic'}"), "linear or log"),
+    (part("alpha = {from = 0.1, to = 1, steps = 3, scale = 'cubic'}"), "'cubic'"),
     (part("light_angle = {from = 0, to = 9, steps = 3, scale = 'log'}"), "above 0"),
     (part("alpha = 0.1\nn = 3"), "two materials"),
     (part("alpha = 0.1", "lobe", "design = 'latin'"), "latin"),

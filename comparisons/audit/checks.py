@@ -50,48 +50,26 @@ Kind = Literal["heuristic", "bsdf"]
 
 
 class Checked(Record):
-    """One check.
-
-    Attributes
-    ----------
-    verdict
-        ``not asked`` if the check does not apply to the subject.
-    value
-        The value in the worst case; None if the check was not made.
-    expected
-        The condition on the value for the check to hold, in words.
-    worst
-        The worst case, or why the check was not made.
-    """
+    """One check, with its value in the worst case, and the condition on it in words."""
 
     name: str
     verdict: Literal["holds", "does not hold", "not asked"]
-    value: float | None
+    value: Annotated[float | None, Meta(description="Null if the check was not made.")]
     expected: str
-    worst: str
+    worst: Annotated[str, Meta(description="The worst case, or why the check was not made.")]
 
 
 class MaterialCurves(Record):
-    """How much light a white material returns, over angles from the normal.
-
-    Attributes
-    ----------
-    alpha
-        Its roughness; None if it has none, or if it was not varied.
-    seen
-        Radiance seen at each angle under radiance 1 from all directions.
-    returned
-        Share of the light from each angle that the surface returns in all directions.
-    lobes
-        ``pi f`` in the plane of incidence at ``views``, for each of ``lights``; empty for most
-        roughnesses.
-    """
+    """How much light a white material returns, over angles from the normal."""
 
     material: str
-    alpha: float | None
-    seen: tuple[float, ...]
-    returned: tuple[float, ...]
-    lobes: tuple[tuple[Amount, ...], ...] = ()
+    alpha: Annotated[float | None, Meta(description="Roughness, if it has one and was varied.")]
+    seen: Annotated[tuple[float, ...], Meta(description="Radiance seen in the white furnace.")]
+    returned: Annotated[tuple[float, ...], Meta(description="Share of the light from each angle.")]
+    lobes: Annotated[
+        tuple[tuple[Amount, ...], ...],
+        Meta(description="``pi f`` in the plane of incidence, by light and view; often empty."),
+    ] = ()
 
 
 class Audit(Record, kw_only=True):

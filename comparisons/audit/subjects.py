@@ -36,11 +36,10 @@ Number = tuple[str, float, Callable[[Any], Any]]
 
 
 class Subject(ABC):
-    """A heuristic or a BSDF.
+    """A heuristic or a BSDF, with white materials and the roughness of those that have several.
 
-    ``materials`` are the white materials that it is evaluated with, which absorb nothing, and the
-    roughness of those that have several; ``untuned`` is why no derivative can be checked, if so.
-    ``faults`` are values that light cannot have, in words, found during any check.
+    ``untuned`` is why no derivative can be checked, if so; ``faults`` are values that light cannot
+    have, in words, from any check.
     """
 
     materials: dict[str, float | None]

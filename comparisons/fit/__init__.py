@@ -2,3 +2,5 @@
 
 Is the model wrong, or only its parameters?
 """
+
+import heuristic  # noqa: F401  before Mitsuba: it finds LLVM

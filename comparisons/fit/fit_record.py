@@ -30,85 +30,45 @@ class FitDeparture(Record):
 
 
 class FittedParameter(Record, kw_only=True):
-    """A parameter as the chapters name it, or of a heuristic's own.
-
-    Attributes
-    ----------
-    channel
-        Of a coefficient with one number per channel; otherwise empty.
-    is_factor
-        Whether the numbers are factors on a texture.
-    paired
-        Value by the pairing table.
-    fitted
-        The best value; null if the image does not determine it.
-    stopped_at
-        Where the search ended; if the parameter is not identifiable, any value would do.
-    interval
-        95 %, by the reference's noise alone; null at a bound, or if not identifiable.
-    bounds
-        Lower and upper; null if there is none.
-    reason
-        Why it is not identifiable; otherwise empty.
-    partners
-        Parameters that make up for it.
-    """
+    """A parameter as the chapters name it, or of a heuristic's own; of a texture, factors on it."""
 
     name: str
     channel: Literal["", "R", "G", "B"] = ""
     is_factor: bool = False
-    paired: float
-    fitted: float | None
-    stopped_at: float
-    interval: tuple[float, float] | None
+    paired: Annotated[float, Meta(description="By the pairing table.")]
+    fitted: Annotated[float | None, Meta(description="Null if the image does not determine it.")]
+    stopped_at: Annotated[float, Meta(description="Where the search ended.")]
+    interval: Annotated[
+        tuple[float, float] | None,
+        Meta(description="95 %, by noise; null at a bound, or if not identifiable."),
+    ]
     bounds: tuple[float | None, float | None]
     at_bound: bool
     identifiable: bool
-    reason: str
-    partners: tuple[str, ...] = ()
+    reason: Annotated[str, Meta(description="Why it is not identifiable; otherwise empty.")]
+    partners: Annotated[tuple[str, ...], Meta(description="Parameters that make up for it.")] = ()
 
 
 class FittedMaterial(Record):
-    """A material.
-
-    Attributes
-    ----------
-    reference
-        Plugin and plain parameters of the material in the reference.
-    pixels
-        Counted pixels that see it.
-    """
+    """A material, and the counted pixels that see it."""
 
     name: str
-    reference: dict[str, Any] | None
+    reference: Annotated[
+        dict[str, Any] | None, Meta(description="Its plugin and plain parameters there.")
+    ]
     pixels: Count
     parameters: tuple[FittedParameter, ...]
 
 
 class FormFit(Record, kw_only=True):
-    """The best fit of one form of the lobe, or of a heuristic's own parameters.
+    """The best fit of one form of the lobe, or of a heuristic's own parameters, in ``own``."""
 
-    Attributes
-    ----------
-    form
-        Of the lobe, ``phong`` or ``blinn``; or the heuristic whose own parameters were fitted.
-    loss
-        At the best parameters, in the loss's own unit: the *model error*, which no parameters of
-        this form remove.
-    parameter_error
-        The paired image's loss less the model error: what better parameters remove.
-    departure
-        By metric.
-    convergence
-        All searches.
-    own
-        Parameters that the heuristic declares.
-    """
-
-    form: str
-    loss: Amount
-    parameter_error: float
-    departure: dict[str, FitDeparture]
+    form: Annotated[str, Meta(description="``phong`` or ``blinn``, or the heuristic.")]
+    loss: Annotated[
+        float, Meta(ge=0, description="At the best parameters, in its unit: the model error.")
+    ]
+    parameter_error: Annotated[float, Meta(description="What better parameters remove of it.")]
+    departure: Annotated[dict[str, FitDeparture], Meta(description="By metric.")]
     materials: tuple[FittedMaterial, ...] = ()
     convergence: tuple[SearchStart, ...]
     own: tuple[FittedParameter, ...] = ()

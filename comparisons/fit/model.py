@@ -56,22 +56,10 @@ LARGEST_FACTOR = 4.0
 
 @dataclass(frozen=True)
 class FitParameter:
-    """One number to be fitted.
+    """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``, or a heuristic's own.
 
-    Attributes
-    ----------
-    name
-        ``k_a``, ``k_d``, ``k_s`` or ``n``, or a name that a heuristic declares.
-    owner
-        Index of the material.
-    paired, low, high
-        Value by the pairing table, and bounds, as in the vector.
-    tint
-        RGB of which a coefficient is a multiple.
-    channel
-        ``R``, ``G`` or ``B`` of a coefficient with three numbers, otherwise empty.
-    is_factor
-        Whether the number is a factor on a texture.
+    ``owner`` is the index of its material. The value by the pairing table and the bounds are as in
+    the vector. A coefficient is a multiple of ``tint``, in one ``channel`` if it has three numbers.
     """
 
     name: str
@@ -101,21 +89,12 @@ def bounds(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
 class Surface:
     """All of an image of the heuristic half but its parameters.
 
-    Attributes
-    ----------
-    names, materials
-        The paired materials, in plain numbers; a coefficient that varies over the surface is 1, a
-        factor on its texture.
-    samples
-        Of each material, those that see it from the side that is shaded, as arrays (..., S):
-        ``position``, ``normal``, ``view``; ``pixel``, the index in reading order; coefficients that
-        have a texture; and ``light 0``, …, the visibility of each light if some can be hidden.
-    lights, ambient
-        See :func:`heuristic.shade`.
-    fixed
-        (N, 3), the light that no parameter changes: emission (8.1) and background.
-    samples_per_pixel
-        Over all passes; a pixel is their mean (box filter).
+    The paired materials are in plain numbers; a coefficient with a texture is 1, a factor on it.
+    ``samples`` of each material are those that see it from the side that is shaded, as arrays
+    (..., S): ``position``, ``normal``, ``view``; ``pixel``, the index in reading order;
+    coefficients that have a texture; and ``light 0``, …, the visibility of each light if some can
+    be hidden. ``fixed`` (N, 3) is the light that no parameter changes: emission (8.1) and
+    background. A pixel is the mean of its ``samples_per_pixel`` (box filter).
     """
 
     names: tuple[str, ...]
@@ -186,18 +165,17 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
 
 def _require_fittable(names, bsdfs):
     """Reject transparent materials, since a sample has one surface, and varying exponents."""
-    clear = [name for name, bsdf in zip(names, bsdfs, strict=True) if bsdf.is_clear]
-    if clear:
-        raise InputError(
-            f"{', '.join(clear)}: a fit needs opaque materials; glass, masks and `null` let light"
-            " pass. Replace them."
-        )
-    varying = [n for n, bsdf in zip(names, bsdfs, strict=True) if isinstance(bsdf.n, mi.Texture)]
-    if varying:
-        raise InputError(
-            f"{', '.join(varying)}: n varies over the surface, and a fit has one n per material."
-            " Give its roughness as a number."
-        )
+    for name, bsdf in zip(names, bsdfs, strict=True):
+        if bsdf.is_clear:
+            raise InputError(
+                f"{name}: a fit needs opaque materials; glass, masks and `null` let light pass."
+                " Replace it."
+            )
+        if isinstance(bsdf.n, mi.Texture):
+            raise InputError(
+                f"{name}: n varies over the surface, and a fit has one n per material. Give its"
+                " roughness as a number."
+            )
 
 
 def _eye(shading):
@@ -415,11 +393,9 @@ class PhongModel:
 class OwnModel:
     """The heuristic half of a scene as a function of the parameters that a heuristic declares.
 
-    The heuristic need not be linear in anything, so an image is a rendering: the passes of the
-    heuristic half, with the reference's seeds, over the pixels of a mask (H, W). Dr.Jit
-    differentiates it by a parameter in forward mode, through the user's code. A step function
-    (``ceil``, ``select``) has no derivative; that is one more reason to begin the search from
-    several places.
+    An image is a rendering: the passes of the heuristic half, with the reference's seeds, over the
+    pixels of a mask (H, W). Dr.Jit differentiates it in forward mode, through the user's code. A
+    step function has no derivative; that is one more reason for several starts.
     """
 
     def __init__(

@@ -1,36 +1,24 @@
 """The search for the best parameters, and which of them the image determines.
 
-The losses of a fit are means over pixels of a distance between two images:
-
-==============  =================================================  =========
-Loss            Distance of two pixels                             Unit
-==============  =================================================  =========
-``perceptual``  Euclidean in CAM16-UCS                             ΔE
-``linear``      its square, in linear RGB; 1 is display white      white
-==============  =================================================  =========
-
-``perceptual`` is the default: departures are reported as mean colour differences, and of the
-metrics only CAM16-UCS is a plain Euclidean distance that is also close to ΔE2000. Unlike the
-metric, it is not clipped at display white: a clipped highlight would not show how high and narrow
-it is. The distance is averaged, not its square: otherwise a shadow, which no parameter makes, would
-pull all of them towards itself. Below ``Loss.rounding``, a tenth of a just noticeable difference,
-it turns into its square, ``sqrt(d^2 + c^2) - c``, to have derivatives everywhere.
+A loss is the mean over pixels of a distance ``d`` between two images: ``sqrt(d^2 + c^2) - c`` in
+CAM16-UCS (``perceptual``), or ``d^2 / 2`` in linear RGB (``linear``). Unlike the metric, CAM16-UCS
+is not clipped at display white: a clipped highlight would not show how high and narrow it is. Its
+distance is averaged, not the square: otherwise a shadow, which no parameter makes, would pull all
+of them towards itself.
 
 *The search* is a bounded Newton method. The loss is a sum of a convex function of the coordinates'
 differences, which are nearly linear in the parameters: its second derivative is that function's,
 carried over by the Jacobian. Each step minimises the quadratic that has these derivatives, damped
-as by Levenberg and Marquardt, within the bounds. SciPy's bounded-variable least squares finds that
-minimum exactly, so a parameter reaches its bound. (SciPy's own searches see a curvature where a
-distance has none, or only its gradient, and take ten times the steps.) A highlight's width can trap
-the search, so it has several starts; so can the kink of a distance at 0, so each search first
-minimises a loss that is rounded more, :data:`SMOOTH`.
+as by Levenberg and Marquardt, within the bounds, so a parameter reaches its bound. (SciPy's own
+searches see a curvature where a distance has none, or only its gradient, and take ten times the
+steps.) A highlight's width can trap the search, so it has several starts; so can the kink of a
+distance at 0, so each search first minimises a loss that is rounded more, :data:`SMOOTH`.
 
 *A parameter that the image does not show*, or that others can make up for, has no fitted value. The
 Jacobian's columns answer both: the root mean square change of the loss's coordinates, over the
 pixels that the parameter can reach, for one natural change of it; and the change that remains when
-all others undo as much of it as they can, ``1 / sqrt((J^T J)^-1)`` on the diagonal. If either is
-below the loss's threshold, the parameter is not identifiable. This is to first order, at the fitted
-values, and as if a parameter at its bound were free to leave it.
+all others undo as much of it as they can, ``1 / sqrt((J^T J)^-1)`` on the diagonal. This is to
+first order, at the fitted values, and as if a parameter at its bound were free to leave it.
 
 *Intervals* are those of an M-estimator: the reference's noise moves the gradient of the loss, and
 the inverse of its second derivative moves the minimum.
@@ -39,9 +27,10 @@ the inverse of its second derivative moves the minimum.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
@@ -58,16 +47,12 @@ FOLLOWED = 2
 SMOOTH = 1.0
 """Rounding, in the loss's unit, of the loss that a search goes through first."""
 
-LARGEST_COUNT = 60
-"""Evaluations of one search."""
+LARGEST_COUNT, LARGEST_DAMPING = 60, 1e12
+"""Evaluations of one search, and the damping at which it ends."""
 
-TOLERANCE = 1e-7
-"""A search has converged when a step is expected to lower the loss by less than this part of it."""
-
-SMALLEST_GAIN = 1e-14
-"""The same in the loss's own unit, for images that the model can make exactly."""
-
-LARGEST_DAMPING = 1e12
+TOLERANCE, SMALLEST_GAIN = 1e-7, 1e-14
+"""A search has converged when a step is expected to lower the loss by less than this part of it, or
+by less than the latter, in its own unit, for images that the model can make exactly."""
 
 AT_BOUND = 1e-5
 """Share of the distance between two bounds; anything nearer to a bound is at it."""
@@ -81,23 +66,12 @@ COVERAGE = 1.96
 
 @dataclass(frozen=True)
 class Loss:
-    """A loss: coordinates of pixels, and their derivatives.
+    """Coordinates of pixels (N, 3) in a viewing, (N, K), and their derivatives by RGB, (N, K, 3).
 
-    Attributes
-    ----------
-    name, unit
-        See the table above.
-    coordinates
-        ``(rgb (N, 3), viewing) -> (N, K)``.
-    derivative
-        ``(rgb (N, 3), viewing) -> (N, K, 3)``, of the coordinates by R, G and B.
-    threshold
-        Root mean square change of the coordinates below which nothing shows.
-    rounding
-        ``c`` above; infinite for squares.
+    ``threshold`` is the root mean square change of coordinates below which nothing shows, and
+    ``rounding`` is ``c`` above, infinite for squares.
     """
 
-    name: str
     unit: str
     coordinates: Callable[[NDArray, Viewing], NDArray]
     derivative: Callable[[NDArray, Viewing], NDArray]
@@ -114,30 +88,22 @@ def _perceptual_derivative(rgb, viewing):
 
 
 LOSSES = {
-    loss.name: loss
-    for loss in (
-        Loss("perceptual", "ΔE (CAM16-UCS)", cam16ucs_unclipped, _perceptual_derivative, 0.05,
-             rounding=0.1),
-        Loss("linear", "white", lambda rgb, _: rgb,
-             lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)), 5e-4),
-    )
-}  # fmt: skip
+    "perceptual": Loss("ΔE (CAM16-UCS)", cam16ucs_unclipped, _perceptual_derivative, 0.05, 0.1),
+    "linear": Loss(
+        "white",
+        lambda rgb, _: rgb,
+        lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)),
+        5e-4,
+    ),
+}
 
 
 class SearchStart(Record):
-    """One search: where it began, where it ended, and its cost.
+    """One search: where it began, where it ended, and its cost."""
 
-    Attributes
-    ----------
-    n
-        Exponent of the start; null for the paired parameters.
-    loss, final_loss
-        Where it began and ended; null if it was not followed, since others began better.
-    """
-
-    n: float | None
+    n: Annotated[float | None, Meta(description="Exponent; null for the paired parameters.")]
     loss: Amount
-    final_loss: Amount | None = None
+    final_loss: Annotated[Amount | None, Meta(description="Null if others began better.")] = None
     evaluations: Count = 0
     converged: bool = False
 
@@ -263,7 +229,7 @@ class Certainty:
     """Whether the image determines a parameter.
 
     ``reason`` says why it does not, else it is empty; ``partners`` are the indices of parameters
-    that undo a change of it; ``at_bound``, whether it is at one of its bounds.
+    that undo a change of it.
     """
 
     reason: str

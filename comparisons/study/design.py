@@ -39,7 +39,7 @@ from itertools import product
 from math import isfinite
 from numbers import Real
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -73,6 +73,8 @@ OWN = "heuristic."
 
 Design = Literal["grid", "random", "sobol"]
 
+Steps = Annotated[int, msgspec.Meta(ge=2, le=LARGEST)]
+
 
 @dataclass(frozen=True)
 class Levels:
@@ -94,9 +96,8 @@ class Levels:
 class StudyPart:
     """One design over one scene.
 
-    ``grid`` has all combinations of the levels, the first varying slowest; ``random`` is
-    independent and uniform (in the logarithm if the scale is ``log``); ``sobol`` is the scrambled
-    Sobol sequence. The seed of the options is also the design's.
+    ``grid`` has all combinations of the levels, the first varying slowest; ``random`` is uniform
+    (in the logarithm if the scale is ``log``); ``sobol`` is the scrambled Sobol sequence.
     """
 
     name: str
@@ -273,11 +274,7 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
 
 
 def _levels(raw: object, parameter: StudyParameter, is_grid: bool, where: str) -> Levels:
-    """Read the values of a parameter, and ensure that they are in its range.
-
-    ``raw`` is a number, a list of numbers, or a table with ``from``, ``to``, ``scale`` (``linear``
-    or ``log``) and, for a grid, ``steps``. Those of a range are rounded to six digits: 0.1 is 0.1.
-    """
+    """Read the values of a parameter; those of a range are rounded to six digits: 0.1 is 0.1."""
     if not isinstance(raw, dict):
         listed = raw if isinstance(raw, list) else [raw]
         if not listed:
@@ -290,11 +287,8 @@ def _levels(raw: object, parameter: StudyParameter, is_grid: bool, where: str) -
             " like, scale (linear or log)."
         )
     low, high = (_checked(raw[end], parameter, f"{where}, {end}") for end in ("from", "to"))
-    scale, steps = raw.get("scale", "linear"), raw.get("steps", 2)
-    if scale not in ("linear", "log"):
-        raise InputError(f"{where}: scale = {scale!r}: choose linear or log.")
-    if not isinstance(steps, int) or not 2 <= steps <= LARGEST:
-        raise InputError(f"{where}: steps = {steps!r}: give an integer from 2 to {LARGEST}.")
+    scale = _converted(raw.get("scale", "linear"), Literal["linear", "log"], f"{where}, scale")
+    steps = _converted(raw.get("steps", 2), Steps, f"{where}, steps")
     is_log = scale == "log"
     if not low < high or (is_log and low <= 0):
         least = "above 0 and " if is_log else ""

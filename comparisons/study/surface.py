@@ -40,7 +40,7 @@ class StudyMaterial:
     misses: tuple[Miss, ...]
 
     def columns(self) -> Row:
-        """Return the columns of a material: its parameters in both models, and its miss."""
+        """Return its parameters in both models, and its miss."""
         return {
             "miss": largest_miss(self.misses),
             "alpha": self.plastic.alpha,
@@ -133,16 +133,10 @@ def reference_radiance(
 def _bsdf(plastic: RoughPlastic) -> Any:
     if plastic.int_ior == plastic.ext_ior:
         return mi.load_dict({"type": "diffuse", "reflectance": plastic.diffuse_reflectance[0]})
-    return mi.load_dict(
-        {
-            "type": "roughplastic",
-            "alpha": plastic.alpha,
-            "int_ior": plastic.int_ior,
-            "ext_ior": plastic.ext_ior,
-            "diffuse_reflectance": plastic.diffuse_reflectance[0],
-            "specular_reflectance": plastic.specular_reflectance[0],
-        }
-    )
+    colours = ("diffuse_reflectance", "specular_reflectance")
+    values = {name: getattr(plastic, name) for name in ("alpha", "int_ior", "ext_ior")}
+    values |= {name: getattr(plastic, name)[0] for name in colours}
+    return mi.load_dict({"type": "roughplastic"} | values)
 
 
 @lru_cache(maxsize=1)
