@@ -11,12 +11,11 @@ import vl_convert
 from msgspec import convert, structs
 
 from comparisons.cost.cost_record import Measured, Prediction
-from reference.records import Machine
 from reports.charts import cost_charts, vega
 from reports.page import page
 from reports.page.scene_view import SceneView
+from reports.page.why_view import why_view
 from reports.run import cost_files, scene
-from reports.run.results import RunRecord
 from tests import cost_records, records
 from tests.browser.conftest import noisy
 from tests.schemas import schema
@@ -28,7 +27,7 @@ def study():
     return cost_records.study()
 
 
-def shown(study, record=None, **more):
+def shown(study, record=None):
     """The page of one scene with its study."""
     made = cost_files.documents(study)
     view = SceneView(
@@ -36,16 +35,13 @@ def shown(study, record=None, **more):
         charts=tuple(cost_files.figures(study.record)),
         cost=cost_files.view(study, made),
     )
-    return page.render([view], **more)
+    return page.render([view])
 
 
-def test_the_figures_on_the_page_are_those_of_the_json_and_stages_add_up(study):
+def test_the_figures_on_the_page_are_those_of_the_json(study):
     made = json.loads(cost_files.documents(study)["cost.json"])
     jsonschema.Draft202012Validator(schema("cost")).validate(made)
-    stages = {"rendering": 3.125, "metrics": 0.75, "page": 0.5}
-    machine = Machine(processor="any", cores=2, system="Linux")
-    run = RunRecord(command="", stages=stages, failures=(), machine=machine, versions={})
-    values = {value for value, _ in Page(shown(study, run=run)).values}
+    values = {value for value, _ in Page(shown(study)).values}
     data = study.record
     wanted = [data.reference.noise_floor, data.attribution.departure]
     for point in data.points:
@@ -58,7 +54,7 @@ def test_the_figures_on_the_page_are_those_of_the_json_and_stages_add_up(study):
         wanted += [one.alone, one.last]
     for part in (*data.split.parts, data.split.departure):
         wanted += [part.mean, part.mean_stderr, part.rms, part.dE2000]
-    assert not [number for number in (*wanted, *stages.values()) if number not in values]
+    assert not [number for number in wanted if number not in values]
 
 
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
@@ -74,7 +70,9 @@ def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_c
 
 
 def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
-    found = cost_files.view(study, cost_files.documents(study)).effects
+    previews = [study.causes.previews[each.effects] for each in study.causes.attribution.hybrids]
+    causes, viewing = study.causes, study.record.viewing
+    found = why_view(causes.maps, study.counted, previews, viewing).effects
     assert found.names == cost_records.EFFECTS
     assert len(set(found.colours)) == 3
     rows = [found.map[start : start + 12] for start in range(0, 96, 12)]

@@ -64,11 +64,11 @@ def test_limits_that_mathematics_does_not_settle_are_as_stated(rgb):
 
 
 def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
-    assert 'id="hard-cases"' not in page.render([])
+    assert 'id="hard-cases"' not in page.details(0)
     lost = hard_cases.HardOutcome("lost <case>", "Hard.", 0.25, np.inf, 0.5)
-    text = page.render([], hard_cases=record | {"Lost": [lost]})
+    text = page.details(0, hard_cases=record | {"Lost": [lost]})
     assert 'id="hard-cases"' in text
-    assert text.count("bound violated") == 1
+    assert text.count("beyond the limit") == 1
     assert "not finite" in text
     assert "lost &lt;case&gt;" in text
     assert all(str(escape(row.difficulty)) in text for rows in record.values() for row in rows)

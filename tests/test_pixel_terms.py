@@ -87,18 +87,18 @@ def total_of(view):
 
 
 def unpacked(embedded, tops):
-    raw = np.frombuffer(zlib.decompress(base64.b64decode(embedded.data)), np.uint8)
-    raw = raw.reshape(len(embedded.planes), 2, embedded.height, embedded.width).astype(np.int64)
-    zigzag = raw[:, 0] + 256 * raw[:, 1]
-    codes = np.cumsum((zigzag >> 1) ^ -(zigzag & 1), axis=-1) & 0xFFFF
+    differences = np.frombuffer(zlib.decompress(base64.b64decode(embedded.data)), np.uint16)
+    codes = np.cumsum(differences, dtype=np.uint16).astype(float)
     found = {}
-    for plane, code in zip(embedded.planes, codes, strict=True):
-        if plane.name == "material":
-            found[plane.name] = code
-        elif plane.name in tops:
-            found[plane.name] = tops[plane.name] * (code / 65535) ** 2
+    for name, code in zip(
+        embedded.names, codes.reshape(-1, embedded.height, embedded.width), strict=True
+    ):
+        if name == "material":
+            found[name] = code
+        elif name in tops:
+            found[name] = tops[name] * (code / 65535) ** 2
         else:
-            found[plane.name] = 2 * code / 65535 - 1
+            found[name] = 2 * code / 65535 - 1
     return found
 
 

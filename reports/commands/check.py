@@ -106,6 +106,7 @@ def check(
                 )
                 title = f"fotismos check: {summaries.outcome(found, significance)}"
                 if views:
+                    results.write(folder / page.DETAILS, page.details(len(views)))
                     results.write(folder / results.PAGE, page.render(views, title))
                 else:
                     results.clear(folder, (results.PAGE,))

@@ -11,7 +11,6 @@ import base64
 from collections.abc import Sequence
 from functools import lru_cache
 from io import BytesIO
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -159,23 +158,21 @@ class Sheet(Record):
     webp: bytes
 
 
-def sheet(previews: Sequence[Image.Image]) -> Sheet | None:
-    """Return the sheet of previews of one size, in order; None for fewer than two."""
-    if len(previews) < 2:
-        return None
+def sheet(previews: Sequence[Image.Image], lossless: bool = False) -> Sheet:
+    """Return the sheet of previews of one size, in order."""
     width, height = previews[0].size
     rows = -(-len(previews) // COLUMNS)
     whole = Image.new("RGB", (width * COLUMNS, height * rows))
     for place, preview in enumerate(previews):
         row, column = divmod(place, COLUMNS)
         whole.paste(preview, (column * width, row * height))
-    return Sheet(width, height, webp(whole))
+    return Sheet(width, height, webp(whole, lossless))
 
 
-def webp(picture: Image.Image) -> bytes:
+def webp(picture: Image.Image, lossless: bool = False) -> bytes:
     """Return the WebP file of a picture."""
     buffer = BytesIO()
-    picture.save(buffer, "WEBP", quality=QUALITY, method=4)
+    picture.save(buffer, "WEBP", quality=QUALITY, method=4, lossless=lossless)
     return buffer.getvalue()
 
 
@@ -188,13 +185,3 @@ def webp_of(png: bytes) -> bytes:
 def webp_uri(file: bytes) -> str:
     """Return a WebP file as an address that holds it."""
     return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
-
-
-def placed(shown: Sheet) -> dict[str, Any]:
-    """Return the sheet, and where its pictures are, for the page's scripts."""
-    return {
-        "sheet": webp_uri(shown.webp),
-        "width": shown.width,
-        "height": shown.height,
-        "columns": COLUMNS,
-    }

@@ -1,8 +1,8 @@
-"""The report: one offline HTML file with the pictures, maps and numbers of a run.
+"""The report: an offline page of a run's pictures, maps and numbers, and one of details beside it.
 
-`render` only prints the numbers of records and of images that are encoded already.
-Names and messages come from users' files, so everything is escaped, and the page may load nothing:
-a content security policy allows only the page's own scripts, by their hashes.
+`render` and `details` only print the numbers of records and of images that are encoded already.
+Names and messages come from users' files, so everything is escaped, and a page may load nothing: a
+content security policy allows only its own scripts, by their hashes.
 
 Without JavaScript the page has small pictures, numbers and charts, one scene after another. With
 it, ``templates/viewer`` shows one scene at a time from its embedded numbers, and the others wait as
@@ -11,76 +11,58 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from msgspec import structs
 
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure import criterion
-from comparisons.departure.metrics import LEADING, METRICS
+from comparisons.departure.colour import BT709, rgb_to_xyz
+from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
+from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS, RATIO, THRESHOLDS
 from reference.records import plain
 from reports import glossary, verdict
-from reports.charts import histograms, vega
-from reports.charts.theme import EFFECT_COLOURS
-from reports.page import templating, viewer_data
-from reports.page.scene_view import Making, SceneView
+from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
+from reports.files import images
+from reports.page import templating
+from reports.page.scene_view import Making, SceneView, WhyView
 from reports.run.results import Failure, RunRecord
+from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
+    from comparisons.cost.cost_record import Cost
     from comparisons.hard_cases import HardCases
     from comparisons.verification import Verification
 
-#: The page's heading.
 TITLE = "Textbook shading against physically based rendering"
 
-ROOM = 1.04
-"""Width of the bars, relative to the longest."""
+DETAILS = "details.html"
+"""The file of :func:`details`, beside the page."""
 
-#: The parts of the page's style and of its script, in order.
-STYLES = (
-    "base", "verdict", "overview", "scene", "viewer", "switchboard", "terms", "help",
-    "print",
-)  # fmt: skip
+STYLES = ("base", "page", "print")
+HELP = ("page", "help")
+"""The parts of a script that explains terms; those of the whole page follow."""
 SCRIPTS = (
-    "page", "numbers", "help", "decoding", "tonemaps", "spaces", "effects", "painting", "selection",
-    "fragment", "address", "viewport", "drawing", "inspector", "distribution", "saving",
-    "pointer", "controls", "viewer", "keyboard", "verdict",
-    "termrows", "terms", "switchboard", "lazy", "main",
+    *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",
+    "pointer", "keyboard", "terms", "main",
 )  # fmt: skip
 
+CHARTED = 6
+"""Most charts of error against time on the overview."""
 
-TOLERANCES = (1.0, 2.0, 5.0)
-"""The tolerances that can be chosen."""
-
-#: Fewest scenes for a meaningful ranking.
-FEWEST = 4
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """How two metrics rank scenes, from −1 (opposite) over 0 (unrelated) to 1 (alike).
-
-    Attributes
-    ----------
-    spearman
-        Correlation of the ranks.
-    kendall
-        Share of the pairs of scenes in the same order, minus the share in opposite order
-        (τ_b, which leaves ties out).
-    """
-
-    spearman: float
-    kendall: float
+Runs = list[tuple[int, str]]
+"""Texts by the place of the threshold from which each holds."""
 
 
 class PageScene(SceneView, kw_only=True):
-    """A scene in the page, and its name in the page's address."""
+    """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error."""
 
     id: str
-    histograms: tuple[vega.Figure, ...]
+    parts: tuple[tuple[str, str, float], ...]
+    shares: tuple[float, ...]
+    verdicts: str
+    cause: str
+    advice: Runs
 
 
 class FailedScene(Failure, kw_only=True):
@@ -92,98 +74,118 @@ class FailedScene(Failure, kw_only=True):
 def render(
     views: Sequence[SceneView],
     title: str = TITLE,
-    verifications: Sequence[Verification] = (),
-    hard_cases: HardCases | None = None,
     failures: Sequence[Failure] = (),
-    run: RunRecord | None = None,
     making: Making | None = None,
 ) -> str:
-    """One HTML page of all scenes, in the given order.
+    """One HTML page of all scenes, worst first.
 
-    `verifications` and `hard_cases` are separate sections, omitted if empty. `failures` are the
-    scenes that could not be compared. `run` says where the time went, `making` how far an
-    unfinished run is.
+    `failures` are the scenes that could not be compared, and `making` says how far an unfinished
+    run is.
     """
     taken: set[str] = set()
+    usual = THRESHOLDS.index(TOLERANCE)
+    studied = [(view.record, _cost(view)) for view in views]
     scenes = [_scene(view, taken) for view in views]
+    scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = [
         FailedScene(failure.scene, failure.error, id=_identifier(failure.scene, taken))
         for failure in failures
     ]
-    return (
-        templating.environment()
-        .get_template("page.html.j2")
-        .render(
-            title=title,
-            style=templating.style(STYLES),
-            scripts=templating.scripts(SCRIPTS),
-            page_data=_page_data(scenes, failed),
-            verdict=_verdict(scenes) if scenes else None,
-            scenes=scenes,
-            failures=failed,
-            metrics=METRICS,
-            leading=LEADING,
-            legends=viewer_data.legends(),
-            glossary=glossary.GROUPS,
-            verifications=verifications,
-            hard_cases=hard_cases,
-            ranking=rankings([scene.record for scene in scenes]),
-            run=run,
-            making=making,
-        )
-    )
-
-
-def _verdict(scenes: Sequence[PageScene]) -> dict[str, Any]:
-    """Return the data of the first screen: the verdict, and a bar for each scene, worst first."""
-    studied = [(scene.record, scene.cost.record if scene.cost else None) for scene in scenes]
-    rows: list[dict[str, Any]] = [
-        {
-            "id": scene.id,
-            "name": record.scene,
-            "mean": record.metrics[LEADING.name].mean,
-            "parts": verdict.missing(record, cost),
-            "passes": [t for t in TOLERANCES if verdict.decision(record, t) == "pass"],
-            "sentences": {t: verdict.sentence(record, cost, t) for t in TOLERANCES},
-        }
-        for scene, (record, cost) in zip(scenes, studied, strict=True)
-    ]
-    names = dict.fromkeys(effect for row in rows for effect in row["parts"])
-    records = [scene.record for scene in scenes]
-    return {
-        "sentences": [verdict.headline(records), verdict.most_missing(studied)],
-        "rows": sorted(rows, key=lambda row: -row["mean"]),
-        "about": {s.id: verdict.about(*pair) for s, pair in zip(scenes, studied, strict=True)},
-        "tolerances": TOLERANCES,
-        "usual": criterion.TOLERANCE,
-        "share": criterion.LIMIT,
-        "top": ROOM * max((row["mean"] for row in rows), default=1.0) or 1.0,
-        "effects": {name: EFFECT_COLOURS[name] for name in names},
-    }
-
-
-def _scene(view: SceneView, taken: set[str]) -> PageScene:
-    return PageScene(
-        **structs.asdict(view),
-        id=_identifier(view.record.scene, taken),
-        histograms=tuple(histograms.figures(view.record)),
-    )
-
-
-def _page_data(scenes: Sequence[PageScene], failed: Sequence[FailedScene]) -> dict[str, Any]:
-    """The data of the page's script: the scenes, and how maps are drawn."""
-    return {
+    data = {
         "scenes": [
             *map(_scene_data, scenes),
             *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
         ],
+        "thresholds": THRESHOLDS,
+        "usual": TOLERANCE,
+        "headlines": _runs(lambda t: verdict.headline([record for record, _ in studied], t)),
+        "missing": _runs(lambda t: verdict.most_missing(studied, t)),
         "terms": glossary.meanings(),
-        **viewer_data.drawing(),
+        **_drawing(),
     }
+    return _rendered(
+        "page.html.j2",
+        SCRIPTS,
+        title=title,
+        data=data,
+        scenes=scenes,
+        failures=failed,
+        usual=usual,
+        charted=[scene for scene in scenes if scene.charts][:CHARTED],
+        limit=LIMIT,
+        usual_title=TITLE,
+        metrics=METRICS,
+        leading=LEADING,
+        details=DETAILS,
+        making=making,
+    )
+
+
+def details(
+    scenes: int,
+    verifications: Sequence[Verification] = (),
+    hard_cases: HardCases | None = None,
+    run: RunRecord | None = None,
+) -> str:
+    """The page beside that of so many scenes: how to read it, and what was checked.
+
+    Parts that are not given are left out; `run` says where the time went.
+    """
+    return _rendered(
+        "details.html.j2",
+        HELP,
+        title="Details",
+        data={"terms": glossary.meanings()},
+        scenes=scenes,
+        metrics=METRICS,
+        glossary=glossary.GROUPS,
+        verifications=verifications,
+        hard_cases=hard_cases,
+        run=run,
+        sections={
+            "verification": verifications,
+            "hard-cases": hard_cases,
+            "equations": True,
+            "stages": run,
+            "glossary": True,
+        },
+    )
+
+
+def _rendered(template: str, scripts: Sequence[str], **content: Any) -> str:
+    content |= {"style": templating.style(STYLES), "scripts": templating.scripts(scripts)}
+    return templating.environment().get_template(template).render(**content)
+
+
+def _runs(text: Callable[[float], str]) -> Runs:
+    """Return the texts at all thresholds, each where it begins."""
+    texts = [text(threshold) for threshold in THRESHOLDS]
+    return [(i, each) for i, each in enumerate(texts) if i == 0 or each != texts[i - 1]]
+
+
+def _cost(view: SceneView) -> Cost | None:
+    return view.cost.record if view.cost else None
+
+
+def _scene(view: SceneView, taken: set[str]) -> PageScene:
+    record, cost = view.record, _cost(view)
+    visible = record.metrics[LEADING.name].visible
+    return PageScene(
+        **structs.asdict(view),
+        id=_identifier(record.scene, taken),
+        parts=tuple(
+            (effect, EFFECT_COLOURS[effect], part)
+            for effect, part in verdict.missing(record, cost).items()
+        ),
+        shares=tuple(round(share.value, 5) for share in visible),
+        verdicts="".join(decide(visible, threshold)[0] for threshold in THRESHOLDS),
+        cause=verdict.cause(record, cost),
+        advice=_runs(lambda t: verdict.sentence(record, cost, t)),
+    )
 
 
 def _scene_data(scene: PageScene) -> dict[str, Any]:
-    record = scene.record
+    record, why = scene.record, scene.why
     return {
         "id": scene.id,
         "name": record.scene,
@@ -191,44 +193,66 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "height": record.resolution[1],
         "exposure": record.viewing.exposure,
         "judged": asdict(verdict.judged(record)),
-        "regions": plain(record.regions),
-        "best": viewer_data.best_exposures(record.metrics),
+        "mean": difference(record.metrics[LEADING.name].mean),
+        "shares": scene.shares,
+        "verdicts": scene.verdicts,
+        "advice": scene.advice,
+        "regions": [
+            {key: getattr(region, key) for key in ("x", "y", "width", "height", "effect")}
+            for region in record.regions
+        ],
         "images": scene.embedded.manifest() if scene.embedded else None,
-        "effects": plain(scene.cost.effects) if scene.cost else None,
+        "effects": plain(why.effects) if why else None,
+        "board": _board(why, _cost(scene)),
         "terms": scene.terms.manifest() if scene.terms else None,
+    }
+
+
+def _board(why: WhyView | None, cost: Cost | None) -> dict[str, Any] | None:
+    """Return which effects each small picture has, and the mean error that they leave."""
+    if not why or not why.pictures or not cost:
+        return None
+    return {
+        "width": why.pictures.width,
+        "height": why.pictures.height,
+        "columns": images.COLUMNS,
+        "hybrids": [
+            {
+                "on": [why.effects.names.index(effect) for effect in each.effects],
+                "mean": difference(max(each.error, 0.0)),
+            }
+            for each in cost.attribution.hybrids
+        ],
+    }
+
+
+def _drawing() -> dict[str, Any]:
+    """Return the maps, their colours, and luminance of linear RGB, under the script's names."""
+    maps = (
+        (LEADING.name, LEADING.label, "difference", 0),
+        ("effects", EFFECTS_TITLE, "effects", 0),
+        (RATIO.name, RATIO.label, "ratio", RATIO.limit),
+        ("significant", "Shown to differ", "mask", 0),
+    )
+    return {
+        "maps": [dict(zip(("name", "title", "kind", "top"), each, strict=True)) for each in maps],
+        "noEffect": NO_EFFECT,
+        "colours": {
+            "error": images.colour_table(images.ERROR_COLOURS),
+            "signed": images.colour_table(images.SIGNED_COLOURS),
+        },
+        "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED, images.UNDETERMINED],
+        "luminance": rgb_to_xyz(BT709)[1].tolist(),
+        "epsilon": LOG2_EPSILON,
     }
 
 
 def _identifier(name: str, taken: set[str]) -> str:
     """Return a name for a scene in the page's address: plain characters; added to `taken`."""
-    plain = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
-    chosen, count = plain or "scene", 1
+    word = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
+    chosen, count = word or "scene", 1
     while chosen in taken:
         count += 1
-        chosen = f"{plain or 'scene'}-{count}"
+        chosen = f"{word or 'scene'}-{count}"
     taken.add(chosen)
     return chosen
-
-
-def rankings(records: Sequence[ComparisonRecord]) -> dict[str, dict[str, Agreement]]:
-    """Return the agreement of each pair of metrics on means without noise, by their names.
-
-    Empty for fewer than `FEWEST` scenes. A metric with the same value in all scenes ranks nothing,
-    and is left out.
-    """
-    if len(records) < FEWEST:
-        return {}
-    from scipy.stats import kendalltau, spearmanr  # takes a second to import
-
-    values = {name: [r.metrics[name].debiased for r in records] for name in METRICS}
-    values = {name: means for name, means in values.items() if np.ptp(means) > 0.0}
-    return {
-        one: {
-            other: Agreement(
-                float(spearmanr(values[one], values[other]).statistic),
-                float(kendalltau(values[one], values[other]).statistic),
-            )
-            for other in values
-        }
-        for one in values
-    }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from msgspec import field
 
@@ -11,14 +10,9 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from reference.records import Record
 from reports.charts.vega import Figure
-from reports.files import images
 from reports.files.images import Sheet
 from reports.page.embedding import Embedded
 from reports.page.terms_view import TermsView
-from reports.terminal.words import number, seconds
-
-LEAST = 0.01
-"""ΔE2000: smaller means are rounding or remaining noise."""
 
 
 class EffectMap(Record):
@@ -31,38 +25,32 @@ class EffectMap(Record):
     map: str
 
 
+class WhyView(Record):
+    """A page's data of causes.
+
+    ``pictures`` are the hybrids of the record in their order, and ``maps`` what each leaves of the
+    error, in levels of a tenth of ΔE2000; both are None for fewer than two.
+    """
+
+    effects: EffectMap
+    pictures: Sheet | None = None
+    maps: Sheet | None = None
+
+
 class CostView(Record):
     """A page's data of a study.
 
-    ``images`` are PNG files by their bare names; ``sheet`` has the hybrids.
+    ``images`` are PNG files by their bare names; ``colours`` are those of the effects.
     """
 
     record: Cost
     images: dict[str, bytes]
     noise: str
-    effects: EffectMap
-    sheet: Sheet | None = None
+    colours: tuple[str, ...]
 
     def picture(self, kind: str, name: str) -> bytes:
         """Return the picture of a method, a part or an effect."""
         return self.images[picture_name(kind, name)]
-
-    @property
-    def switchboard(self) -> dict[str, Any]:
-        """The switchboard's data: previews of combinations of effects; empty without a sheet."""
-        if not self.sheet:
-            return {}
-        effects = [one.effect for one in self.record.attribution.effects]
-        return images.placed(self.sheet) | {
-            "hybrids": [
-                {
-                    "on": [effects.index(effect) for effect in hybrid.effects],
-                    "error": number(hybrid.error) if hybrid.error >= LEAST else f"< {LEAST}",
-                    "time": seconds(max(hybrid.seconds, 0.0)),
-                }
-                for hybrid in self.record.attribution.hybrids
-            ],
-        }
 
 
 class Before(Record):
@@ -94,6 +82,8 @@ class SceneView(Record):
         Labels and paths relative to the page, shown as links.
     charts, cost
         The study of cost, if there is one.
+    why
+        The causes, if they are known.
     terms
         The terms of equation 8.10 at a grid of pixels.
     before
@@ -108,6 +98,7 @@ class SceneView(Record):
     cost: CostView | None = None
     terms: TermsView | None = None
     before: Before | None = None
+    why: WhyView | None = None
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,17 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from comparisons.departure.regions import Region
 from reference.records import plain
 from reports import verdict
-from reports.charts import theme
 from reports.files import images
-from reports.page import viewer_data
 from reports.terminal.words import (
     NOTICEABLE,
     about_noise,
@@ -30,8 +29,8 @@ from reports.terminal.words import (
 
 TEMPLATES = Path(__file__).parent / "templates"
 
-#: Pictures narrower than this are enlarged without smoothing.
-PIXELATED_BELOW = 400
+REGION_SIZE = 420
+"""Approximate screen pixels of a region that is opened from its link."""
 
 #: How values are printed, by the names of forms.
 FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
@@ -58,13 +57,12 @@ def style(parts: Iterable[str]) -> Markup:
     return Markup("".join(_source(f"styles/{part}.css") for part in parts))
 
 
-def scripts(parts: Iterable[str], last: str = "") -> list[dict[str, Markup]]:
-    """Return a page's scripts: one that runs early, and its own.
+def scripts(parts: Iterable[str]) -> list[dict[str, Markup]]:
+    """Return a page's scripts: one that runs early, and its own of some parts.
 
-    Each has its ``code``, and the ``source`` by which the page's policy allows it. The page's own
-    consists of some parts and then ``last``.
+    Each has its ``code``, and the ``source`` by which the page's policy allows it.
     """
-    code = "\n".join([*(_source(f"viewer/{part}.js") for part in parts), last])
+    code = "\n".join(_source(f"viewer/{part}.js") for part in parts)
     return [
         {"code": Markup(script), "source": _hash(script)}
         for script in (EARLY, '"use strict";\n' + code)
@@ -91,22 +89,32 @@ def environment() -> Environment:
     environment.filters.update(
         FORMS,
         judged=verdict.judged,
-        region_view=viewer_data.region_view,
+        region_view=region_view,
+        at=text_at,
+        ink=ink,
         plain=plain,
         uri=_data_uri,
         webp_uri=images.webp_uri,
         webp_of=images.webp_of,
     )
     environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
-    environment.globals.update(
-        forms=FORMS,
-        marked=images.css_colour(images.MARKED),
-        unmarked=images.css_colour(images.UNMARKED),
-        uncounted=images.css_colour(images.UNCOUNTED),
-        undetermined=images.css_colour(images.UNDETERMINED),
-        effects_title=theme.EFFECTS_TITLE,
-        value_bar=images.colour_bar(images.VALUE_COLOURS),
-        pixelated_below=PIXELATED_BELOW,
-        noticeable=NOTICEABLE,
-    )
+    environment.globals.update(forms=FORMS, noticeable=NOTICEABLE)
     return environment
+
+
+def region_view(region: Region) -> str:
+    """Return the part of the address that shows and selects a region."""
+    zoom = round(min(16.0, REGION_SIZE / max(region.width, region.height)), 2)
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    return f"zoom={zoom}&x={x}&y={y}&box={region.x},{region.y},{region.width},{region.height}"
+
+
+def text_at(runs: Sequence[tuple[int, str]], place: int) -> str:
+    """Return the last text that begins at a place or before."""
+    return next(text for start, text in reversed(runs) if start <= place)
+
+
+def ink(colour: str) -> str:
+    """Return black or white, whichever is easier to read on a colour ``#rrggbb``."""
+    red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
+    return "#000" if 0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2 > 0.18 else "#fff"

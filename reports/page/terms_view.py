@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from comparisons.departure.regions import Region
 from comparisons.pixel_terms import TermGrid, TermMaterial
 from reference.records import Record, plain
-from reports.page.embedding import Embedded, Plane, packed
+from reports.page.embedding import Embedded, packed
 
 LARGEST = 65535
 
@@ -96,7 +96,7 @@ def view(
         code = np.rint(LARGEST * np.sqrt(np.maximum(values, 0) / tops[name]))
         planes[name] = code.astype(np.uint16)
     return TermsView(
-        grid=_embedded(planes),
+        grid=packed(planes),
         tops=tops,
         materials=grid.materials,
         lights=tuple({"name": each.name, "intensity": each.intensity} for each in grid.lights),
@@ -124,9 +124,3 @@ def picked(
     rows = [(name, rgb) for name, rgb in (*rows, ("other lights", terms.others)) if any(rgb)]
     rows += [("textbook", terms.total), ("physical", tuple(reference[row, column].tolist()))]
     return PickedTerms(terms.pixel, terms.material.name, tuple(rows))
-
-
-def _embedded(codes: dict[str, NDArray[np.uint16]]) -> Embedded:
-    planes = tuple(Plane(name, 0) for name in codes)
-    height, width = next(iter(codes.values())).shape
-    return Embedded(width, height, 1, planes, packed(planes, codes))

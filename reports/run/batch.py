@@ -37,7 +37,7 @@ class Further:
     """Further content of a page: the tasks that make it, begun while the last scenes are rendered.
 
     ``tasks`` return a result and the seconds that it took, which count towards ``stage``;
-    ``content`` makes arguments of :func:`reports.page.page.render` from results by task name.
+    ``content`` makes arguments of :func:`reports.page.page.details` from results by task name.
     """
 
     stage: str
@@ -93,15 +93,17 @@ class Batch:
         )
 
     def write_page(self, is_interrupted: bool = False, **content: Any) -> None:
-        """Write the page, with further arguments of :func:`reports.page.page.render`."""
+        """Write the page and its details, with further arguments of both."""
         from reports.page import page
         from reports.page.scene_view import Making
         from reports.run import results
 
         begin, path = perf_counter(), self.folder / results.PAGE
+        making = None
         if is_interrupted or self.done < len(self.places):
-            content["making"] = Making(self.done, len(self.places), is_interrupted)
-        results.write(path, page.render(self.ordered, failures=self.failures(), **content))
+            making = Making(self.done, len(self.places), is_interrupted)
+        results.write(self.folder / page.DETAILS, page.details(len(self.ordered), **content))
+        results.write(path, page.render(self.ordered, failures=self.failures(), making=making))
         end = perf_counter()
         self.stages["page"] += end - begin
         self.next_page = end + (end - begin) / SHARE

@@ -7,13 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from comparisons.hybrids.dominance import dominating
 from reference import records
 from reports import glossary
 from reports.charts import theme, vega
 from reports.files import images
 from reports.page import templating
-from reports.page.scene_view import CostView, EffectMap, picture_name
+from reports.page.scene_view import CostView, picture_name
 from reports.run import results
 from reports.run.results import PAGE
 from reports.terminal.cost_tables import closure, noise
@@ -21,15 +20,6 @@ from reports.terminal.cost_tables import closure, noise
 if TYPE_CHECKING:
     from comparisons.cost.cost import Study
     from comparisons.cost.cost_record import Cost
-
-BEGIN = """
-explainTerms(document.body);
-listenForHelp(document.getElementById("tip"));
-"""
-"""Makes the page live."""
-
-LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789"))
-"""Codes of the page's map: no effect, a pixel that does not count, and the effects' places."""
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
@@ -72,8 +62,8 @@ def write(place: Path, study: Study) -> None:
     results.write(
         place / PAGE,
         page.render(
-            style=templating.style(("base", "scene", "help", "print")),
-            scripts=templating.scripts(("page", "numbers", "decoding", "help"), BEGIN),
+            style=templating.style(("base", "page", "print")),
+            scripts=templating.scripts(("page", "help")),
             cost=view(study, made),
             r=study.record,
             charts=figures(study.record),
@@ -105,7 +95,6 @@ def figures(record: Cost) -> list[vega.Figure]:
 def view(study: Study, made: dict[str, bytes]) -> CostView:
     """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
     record, causes = study.record, study.causes
-    places = dominating(causes.maps, study.counted)
     said = " ".join(each(record) for each in (noise, closure) if causes.maps)
     return CostView(
         record=record,
@@ -115,17 +104,5 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             if name.endswith(".png")
         },
         noise=re.sub(r"-(?=\d)", "−", said),
-        effects=EffectMap(
-            width=places.shape[1],
-            height=places.shape[0],
-            names=tuple(causes.maps),
-            colours=tuple(theme.EFFECT_COLOURS[name] for name in causes.maps),
-            map="".join(LETTERS[int(place)] for place in places.ravel()),
-        ),
-        sheet=images.sheet(
-            [
-                images.tonemap(causes.previews[hybrid.effects], record.viewing.exposure)
-                for hybrid in record.attribution.hybrids
-            ]
-        ),
+        colours=tuple(theme.EFFECT_COLOURS[name] for name in causes.maps),
     )

@@ -188,13 +188,25 @@ def write(
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
     if study:
+        from reports.page.why_view import why_view
         from reports.run import cost_files
 
         priced = cost_files.documents(study)
         made |= priced
         linked = (*linked, "cost.json")
         charts = tuple(cost_files.figures(study.record))
-        view = structs.replace(view, charts=charts, cost=cost_files.view(study, priced))
+        causes = study.causes
+        view = structs.replace(
+            view,
+            charts=charts,
+            cost=cost_files.view(study, priced),
+            why=why_view(
+                causes.maps,
+                study.counted,
+                [causes.previews[each.effects] for each in causes.attribution.hybrids],
+                record.viewing,
+            ),
+        )
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(place / file, content)

@@ -18,7 +18,7 @@ const meanings = new Map(Object.entries(page.terms ?? {}).map(([name, meaning]) 
 function explainTerms(section) {
   const known = new Set();
   for (const element of /** @type {NodeListOf<HTMLElement>} */ (section.querySelectorAll(NAMING))) {
-    if (element.closest(".reading dl, [data-plain]")) continue; // the glossary itself, and other meanings
+    if (element.closest("[data-plain]")) continue; // the glossary itself, and other meanings
     const texts = [element.getAttribute("aria-label"), element.innerHTML.replace(/<[^>]*>/g, " "), element.firstChild?.textContent];
     const name = texts.map((text) => wordsOf(text ?? "")).find((text) => meanings.has(text));
     if (name === undefined) continue;
@@ -71,3 +71,6 @@ function listenForHelp(tip) {
     event.stopPropagation(); // Escape would also leave the scene
   }, true);
 }
+
+explainTerms(document.body);
+listenForHelp(byId("tip"));

@@ -1,12 +1,11 @@
 // The page: the address's fragment says which scene is seen, and how.
 
 const address = makeAddress();
-const verdict = document.getElementById("verdict-section");
-if (verdict) makeVerdict(verdict);
-const viewer = new Viewer(byId("viewer"), byId("inspector"), byId("distribution"), page, change);
-const terms = new TermsPanel(byId("terms"), page);
-/** @type {View} */
+const viewer = new Viewer(byId("viewer"), change);
+const terms = new TermsPanel(byId("terms"));
 let view = DEFAULT_VIEW;
+/** How far the overview was scrolled when it was left. */
+let left = 0;
 
 /** Change the view, and the address unless the change is passing: browsers allow few changes per second. @param {Partial<View>} changes */
 function change(changes, passing = false) {
@@ -15,73 +14,85 @@ function change(changes, passing = false) {
   show();
 }
 
-/** Show the address's view. */
+/** Show the address's view; links to scenes keep the threshold. */
 function follow() {
-  const before = view.scene;
+  const before = view;
   view = parseFragment(address.read());
-  if (!page.scenes.some((scene) => scene.id === view.scene)) view.scene = "";
+  if (!page.scenes.some((scene) => scene.id === view.scene && !scene.failed)) view.scene = "";
+  if (!before.scene && view.scene) left = window.scrollY;
+  if (!/[#&]t=/.test(address.read()) && before.t !== view.t) {
+    view.t = before.t;
+    address.replace(fragmentOf(view));
+  }
   show();
-  if (view.scene !== before) arrive(view.scene || before);
-}
-
-/** Show the address's view, or the only scene. */
-function begin() {
-  const [only, ...others] = page.scenes;
-  if (!address.read() && only?.images && !others.length) address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
-  follow();
+  if (view.scene === before.scene) return;
+  window.scrollTo(0, view.scene ? 0 : left);
+  if (view.scene) /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2"))?.focus({ preventScroll: true });
 }
 
 function show() {
+  const place = placeOf(view.t);
   const scene = page.scenes.find((one) => one.id === view.scene);
   document.documentElement.dataset.view = scene ? "scene" : "overview";
-  const open = scene && sectionOf(scene.id);
+  for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-threshold]"))) {
+    slider.value = String(view.t);
+    if (slider.nextElementSibling) slider.nextElementSibling.textContent = String(view.t);
+  }
+  const open = scene ? sectionOf(scene.id) : null;
   for (const section of document.querySelectorAll(".scene")) section.classList.toggle("open", section === open);
-  if (!scene?.images) return;
-  if (viewer.scene !== scene) openScene(scene);
+  if (!scene) showOverview(view.t);
+  if (!scene || scene.failed || !open) return;
+  showScene(open, scene, place);
+  if (!scene.images) return;
+  if (viewer.scene !== scene) openScene(/** @type {Pictured} */ (scene), open);
   viewer.show(view);
+  showTerms();
 }
 
-/** @param {Scene} scene */
-function openScene(scene) {
-  const section = byId(`scene=${scene.id}`);
-  void terms.open(scene, section);
-  void viewer.open(scene, section);
-  void makeSwitchboard(section);
+/** Scenes wait as text, in <noscript>: a page of many scenes loads fast. @param {string} id */
+function sectionOf(id) {
+  const waiting = document.querySelector(`noscript[data-scene="${CSS.escape(id)}"]`);
+  if (waiting) waiting.outerHTML = waiting.textContent ?? "";
+  return document.getElementById(`scene=${id}`);
+}
+
+/** @param {Pictured} scene @param {HTMLElement} section */
+function openScene(scene, section) {
+  void Promise.all([viewer.open(scene, section), terms.open(scene, section)]).then(showTerms);
   explainTerms(section);
 }
 
-/** @param {string} id @returns {HTMLElement} */
-function byId(id) {
-  return /** @type {HTMLElement} */ (document.getElementById(id));
-}
-
-/** Scroll to a scene's heading, or to where the overview was left. @param {string} id */
-function arrive(id) {
-  if (view.scene) {
-    window.scrollTo(0, 0);
-    /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2"))?.focus({ preventScroll: true });
-  } else {
-    document.querySelector(`.card[data-scene="${CSS.escape(id)}"]`)?.scrollIntoView({ block: "center" });
-  }
+function showTerms() {
+  if (viewer.painter) terms.show(viewer.painter, view.pixel ?? viewer.panels.worst());
 }
 
 /** @param {number} step */
 function turn(step) {
   const seen = page.scenes.filter((scene) => scene.images);
-  const place = seen.findIndex((scene) => scene.id === view.scene);
-  const { mode, map, tone, top } = view;
-  const next = seen[(place + step + seen.length) % seen.length];
-  address.go(fragmentOf({ ...DEFAULT_VIEW, mode, map, tone, top, scene: next.id }));
+  const next = seen[(seen.findIndex((scene) => scene.id === view.scene) + step + seen.length) % seen.length];
+  address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t, mode: view.mode, map: view.map, scene: next.id }));
 }
 
-listenToPrinting(viewer);
-explainTerms(document.body);
-listenForHelp(byId("tip"));
-document.querySelector(".skip")?.addEventListener("click", (event) => {
-  event.preventDefault(); // the fragment is the view's
-  event.stopPropagation();
-  /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2") ?? document.getElementById("main"))?.focus();
+for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-threshold]"))) {
+  slider.addEventListener("input", () => change({ t: Number(slider.value) }));
+}
+for (const link of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-jump]"))) {
+  link.addEventListener("click", (event) => {
+    event.preventDefault(); // the fragment is the view's
+    event.stopPropagation();
+    if (view.scene && link.dataset.jump !== "main") address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t }));
+    setTimeout(() => {
+      const target = byId(link.dataset.jump ?? "");
+      target.scrollIntoView();
+      target.focus({ preventScroll: true });
+    });
+  });
+}
+window.addEventListener("beforeprint", () => {
+  for (const part of document.querySelectorAll(".scene.open details")) part.setAttribute("open", "");
 });
-listenToKeys(viewer, turn, () => address.go("#"));
+listenToKeys(viewer, turn, () => address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t })));
 address.listen(follow);
-begin();
+const [only, ...others] = page.scenes;
+if (!address.read() && only?.images && !others.length) address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
+follow();

@@ -1,20 +1,15 @@
-// The page's data: its scenes, and its maps in order. A test compares these types with what is written.
+// The page's data, and how numbers are printed. A test compares these types with what is written.
 
 /**
- * @typedef {{name: string, title: string, kind: string, top: number}} Legend of a map
- * @typedef {{factor: number, mean: number, after: number}} Exposure
- * @typedef {{x: number, y: number, width: number, height: number, share: number, mean_dE2000: number, effect: string | null, nearest: object | null}} Region
+ * @typedef {[number, string][]} Runs   texts by the place of the threshold from which each holds
+ * @typedef {{name: string, title: string, kind: string, top: number}} MapOf
+ * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
+ * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}} Effects
+ * @typedef {{on: number[], mean: string}} Hybrid
+ * @typedef {{width: number, height: number, columns: number, pictures: string, maps: string, hybrids: Hybrid[]}} Board
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number, form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[]}} Lamp
- */
-
-/**
- * @typedef {object} Terms
- * @property {Manifest | null} grid
- * @property {Record<string, number>} tops of the named planes of values ≥ 0
- * @property {Material[]} materials
- * @property {Lamp[]} lights
- * @property {string} missing        why there is no grid
+ * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
  */
 
 /**
@@ -25,28 +20,32 @@
  * @property {number} height
  * @property {number} exposure
  * @property {{subject: string, title: string, name: string}} judged   the names of the first half
+ * @property {string} mean       of ΔE2000
+ * @property {number[]} shares   of the pixels that differ visibly, by threshold
+ * @property {string} verdicts   a letter by threshold: p(ass), f(ail) or u(ndecided)
+ * @property {Runs} advice
  * @property {Region[]} regions
- * @property {Record<string, Exposure>} best by map: the first half's exposure that lowers the mean most
- * @property {Manifest} images
+ * @property {Manifest | null} images
  * @property {Effects | null} effects
+ * @property {Board | null} board
  * @property {Terms | null} terms
  * @property {undefined} [failed]
  */
 
-/**
- * @typedef {Omit<Scene, "images"> & {images: null}} Unpictured
- * @typedef {{id: string, name: string, failed: true, images?: undefined}} Failed
- * @typedef {Scene | Unpictured | Failed} Listed
- */
+/** @typedef {Scene & {images: Manifest}} Pictured @typedef {{id: string, name: string, failed: true, images?: undefined}} Failed */
 
 /**
  * @typedef {object} Page
- * @property {Listed[]} scenes
- * @property {Legend[]} maps
+ * @property {(Scene | Failed)[]} scenes
+ * @property {number[]} thresholds
+ * @property {number} usual              the threshold shown first
+ * @property {Runs} headlines
+ * @property {Runs} missing
+ * @property {MapOf[]} maps
  * @property {string} noEffect
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
- * @property {number[][]} mask   colours of pixels: marked, unmarked, not counted, undetermined
- * @property {number[][]} xyz
+ * @property {number[][]} mask           colours of pixels: marked, unmarked, not counted, undetermined
+ * @property {number[]} luminance        weights of R, G and B
  * @property {Record<string, string>} terms   meanings, from the glossary
  * @property {number} epsilon
  */
@@ -54,23 +53,33 @@
 /** @type {Page} */
 const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
 
-/** The exposure of the textbook that lowers a map's mean most: its factor (1: unchanged), and both means. @param {Scene} scene @param {string} map */
-function bestOf(scene, map) {
-  return scene.best[map] ?? scene.best[page.maps[0].name];
+/** @param {string} id @returns {HTMLElement} */
+const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+/** @param {number} value @param {number} low @param {number} high */
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+/** The text at a threshold's place. @param {Runs} runs @param {number} place */
+const textAt = (runs, place) => runs.filter(([from]) => from <= place).at(-1)?.[1] ?? "";
+
+/** The place of a threshold in the lists. @param {number} t */
+const placeOf = (t) => page.thresholds.indexOf(t);
+
+/** A value with significant digits, in human form. @param {number} value */
+function significant(value, digits = 3) {
+  if (!value) return "0";
+  const [mantissa, power] = value.toExponential(digits - 1).split("e");
+  const exponent = Number(power);
+  const isPlain = exponent >= -3 && exponent < Math.max(digits, 3);
+  const raised = [...String(exponent)].map((sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)])).join("");
+  return (isPlain ? value.toFixed(Math.max(0, digits - 1 - exponent)) : `${mantissa} × 10${raised}`).replace("-", "−");
 }
 
-/** The factor on the textbook's image in a view. @param {Scene} scene @param {View} view */
-function gainOf(scene, view) {
-  return view.best ? bestOf(scene, view.map).factor : 1;
-}
+/** A colour difference; a hundredth is invisible. @param {number} value */
+const differenceText = (value) => (value > 0 && value < 0.01 ? "< 0.01" : significant(value));
 
-/** A factor on the textbook's image, in words. @param {number} gain */
-function gainText(gain) {
-  const rounded = plainly(Number(gain.toPrecision(3)));
-  return rounded === "1" ? "at the same exposure" : `× ${rounded}`;
-}
-
-/** The map with a known name. @param {Page} page @param {string} name @returns {Legend} */
-function mapOf(page, name) {
-  return /** @type {Legend} */ (page.maps.find((map) => map.name === name));
+/** @param {number} part of 1 */
+function percentText(part) {
+  const value = 100 * part;
+  return value > 0 && value < 0.1 ? "< 0.1 %" : `${value >= 99.95 ? "100" : value.toPrecision(value < 1 ? 1 : value < 10 ? 2 : 3)} %`;
 }

@@ -1,127 +1,73 @@
-// Equation 8.10 at the picked pixel, with its numbers, from the page's grid.
+// Equation 8.10 at the marked pixel, with its numbers, from the page's grid (see terms_view.py).
 
-/** The largest code of the grid; see reports/page/terms_view.py. */
+/** The largest code of the grid. */
 const LARGEST_CODE = 65535;
 
-/**
- * @typedef {Awaited<ReturnType<typeof termsOf>>} TermsData
- * @typedef {ReturnType<typeof lightTerms>} LightTerms
- * @typedef {ReturnType<typeof termsAt>} AnyPoint of a surface or the background
- * @typedef {Extract<AnyPoint, {material: Material}>} TermsPoint
- */
+/** @typedef {{terms: Terms, grid: Images, planes: Record<string, Float64Array>}} TermsData @typedef {ReturnType<typeof lightTerms>} LightTerms */
 
 class TermsPanel {
-  /** @param {HTMLElement} panel @param {Page} page */
-  constructor(panel, page) {
+  /** @param {HTMLElement} panel */
+  constructor(panel) {
     this.panel = panel;
-    /** @type {Scene | null} */
+    /** @type {Pictured | null} */
     this.scene = null;
     /** @type {TermsData | null} */
     this.data = null;
-    /** @type {number[] | null} */
-    this.asked = null;
-    document.addEventListener("pick", (event) => {
-      const { scene, pixel } = /** @type {CustomEvent} */ (event).detail;
-      if (pixel && scene === this.scene?.id) this.show(pixel);
-    });
   }
 
-  /** Move into a scene's section, and show its first pixel. @param {Scene} scene @param {HTMLElement} section */
+  /** Move into a scene's section. @param {Pictured} scene @param {HTMLElement} section */
   async open(scene, section) {
     const { terms } = scene;
-    this.scene = scene;
-    this.data = this.asked = null;
+    Object.assign(this, { scene, data: null });
     this.panel.hidden = !terms;
     if (!terms) return;
-    section.querySelector(".pictures")?.after(this.panel); // first on paper, hidden on screens
+    section.querySelector(".terms-slot")?.append(this.panel);
     this.part("missing").hidden = !terms.missing;
     this.part("missing").textContent = `No terms. ${terms.missing}`;
     this.part("whole").hidden = !terms.grid;
-    this.part("place").textContent = "";
     if (!terms.grid) return;
-    const data = await termsOf(scene, terms, terms.grid);
-    if (this.scene !== scene) return; // another one was opened meanwhile
-    this.data = data;
-    this.show(this.asked ?? firstPixel(scene, data));
-  }
-
-  /** @param {number[]} pixel */
-  show(pixel) {
-    this.asked = pixel;
-    if (!this.scene || !this.data) return;
-    const point = termsAt(this.scene, this.data, pixel);
-    const [x, y] = point.pixel;
-    this.part("place").textContent = `at ${x}, ${y}${point.material ? `: ${point.material.name}` : ", where no surface is seen"}`;
-    this.listTerms(point, this.scene);
-  }
-
-  /** @param {AnyPoint} point @param {Scene} scene */
-  listTerms(point, scene) {
-    const [list, sums] = this.panel.querySelectorAll("tbody");
-    list.replaceChildren(...(point.material ? termRows(point) : []));
-    void imagesOf(scene.id, scene.images).then((images) => {
-      if (this.scene === scene) sums.replaceChildren(...sumRows(point, images));
-    });
+    const grid = await imagesIn(`data-terms-${scene.id}`, terms.grid);
+    const valueOf = (/** @type {string} */ name, /** @type {number} */ code) =>
+      name in terms.tops ? terms.tops[name] * (code / LARGEST_CODE) ** 2 : (2 * code) / LARGEST_CODE - 1;
+    const planes = Object.entries(grid.codes).map(([name, codes]) => [name, Float64Array.from(codes, (code) => valueOf(name, code))]);
+    if (this.scene === scene) this.data = { terms, grid, planes: Object.fromEntries(planes) };
   }
 
   /** @param {string} name @returns {HTMLElement} */
   part(name) {
     return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part=${name}]`));
   }
+
+  /** List the terms at the grid's point nearest to a pixel. @param {Painter} painter @param {number[]} pixel */
+  show(painter, [x, y]) {
+    const { scene, data } = this;
+    if (!scene || !data || painter.scene !== scene) return;
+    const { width, height, codes } = data.grid;
+    const [column, row] = [Math.floor((x * width) / scene.width), Math.floor((y * height) / scene.height)];
+    const middle = (/** @type {number} */ cell, /** @type {number} */ count, /** @type {number} */ side) => Math.floor(((2 * cell + 1) * side) / (2 * count));
+    const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
+    const place = row * width + column, material = data.terms.materials[codes.material[place] - 1];
+    this.part("place").textContent = `at ${pixel.join(", ")}${material ? `: ${material.name}` : ", where no surface is seen"}`;
+    const rows = material ? termRows(data, material, place) : [];
+    const own = painter.placeOf(pixel), error = VALUES[painter.images.codes.standard_error[own]];
+    rows.push(termRow("physical", `± ${significant(error, 2)} in its noisiest channel`, painter.colour("reference", own).map((value) => significant(value)), "sum"));
+    this.panel.querySelector("tbody")?.replaceChildren(...rows);
+  }
 }
 
-/** Planes of a scene's grid as numbers. @param {Scene} scene @param {Terms} terms @param {Manifest} grid */
-async function termsOf(scene, terms, grid) {
-  const { tops } = terms;
-  const { codes } = await imagesOf(`terms-${scene.id}`, grid);
-  const values = (/** @type {string} */ name, /** @type {Uint16Array} */ plane) =>
-    Float64Array.from(plane, (code) =>
-      name in tops ? tops[name] * (code / LARGEST_CODE) ** 2 : (2 * code) / LARGEST_CODE - 1);
-  /** @type {Record<string, Float64Array>} */
-  const planes = Object.fromEntries(Object.entries(codes).map(([name, plane]) => [name, values(name, plane)]));
-  return {
-    terms,
-    grid,
-    material: codes.material,
-    planes,
-  };
-}
-
-/** The middle of the largest region if it shows a surface, or else of the picture. @param {Scene} scene @param {TermsData} data */
-function firstPixel(scene, data) {
-  const [region] = scene.regions;
-  const inside = region && [region.x + (region.width >> 1), region.y + (region.height >> 1)];
-  const places = [...(inside ? [inside] : []), [scene.width >> 1, scene.height >> 1]];
-  const seen = places.filter((pixel) => termsAt(scene, data, pixel).material);
-  const shaded = seen.find((pixel) => !termsAt(scene, data, pixel).material?.k_i.some(Boolean)); // not a lamp
-  return shaded ?? seen[0] ?? places[0];
-}
-
-/**
- * The terms at the point of the grid nearest to a pixel; `material` is null on the background.
- * @param {Scene} scene
- * @param {TermsData} data
- * @param {number[]} pixel
- */
-function termsAt(scene, data, [x, y]) {
-  const { terms } = data;
-  const { width, height } = data.grid;
-  const column = Math.floor((x * width) / scene.width), row = Math.floor((y * height) / scene.height);
-  const middle = (/** @type {number} */ cell, /** @type {number} */ count, /** @type {number} */ side) =>
-    Math.floor(((2 * cell + 1) * side) / (2 * count));
-  const place = row * width + column;
-  const number = data.material[place] - 1;
-  const at = (/** @type {string} */ name) => data.planes[name][place];
-  const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
-  const material = /** @type {Material | null} */ (terms.materials[number] ?? null);
-  if (!material) return { pixel, material, number, cosView: 0, lights: [], total: [0, 0, 0] };
-  const lights = terms.lights.map((light, index) =>
-    lightTerms(light, material, at("cos_view"), (name) => at(`${index}.${name}`)));
+/** The rows of all terms, and of their sum. @param {TermsData} data @param {Material} material @param {number} place */
+function termRows({ terms, planes }, material, place) {
+  const at = (/** @type {string} */ name) => planes[name][place];
+  const lights = terms.lights.map((light, index) => lightTerms(light, material, at("cos_view"), (name) => at(`${index}.${name}`)));
   const ambient = product(material.ambient, material.k_a);
-  const others = "others.R" in data.planes ? ["R", "G", "B"].map((colour) => at(`others.${colour}`)) : null;
-  const parts = [material.k_i, ambient, ...(others ? [others] : []), ...lights.flatMap((light) => [light.diffuse, light.specular])];
-  const total = parts.reduce((sum, part) => sum.map((/** @type {number} */ value, /** @type {number} */ channel) => value + part[channel]));
-  return { pixel, material, number, cosView: at("cos_view"), ambient, lights, others, total };
+  const others = "others.R" in planes ? ["R", "G", "B"].map((channel) => at(`others.${channel}`)) : [0, 0, 0];
+  const parts = [material.k_i, ambient, others, ...lights.flatMap((light) => [light.diffuse, light.specular])];
+  const total = [0, 1, 2].map((channel) => parts.reduce((sum, part) => sum + part[channel], 0));
+  const rows = lights.flatMap((light) => lightRows(light, material));
+  rows.unshift(termRow("ambient", `I_{a} k_{a} = ${colourText(material.ambient)} × ${colourText(material.k_a)}`, ambient.map(amount)));
+  if (material.k_i.some(Boolean)) rows.unshift(termRow("emission", `k_{i} = ${colourText(material.k_i)}`, material.k_i.map(amount)));
+  if (others.some(Boolean)) rows.push(termRow("other lights", "diffuse and specular", others.map(amount)));
+  return [...rows, termRow("textbook", "the sum of the terms", total.map(amount), "sum")];
 }
 
 /** @param {Lamp} light @param {Material} material @param {number} normalView @param {(name: string) => number} at */
@@ -129,14 +75,59 @@ function lightTerms(light, material, normalView, at) {
   const [attenuation, cosIncidence, cosView, lobe] = ["attenuation", "cos_incidence", "cos_view", "lobe"].map(at);
   const arriving = light.intensity.map((value) => value * attenuation);
   return {
-    ...light, attenuation, cosIncidence, cosView, lobe,
-    cosReflection: 2 * cosIncidence * normalView - cosView,
+    ...light, attenuation, cosIncidence, lobe, cosReflection: 2 * cosIncidence * normalView - cosView,
     diffuse: product(arriving, material.k_d).map((value) => value * Math.max(cosIncidence, 0)),
     specular: product(arriving, material.k_s).map((value) => value * lobe),
   };
 }
 
+/** @param {LightTerms} light @param {Material} material */
+function lightRows(light, material) {
+  const isLit = light.cosIncidence > 0, isBlinn = material.form === "blinn";
+  const cosine = Math.max(isBlinn ? light.lobe ** (1 / material.n) : light.cosReflection, 0);
+  const behind = `N·L = ${factor(light.cosIncidence)}: the light is behind the surface`;
+  return [
+    termRow(light.name, `I_{p0} f_{att} = ${colourText(light.intensity)} × ${factor(light.attenuation)}`, ["", "", ""], "light"),
+    termRow("diffuse", isLit ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}` : behind, light.diffuse.map(amount)),
+    termRow("specular", isLit ? `× k_{s} (${isBlinn ? "N·H" : "R·V"})^{n} = × ${colourText(material.k_s)} × ${factor(cosine, 4)}^{${factor(material.n)}}` : "", light.specular.map(amount)),
+  ];
+}
+
 /** @param {number[]} a @param {number[]} b */
-function product(a, b) {
-  return a.map((value, channel) => value * b[channel]);
+const product = (a, b) => a.map((value, channel) => value * b[channel]);
+
+/** A number of a term; "< 0.0001" below the page's precision. @param {number} value */
+const amount = (value) => (value > 0 && value < 1e-4 ? "< 0.0001" : significant(value));
+
+/** A factor of a term, without trailing zeros. @param {number} value */
+function factor(value, digits = 3) {
+  const text = significant(value, digits);
+  return text.includes("×") ? text : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+}
+
+/** @param {number[]} colour */
+function colourText(colour) {
+  const texts = colour.map((value) => factor(value));
+  return texts.every((text) => text === texts[0]) ? texts[0] : `(${texts.join(", ")})`;
+}
+
+/** @param {string} name @param {string} words @param {string[]} values @param {string} kind */
+function termRow(name, words, values, kind = "") {
+  const line = Object.assign(document.createElement("tr"), { className: kind });
+  const [head, text, ...cells] = ["th", "td", ...values.map(() => "td")].map((tag) => document.createElement(tag));
+  head.setAttribute("scope", "row");
+  head.textContent = name;
+  text.className = "text";
+  text.append(...rich(words));
+  cells.forEach((cell, place) => { cell.textContent = values[place]; });
+  line.append(head, text, ...cells);
+  return line;
+}
+
+/** Text in which _{…} is a subscript and ^{…} an exponent. @param {string} words */
+function rich(words) {
+  return words.split(/([_^]\{[^}]*\})/).map((part) => {
+    const found = /^([_^])\{(.*)\}$/.exec(part);
+    return found ? Object.assign(document.createElement(found[1] === "_" ? "sub" : "sup"), { textContent: found[2] }) : part;
+  });
 }

@@ -1,92 +1,94 @@
-// The viewer of one scene: its state, its actions, and when it is drawn.
+// The viewer of one scene: its state, its controls, and when it is drawn.
 
 class Viewer {
   /**
    * @param {HTMLElement} element the canvas and its controls
-   * @param {HTMLElement} panel the pixel inspector
-   * @param {HTMLElement} brushing the panel of the selection
-   * @param {Page} page
    * @param {(changes: Partial<View>, passing?: boolean) => void} change requests a view of the page
    */
-  constructor(element, panel, brushing, page, change) {
+  constructor(element, change) {
     this.element = element;
-    this.panel = panel;
-    this.page = page;
     this.change = change;
-    this.canvas = /** @type {HTMLCanvasElement} */ (element.querySelector("canvas"));
+    this.canvas = /** @type {HTMLCanvasElement} */ (element.querySelector("canvas[tabindex]"));
     this.drawing = new Drawing(this.canvas);
     this.viewport = new Viewport(1, 1);
-    /** The open one. @type {Scene} */
+    this.panels = new Panels(this);
+    /** The open one. @type {Pictured} */
     this.scene;
-    /** @type {View} */
     this.view = DEFAULT_VIEW;
     /** @type {Painter | null} */
     this.painter = null;
+    /** @type {Switches | null} */
+    this.switches = null;
     /** @type {number[] | null} */
     this.hovered = null;
-    this.swapped = false;
-    this.selecting = false;
-    this.pending = false;
-    /** The last details, by the event's name. @type {Map<string, string>} */
-    this.told = new Map();
-    this.controls = new Controls(this);
-    this.distribution = new Distribution(brushing, this);
+    this.selecting = this.pending = false;
+    element.addEventListener("click", (event) => {
+      const { mode, action, effect } = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset ?? {};
+      if (mode) change({ mode });
+      if (action) this.act(action);
+      if (effect && this.switches) change({ on: this.switches.after(this.view.on, Number(effect)) });
+    });
+    for (const control of this.fields()) {
+      control.addEventListener("input", () => change({ [control.dataset.control ?? ""]: control.type === "range" ? Number(control.value) : control.value }));
+    }
     listenToPointers(this);
     new ResizeObserver(() => this.redraw()).observe(element);
   }
 
-  /** Open a scene in its section of the page. @param {Scene} scene @param {HTMLElement} section */
-  async open(scene, section) {
-    this.scene = scene;
-    this.painter = null;
-    this.hovered = null;
-    this.swapped = this.selecting = false;
-    this.viewport = new Viewport(scene.width, scene.height);
-    section.querySelector(".viewer-slot")?.append(this.element);
-    section.querySelector(".side")?.prepend(this.panel, this.distribution.panel);
-    this.element.hidden = this.panel.hidden = this.distribution.panel.hidden = false;
-    this.element.dataset.ready = "";
-    for (const one of this.panel.querySelectorAll("[data-judged]")) one.textContent = scene.judged.title;
-    this.offerEffects();
-    const images = await imagesOf(scene.id, scene.images);
-    if (this.scene !== scene) return; // another one was opened meanwhile
-    this.painter = new Painter(images, scene.exposure, this.page, scene.effects);
-    this.element.dataset.ready = scene.id;
-    this.controls.show();
-    this.redraw();
+  /** @returns {NodeListOf<HTMLInputElement>} */
+  fields() {
+    return this.element.querySelectorAll("[data-control]");
   }
 
-  /** Offer the map of effects for scenes with an attribution. */
-  offerEffects() {
-    const option = /** @type {HTMLOptionElement} */ (this.element.querySelector("option[value=effects]"));
-    option.hidden = option.disabled = !this.scene.effects;
-    const legend = /** @type {HTMLElement} */ (this.element.querySelector("[data-legend=effects]"));
-    if (this.scene.effects) listEffects(legend, this.scene.effects, this.page);
+  /** @param {string} selector @returns {HTMLElement} */
+  part(selector) {
+    return /** @type {HTMLElement} */ (this.element.querySelector(selector));
+  }
+
+  /** Open a scene in its section of the page. @param {Pictured} scene @param {HTMLElement} section */
+  async open(scene, section) {
+    Object.assign(this, { scene, painter: null, switches: null, hovered: null, selecting: false });
+    this.viewport = new Viewport(scene.width, scene.height);
+    section.querySelector(".viewer-slot")?.append(this.element);
+    section.querySelector(".side")?.prepend(...this.panels.elements);
+    for (const part of [this.element, ...this.panels.elements]) part.hidden = false;
+    for (const one of document.querySelectorAll("[data-judged]")) one.textContent = scene.judged.title;
+    this.element.dataset.ready = "";
+    this.part("[data-part=switches]").hidden = !scene.board;
+    const [images, switches] = await Promise.all([imagesIn(`data-${scene.id}`, scene.images), scene.board && Switches.of(scene, scene.board, section)]);
+    if (this.scene !== scene) return; // another one was opened meanwhile
+    this.painter = new Painter(scene, images);
+    this.switches = switches;
+    this.part("[data-part=switches] .choices").replaceChildren(...(switches?.buttons ?? []));
+    this.element.dataset.ready = scene.id;
+    this.show(this.view);
   }
 
   /** @param {View} view */
   show(view) {
-    const known = this.page.maps.some((map) => map.name === view.map) && (view.map !== "effects" || this.scene.effects);
-    this.view = known ? view : { ...view, map: DEFAULT_VIEW.map };
+    const without = !this.scene.effects && view.map === "effects";
+    this.view = without ? { ...view, map: DEFAULT_VIEW.map } : view;
     this.element.dataset.mode = view.mode;
-    this.controls.show();
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (this.element.querySelectorAll("button[data-mode]"))) {
+      button.setAttribute("aria-pressed", String(button.dataset.mode === view.mode));
+    }
+    this.part("[data-action=select]").setAttribute("aria-pressed", String(this.selecting));
+    this.element.classList.toggle("selecting", this.selecting);
+    const option = /** @type {HTMLOptionElement} */ (this.part("option[value=effects]"));
+    option.hidden = option.disabled = !this.scene.effects;
+    for (const field of this.fields()) field.value = String(this.view[/** @type {"map" | "ev"} */ (field.dataset.control)]);
+    this.part("[data-control=ev] + output").textContent = `${view.ev > 0 ? "+" : ""}${view.ev}`.replace("-", "−");
     this.redraw();
   }
 
-  /** The map of the numbers shown: the chosen one, or the first if that has no values. */
-  measure() {
-    const map = mapOf(this.page, this.view.map);
-    return hasRange(map) ? map : this.page.maps[0];
+  /** The hybrid that is switched on. */
+  hybrid() {
+    return this.view.on ? this.switches?.find(this.view.on) : undefined;
   }
 
-  /** The end of its colours. */
-  top() {
-    return this.view.top ?? this.automatic();
-  }
-
-  automatic() {
-    const map = this.measure();
-    return this.painter ? automaticRange(this.painter, map) : map.top;
+  /** @returns {MapOf} */
+  map() {
+    return /** @type {MapOf} */ (page.maps.find((map) => map.name === this.view.map));
   }
 
   /** The part of the selection in the image, or null. @returns {number[] | null} */
@@ -94,6 +96,13 @@ class Viewer {
     const [x, y, w, h] = this.view.box ?? [0, 0, 0, 0];
     const [width, height] = [Math.min(w, this.scene.width - x), Math.min(h, this.scene.height - y)];
     return width > 0 && height > 0 ? [x, y, width, height] : null;
+  }
+
+  /** The pixel at the pointer, or the marked one, or the worst. @returns {number[]} */
+  pixel() {
+    const { width, height } = this.scene;
+    const [x, y] = this.hovered ?? this.view.pixel ?? this.panels.worst();
+    return [Math.min(x, width - 1), Math.min(y, height - 1)];
   }
 
   /** Draw once before the next frame, however often requested. */
@@ -107,145 +116,117 @@ class Viewer {
   }
 
   paint() {
-    if (!this.painter || !this.canvas.clientWidth) return;
-    const { swapped, scene } = this;
-    const map = { ...mapOf(this.page, this.view.map), end: this.top(), measure: this.measure().name };
-    const gain = gainOf(scene, this.view);
-    this.drawing.draw(this.view, this.viewport, this.painter, { swapped, regions: scene.regions, box: this.box(), map, gain, judged: scene.judged.name });
-    this.canvas.style.touchAction = this.view.zoom === null && !this.selecting ? "pan-y" : "none";
-    this.controls.disable();
-    this.distribution.show();
-    this.canvas.setAttribute("aria-label", this.description());
-    this.inspectPixel();
+    const { painter, scene, view } = this;
+    if (!painter || !this.canvas.clientWidth) return;
+    const [hybrid, map, box] = [this.hybrid(), this.map(), this.box()];
+    const textbook = { picture: painter.rendering("heuristic", view.ev), title: scene.judged.name };
+    const second = hybrid
+      ? { picture: hybrid.picture, title: `+ ${hybrid.name}`, smooth: true }
+      : { picture: painter.rendering("reference", view.ev), title: "physical" };
+    const third = hybrid
+      ? { picture: hybrid.map(view.t, painter.top), title: "error left" }
+      : { picture: painter.map(map, view.t), title: map.kind === "difference" ? "error" : map.title };
+    const contents = { side: [textbook, second, third], split: [textbook, second] }[view.mode] ?? [third];
+    /** @type {[number[], string][]} */
+    const outlines = scene.regions.slice(0, 1).map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
+    if (box) outlines.push([box, OVERLAY.selection]);
+    outlines.push([[...(view.pixel ?? this.panels.worst()), 1, 1], OVERLAY.line]);
+    this.drawing.draw(view, this.viewport, contents, outlines);
+    this.canvas.style.touchAction = view.zoom === null && !this.selecting ? "pan-y" : "none";
+    this.canvas.setAttribute("aria-label", `${scene.name}: ${contents.map((one) => one.title).join(", ")}. Press ? for the keys.`);
+    this.part("[data-part=numbers]").textContent = this.numbers(hybrid);
+    this.switches?.show(view.on);
+    this.panels.show();
+    showLegend(this.part(".legend"), this);
   }
 
-  description() {
-    const { title } = mapOf(this.page, this.view.map);
-    const { subject } = this.scene.judged;
-    const modes = {
-      split: `${subject} on the left, physical reference on the right`,
-      flicker: this.swapped ? "physical reference" : subject,
-      side: `${subject}, physical reference and ${title}`,
-      error: title,
-    };
-    return `${this.scene.name}: ${modes[/** @type {keyof modes} */ (this.view.mode)]}. Press ? for the keys.`;
-  }
-
-  /** Show the numbers of the pixel at the pointer, or else of the marked one. */
-  inspectPixel() {
-    const pixel = this.hovered ?? this.view.pixel;
-    const known = this.painter && pixel && pixel[0] < this.scene.width && pixel[1] < this.scene.height ? pixel : null;
-    showInspection(this.panel, this.painter && known ? inspect(this.painter, this.scene, known, this.view) : null);
-    this.tell("pick", { scene: this.scene.id, pixel: known, marked: Boolean(known && !this.hovered) });
-  }
-
-  /**
-   * Report each change to other parts of the page by a CustomEvent on the viewer's element. "pick" has
-   * the detail `{scene, pixel, marked}`: the scene's id, `[x, y]` in pixels of the image or null, and
-   * whether the pixel is marked (by a click or the keys) or only at the pointer.
-   * @param {string} name
-   * @param {object} detail
-   */
-  tell(name, detail) {
-    const text = JSON.stringify(detail);
-    if (this.told.get(name) === text) return;
-    this.told.set(name, text);
-    this.element.dispatchEvent(new CustomEvent(name, { detail, bubbles: true }));
+  /** @param {ReturnType<Switches["find"]>} hybrid */
+  numbers(hybrid) {
+    const { scene, view } = this;
+    const visibly = `of the pixels differ visibly (ΔE2000 above ${view.t})`;
+    if (!hybrid) return `${percentText(scene.shares[placeOf(view.t)])} ${visibly}, mean ${scene.mean}`;
+    const none = /** @type {NonNullable<typeof hybrid>} */ (this.switches?.find([]));
+    const { width, height } = hybrid.picture;
+    return `${percentText(none.share(view.t))} → ${percentText(hybrid.share(view.t))} ${visibly}, mean ${none.mean} → ${hybrid.mean}; at ${width} × ${height}`;
   }
 
   /** @param {number[] | null} place */
   hover(place) {
-    this.hovered = place && this.viewport.pixelAt(this.view, place[0], place[1]);
-    if (this.painter) this.inspectPixel();
+    this.hovered = place && this.viewport.pixelAt(this.view, place);
+    if (this.painter) this.panels.inspect();
   }
 
   /** Select the rectangle between two places of the canvas. @param {number[]} from @param {number[]} to */
   select(from, to) {
-    const ends = [from, to].map(([left, top]) => this.viewport.nearestPixel(this.view, left, top));
-    this.change({ box: boxBetween(ends[0], ends[1]) }, true);
+    const [a, b] = [from, to].map((place) => this.viewport.pixelAt(this.view, place));
+    const size = a.map((value, axis) => Math.abs(value - b[axis]) + 1);
+    this.change({ box: [...a.map((value, axis) => Math.min(value, b[axis])), ...size] }, true);
   }
 
-  /** Mark a pixel, and swap flickering halves; clear the selection when selecting. @param {number[]} place */
+  /** Mark a pixel; clear the selection when selecting. @param {number[]} place */
   tap(place) {
-    if (this.selecting) return this.change({ box: null });
-    if (this.view.mode === "flicker") this.swap();
-    this.change({ pixel: this.viewport.pixelAt(this.view, place[0], place[1]) });
+    this.change(this.selecting ? { box: null } : { pixel: this.viewport.pixelAt(this.view, place) });
   }
 
-  /** Let drags and arrows select rectangles, or not. @param {boolean} selecting */
-  selectBy(selecting) {
-    this.selecting = selecting;
-    this.element.classList.toggle("selecting", selecting);
-    this.controls.show();
-    this.redraw();
-  }
-
-  swap() {
-    this.swapped = !this.swapped;
-    this.redraw();
-  }
-
-  /** Whether a press grabs the divide: near it, or anywhere if the whole image is visible. @param {number} left @param {number} reach */
-  dividesAt(left, reach) {
-    if (this.view.mode !== "split") return false;
-    const pane = this.viewport.panes[0];
-    return this.view.zoom === null || Math.abs(left - pane.width * this.view.split) < reach;
-  }
-
-  /** @param {number} left */
-  divideAt(left) {
-    return clamp(left / this.viewport.panes[0].width, 0, 1);
-  }
-
-  /** Zoom about the marked pixel if visible, or else about the middle. @param {number} factor */
-  zoomBy(factor) {
-    const pane = this.viewport.panes[0];
-    const [x, y] = this.view.pixel ?? this.viewport.centre(this.view);
-    const at = this.viewport.toScreen(this.view, pane, x + 0.5, y + 0.5);
-    const about = this.view.pixel && this.viewport.sees(at) ? at : [pane.width / 2, pane.height / 2];
-    this.change(this.viewport.zoomed(this.view, factor, about));
-  }
-
-  /** Move the marked pixel, and keep it in view. @param {number} right @param {number} down */
+  /** Move the marked pixel, or the far corner of the selection. @param {number} right @param {number} down */
   step(right, down) {
-    const { width, height } = this.viewport;
-    const [cx, cy] = this.viewport.centre(this.view).map(Math.floor);
-    const [x, y] = this.view.pixel ?? [cx - right, cy - down];
-    const pixel = [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)];
-    this.hovered = null;
-    this.change({ pixel, ...this.following(pixel) });
-  }
-
-  /** Move the far corner of the selection, which begins at the marked pixel. @param {number} right @param {number} down */
-  stretch(right, down) {
-    const { width, height } = this.viewport;
-    const [x, y] = this.view.pixel ?? this.viewport.centre(this.view).map(Math.floor);
+    const { width, height } = this.scene;
+    const [x, y] = this.view.pixel ?? this.panels.worst();
+    if (!this.selecting) return this.change({ pixel: [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)] });
     const [left, top, w, h] = this.box() ?? [x, y, 1, 1];
     this.change({ box: [left, top, clamp(w + right, 1, width - left), clamp(h + down, 1, height - top)] });
   }
 
-  /** @param {number[]} pixel */
-  following([x, y]) {
-    if (this.view.zoom === null) return {};
-    const at = this.viewport.toScreen(this.view, this.viewport.panes[0], x + 0.5, y + 0.5);
-    return this.viewport.sees(at) ? {} : { x: x + 0.5, y: y + 0.5 };
+  /** Zoom about the marked pixel. @param {number} factor */
+  zoomBy(factor) {
+    const [x, y] = this.pixel();
+    const [left, top] = this.viewport.frame(this.view, this.viewport.panes[0], [x + 0.5, y + 0.5, 0, 0]);
+    this.change(this.viewport.zoomed(this.view, factor, [left, top]));
   }
 
   /** Do the action of a button or a key. @param {string} action */
   act(action) {
-    /** @type {Record<string, () => void>} */
-    const actions = {
-      "zoom-in": () => this.zoomBy(2),
-      "zoom-out": () => this.zoomBy(0.5),
-      fit: () => this.change({ zoom: null, x: null, y: null }),
-      pixels: () => this.zoomBy(1 / this.viewport.zoom(this.view)),
-      best: () => this.change({ best: !this.view.best }),
-      select: () => this.selectBy(!this.selecting),
-      save: () => savePicture(this),
-      boxes: () => this.change({ boxes: !this.view.boxes }),
-      swap: () => this.swap(),
-      help: () => openHelp(),
-    };
-    actions[action]?.();
+    if (action === "zoom-in") this.zoomBy(2);
+    if (action === "zoom-out") this.zoomBy(0.5);
+    if (action === "fit") this.change({ zoom: null, x: null, y: null });
+    if (action === "help") openHelp();
+    if (action === "select") {
+      this.selecting = !this.selecting;
+      this.change({});
+    }
   }
+}
+
+/** The meaning of the map's colours. @param {HTMLElement} legend @param {Viewer} viewer */
+function showLegend(legend, { painter, view, scene }) {
+  if (!painter) return;
+  const { kind, title, top } = /** @type {MapOf} */ (page.maps.find((map) => map.name === view.map));
+  const is = view.on ? "difference" : kind;
+  const hasBar = is === "difference" || is === "ratio";
+  const key = JSON.stringify([scene.id, is, view.t]);
+  if (legend.dataset.key === key) return;
+  legend.dataset.key = key;
+  const [bar, labels, words] = /** @type {HTMLElement[]} */ ([...legend.children]);
+  bar.hidden = labels.hidden = !hasBar;
+  if (hasBar) {
+    const colour = is === "ratio" ? (/** @type {number} */ part) => pixelsOf(page.colours.signed)[Math.floor(256 * part)] : (/** @type {number} */ part) => differenceColours(view.t, painter.top)(part * painter.top);
+    const strip = painted(256, 1, (pixels) => pixels.forEach((_, place) => { pixels[place] = colour(place / 256); }));
+    /** @type {HTMLCanvasElement} */ (bar).getContext("2d")?.drawImage(strip, 0, 0);
+    const texts = is === "ratio" ? [`≤ −${top}`, "0", `≥ +${top} stops`] : ["0", "", `≥ ${painter.top}`];
+    texts.forEach((text, place) => { labels.children[place].textContent = text; });
+    words.textContent = is === "ratio" ? title : `ΔE2000; grey up to ${view.t}, where nothing is visible`;
+    return;
+  }
+  const names = is === "mask" ? ["shown to differ, however little", "not shown", "not counted", "undetermined"] : [...(scene.effects?.names ?? []), "none visible"];
+  const colours = is === "mask" ? page.mask.map((rgb) => `rgb(${rgb})`) : [...(scene.effects?.colours ?? []), page.noEffect];
+  words.replaceChildren(...names.map((name, place) => keyOf(name, colours[place])));
+}
+
+/** A swatch and its name. @param {string} name @param {string} colour */
+function keyOf(name, colour) {
+  const key = Object.assign(document.createElement("span"), { className: "key" });
+  const swatch = document.createElement("i");
+  swatch.style.background = colour;
+  key.append(swatch, name);
+  return key;
 }

@@ -1,0 +1,172 @@
+// Embedded images (see reports/page/embedding.py) back to numbers, and pictures of them.
+
+/**
+ * @typedef {{width: number, height: number, block: number, names: string[]}} Manifest
+ * @typedef {Manifest & {codes: Record<string, Uint16Array>}} Images
+ */
+
+/** The values of all half floats, by their 16 bits (IEEE 754). */
+const VALUES = Float64Array.from({ length: 65536 }, (_, code) => {
+  const [exponent, fraction] = [(code >> 10) & 31, (code & 1023) / 1024];
+  const size = exponent ? (1 + fraction) * 2 ** (exponent - 15) : fraction * 2 ** -14;
+  return code & 0x8000 ? -size : size;
+});
+
+/** Bits of the plane "flags". */
+const SIGNIFICANT = 1, COUNTED = 2, UNDETERMINED = 4;
+
+/** The greatest grey of a difference that is not visible. */
+const DARK = 70;
+
+/** Decoded planes by the ids of their elements. @type {Map<string, Promise<Images>>} */
+const decoded = new Map();
+
+/** The planes in an element, decoded when first requested. @param {string} id @param {Manifest} manifest */
+function imagesIn(id, manifest) {
+  if (!decoded.has(id)) decoded.set(id, decode(manifest, byId(id).textContent ?? ""));
+  return /** @type {Promise<Images>} */ (decoded.get(id));
+}
+
+/** @param {Manifest} manifest @param {string} text @returns {Promise<Images>} */
+async function decode(manifest, text) {
+  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const codes = new Uint16Array(await new Response(stream).arrayBuffer());
+  for (let place = 1; place < codes.length; place++) codes[place] += codes[place - 1];
+  const size = manifest.width * manifest.height;
+  return { ...manifest, codes: Object.fromEntries(manifest.names.map((name, i) => [name, codes.subarray(i * size, (i + 1) * size)])) };
+}
+
+/** An opaque pixel as stored in the canvas, on little-endian machines (all that browsers run on). @param {number[]} colour */
+const rgba = ([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
+
+/** "rrggbb", once or repeated, as pixels. @param {string} digits */
+const pixelsOf = (digits) => Uint32Array.from(digits.match(/.{6}/g) ?? [], (css) => rgba([0, 2, 4].map((at) => parseInt(css.slice(at, at + 2), 16))));
+
+/** The 8-bit sRGB level of linear light, 1 being white (IEC 61966-2-1). @param {number} linear */
+function srgb(linear) {
+  const x = clamp(linear, 0, 1);
+  return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
+}
+
+/** A canvas that a function has painted. @param {number} width @param {number} height @param {(pixels: Uint32Array) => void} paint */
+function painted(width, height, paint) {
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  const data = new ImageData(width, height);
+  paint(new Uint32Array(data.data.buffer));
+  canvas.getContext("2d")?.putImageData(data, 0, 0);
+  return canvas;
+}
+
+/** The colours of differences: grey up to the threshold, then from dark to bright up to the top. @param {number} t @param {number} top */
+function differenceColours(t, top) {
+  const table = pixelsOf(page.colours.error);
+  return (/** @type {number} */ value) => {
+    if (value <= t) return rgba(new Array(3).fill(Math.round((DARK * Math.max(value, 0)) / t)));
+    return table[clamp(Math.floor(64 + (192 * (value - t)) / (top - t)), 64, 255)];
+  };
+}
+
+/** Pictures of one scene, kept until they change. */
+class Painter {
+  /** @param {Scene} scene @param {Images} images */
+  constructor(scene, images) {
+    this.scene = scene;
+    this.images = images;
+    this.differences = Float64Array.from(images.codes.dE2000, (code) => VALUES[code]);
+    const sizes = this.differences.filter((_, place) => this.counts(place)).sort();
+    /** The end of the map's colours, by what most pixels have. */
+    this.top = [5, 10, 20, 40].find((end) => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ?? 100;
+    /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
+    this.kept = new Map();
+  }
+
+  /** Whether statistics include a place. @param {number} place */
+  counts(place) {
+    return Boolean(this.images.codes.flags[place] & COUNTED);
+  }
+
+  /** The place of a pixel of the image. @param {number[]} pixel */
+  placeOf([x, y]) {
+    const { block, width } = this.images;
+    return Math.floor(y / block) * width + Math.floor(x / block);
+  }
+
+  /** Linear red, green and blue. @param {string} half @param {number} place */
+  colour(half, place) {
+    return ["R", "G", "B"].map((channel) => VALUES[this.images.codes[`${half}.${channel}`][place]]);
+  }
+
+  /** Luminance of the first half over that of the reference, in stops. @param {number} place */
+  ratio(place) {
+    const [test, reference] = ["heuristic", "reference"].map((half) =>
+      Math.max(this.colour(half, place).reduce((sum, value, channel) => sum + page.luminance[channel] * value, 0), 0) + page.epsilon);
+    return Math.log2(test / reference);
+  }
+
+  /** The letter of the effect that dominates at a place. @param {number} place */
+  letter(place) {
+    const { width, height } = this.images;
+    return letterAt(this.scene.effects, ((place % width) + 0.5) / width, (Math.floor(place / width) + 0.5) / height);
+  }
+
+  /** The canvas in a slot, painted place by place if its key has changed. @param {string} slot @param {string} key @param {(place: number) => number} pixelAt */
+  picture(slot, key, pixelAt) {
+    const kept = this.kept.get(slot);
+    if (kept?.key === key) return kept.canvas;
+    const canvas = painted(this.images.width, this.images.height, (pixels) => {
+      for (let place = 0; place < pixels.length; place++) pixels[place] = pixelAt(place);
+    });
+    this.kept.set(slot, { key, canvas });
+    return canvas;
+  }
+
+  /** "heuristic" or "reference". @param {string} half @param {number} ev */
+  rendering(half, ev) {
+    const levels = Uint8Array.from(VALUES, (value) => srgb(value * this.scene.exposure * 2 ** ev));
+    const [r, g, b] = ["R", "G", "B"].map((channel) => this.images.codes[`${half}.${channel}`]);
+    return this.picture(half, String(ev), (place) => rgba([levels[r[place]], levels[g[place]], levels[b[place]]]));
+  }
+
+  /** @param {MapOf} map @param {number} t */
+  map({ kind, top }, t) {
+    return this.picture("map", `${kind} ${t}`, this.colours(kind, top, t));
+  }
+
+  /** @param {string} kind @param {number} top @param {number} t @returns {(place: number) => number} */
+  colours(kind, top, t) {
+    const flags = this.images.codes.flags;
+    const [marked, unmarked, uncounted, undetermined] = page.mask.map(rgba);
+    if (kind === "ratio") {
+      const table = pixelsOf(page.colours.signed);
+      return (place) => table[clamp(Math.floor(128 + (128 * this.ratio(place)) / top), 0, 255)];
+    }
+    if (kind === "mask") {
+      const unshown = (/** @type {number} */ place) => (flags[place] & UNDETERMINED ? undetermined : unmarked);
+      return (place) => (!this.counts(place) ? uncounted : flags[place] & SIGNIFICANT ? marked : unshown(place));
+    }
+    if (kind === "effects") {
+      const own = pixelsOf([...(this.scene.effects?.colours ?? []), page.noEffect].join("").replaceAll("#", ""));
+      return (place) => {
+        const letter = this.letter(place);
+        return letter === NOT_COUNTED ? uncounted : own[letter === NO_EFFECT ? own.length - 1 : Number(letter)];
+      };
+    }
+    const colour = differenceColours(t, this.top);
+    return (place) => colour(this.differences[place]);
+  }
+}
+
+/** Letters of pixels without an effect: none dominates, and not counted. */
+const NO_EFFECT = ".", NOT_COUNTED = "-";
+
+/** The letter at a place of the image, from 0 to 1. @param {Effects | null} effects @param {number} x @param {number} y */
+function letterAt(effects, x, y) {
+  if (!effects) return NOT_COUNTED;
+  return effects.map[Math.floor(y * effects.height) * effects.width + Math.floor(x * effects.width)];
+}
+
+/** What is missing where a letter stands; empty if unknown. @param {Effects | null} effects @param {string} letter */
+function effectName(effects, letter) {
+  return letter === NO_EFFECT ? "none visible" : effects?.names[Number(letter)] ?? "";
+}
