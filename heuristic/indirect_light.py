@@ -181,16 +181,6 @@ EVENNESS = 1e-3
 because all visible surfaces have the same inclination."""
 
 
-@dataclass
-class SkyAndGround:
-    """The colours of both halves, the upward direction, and whether they replace ``I_a``."""
-
-    sky: Table
-    ground: Table
-    up: list[float]
-    replaces_ambient: bool
-
-
 def upward(scene: Any) -> np.ndarray:
     """Return the axis of the world, or its opposite, nearest to the camera's up vector."""
     matrix = np.array(scene.sensors()[0].world_transform().matrix, float)
@@ -217,43 +207,35 @@ def fit(gathered: GatheredLight, up: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return np.maximum(level + slope, 0), np.maximum(level - slope, 0)
 
 
-def prepare_mean(scene: Any) -> SkyAndGround:
-    """Gather the mean of the indirect light of a scene."""
-    mean = gather(scene).mean()
-    return SkyAndGround(Table(mean), Table(mean), [0.0, 0.0, 1.0], scene.environment() is not None)
+def prepare_mean(scene: Any) -> tuple[Table, Table, list[float], bool]:
+    """Return the same sky and ground: the mean of the indirect light of a scene."""
+    mean = Table(gather(scene).mean())
+    return mean, mean, [0.0, 0.0, 1.0], scene.environment() is not None
 
 
-def prepare(scene: Any) -> SkyAndGround:
-    """Fit sky and ground to the indirect light of a scene."""
+def prepare(scene: Any) -> tuple[Table, Table, list[float], bool]:
+    """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
     up = upward(scene)
     sky, ground = fit(gather(scene), up)
-    return SkyAndGround(Table(sky), Table(ground), up.tolist(), scene.environment() is not None)
-
-
-def shade_mean(point: Point) -> Array:
-    """Return the chapters' model with the mean of the indirect light."""
-    return _with_light(point, point.prepared.sky.at(point.wavelengths))
+    return Table(sky), Table(ground), up.tolist(), scene.environment() is not None
 
 
 def shade(point: Point) -> Array:
-    """Return the chapters' model with the light of sky and ground."""
-    sky, ground = (one.at(point.wavelengths) for one in (point.prepared.sky, point.prepared.ground))
-    cosine = dr.dot(point.normal, mi.Vector3f(point.prepared.up))
-    return _with_light(point, sky * (0.5 + 0.5 * cosine) + ground * (0.5 - 0.5 * cosine))
-
-
-def _with_light(point: Point, arriving: Array) -> Array:
-    """Return the chapters' model plus ``k_d`` times the light ``E / pi`` from all around."""
+    """Return the chapters' model plus ``k_d`` times the light ``E / pi`` from sky and ground."""
+    sky, ground, up, replaces_ambient = point.prepared
+    high, low = sky.at(point.wavelengths), ground.at(point.wavelengths)
+    arriving = high
+    if sky is not ground:
+        cosine = dr.dot(point.normal, mi.Vector3f(up))
+        arriving = high * (0.5 + 0.5 * cosine) + low * (0.5 - 0.5 * cosine)
     ambient = materials.checked_colour("ambient", point.arguments.ambient)
-    stays = not (point.prepared.replaces_ambient or materials.is_zero(ambient))
+    stays = not (replaces_ambient or materials.is_zero(ambient))
     colour = point.textbook(ambient=ambient if stays else 0)
     return colour + point.material.k_d * arriving
 
 
 _NEEDS = frozenset(INPUTS) - {"uv", "visible"}
-MEAN = Heuristic(
-    "mean-ambient", shade_mean, "mean ambient light", needs=_NEEDS, prepare=prepare_mean
-)
+MEAN = Heuristic("mean-ambient", shade, "mean ambient light", _NEEDS, prepare=prepare_mean)
 HEMISPHERE = Heuristic(
-    "hemisphere-ambient", shade, "hemisphere ambient light", needs=_NEEDS, prepare=prepare
+    "hemisphere-ambient", shade, "hemisphere ambient light", _NEEDS, prepare=prepare
 )

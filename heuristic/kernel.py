@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
 from numbers import Real
 from typing import Any
 
@@ -34,34 +33,19 @@ def shade(
     give neither diffuse nor specular light. Only terms that can be non-zero are traced: a
     coefficient of 0, or an empty list of lights, adds no instruction.
 
-    Parameters
-    ----------
-    position, normal, view
-        Dr.Jit arrays of three components, of any float type: ``P``, ``N`` and ``V``, in one space.
-        Normals and views of any length are normalised; a zero vector receives no light. Three plain
-        numbers stand for all points if another of the three is a Dr.Jit array. Half precision and
-        integers are computed in single precision. Where a component is NaN, so is the result.
-    material
-        The coefficients.
-    lights
-        Any number of them. Numbers in up to :data:`BLOCK` lights, and in the material, are compiled
-        into the kernel; opaque Dr.Jit values are not.
-    ambient
-        ``I_a``: a number, RGB, one value per wavelength, or a Dr.Jit array.
-    visible
-        ``visible(toward, distance)`` returns a mask of the points that a light in that direction,
-        at that distance, reaches. The chapters' model has no shadows; if omitted, nothing is
-        hidden.
+    ``P``, ``N`` and ``V`` are Dr.Jit arrays of three components, of any float type, in one space.
+    Normals and views of any length are normalised; a zero vector receives no light. Three plain
+    numbers stand for all points if another of the three is a Dr.Jit array. Half precision and
+    integers are computed in single precision. Where a component is NaN, so is the result. Numbers
+    in up to :data:`BLOCK` lights, and in the material, are compiled into the kernel; opaque Dr.Jit
+    values are not. ``ambient`` is ``I_a``, any colour. ``visible(toward, distance)`` returns a mask
+    of the points that a light in that direction, at that distance, reaches: the chapters' model has
+    no shadows.
 
-    Returns
-    -------
-    Dr.Jit array
-        The display-linear value: a float if all coefficients are single numbers, otherwise a colour
-        with one component per wavelength. No term of a light exceeds the type's largest float, but
-        their sum may, and is then infinite: next to a light of inverse-square type, say.
+    The value is display-linear: a float if all coefficients are single numbers, otherwise a colour
+    with one component per wavelength. No term of a light exceeds the type's largest float, but
+    their sum may, and is then infinite: next to a light of inverse-square type, say.
 
-    Examples
-    --------
     Two points under a light from straight above, the second of them tilted:
 
     >>> from heuristic import DirectionalLight, Material, shade
@@ -75,37 +59,30 @@ def shade(
     lights = _checked_lights(lights)
     if not isinstance(material, Material):
         raise InputError(f"material is {_kind(material)}: give a heuristic.Material.")
-    visible = _checked_visibility(visible)
     ambient = materials.checked_colour("ambient", ambient)
     _check_sizes((position, normal, view), material, lights, ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
     own = {f"lights[{i}].intensity": light.intensity for i, light in enumerate(lights)}
-    materials.common_wavelength_count(values | own)
+    materials.require_common_wavelengths(values | own)
     vector_type = type(position)
     k_i, k_a, k_d, k_s, ambient = (
         materials.as_array(value, vector_type) for value in values.values()
     )
-
-    present = []
+    # The type of a sum of all terms, whether or not each is there.
+    arrays = [type(value) for value in (k_i, k_a, k_d, k_s, ambient) if dr.is_array_v(value)]
+    float_type = dr.value_t(vector_type)
+    total = (dr.expr_t(float_type, *arrays) if arrays else float_type)(0)
     if not materials.is_zero(material.k_i):
-        present.append(terms.emission(k_i))
-    if not (materials.is_zero(material.k_a) or materials.is_zero(ambient)):
-        present.append(terms.ambient(ambient, k_a))
+        total = total + terms.emission(k_i)
+    if not (materials.is_zero(material.k_a) or materials.is_zero(values["ambient"])):
+        total = total + terms.ambient(ambient, k_a)
     if lights:
         if material.normalised:
             k_s = k_s * terms.normalisation(material.form, material.n)
         diffuse, specular = sum_lights(position, normal, view, material, lights, visible)
-        present += [
-            coefficient * term
-            for coefficient, term in ((k_d, diffuse), (k_s, specular))
-            if term is not None
-        ]
-    # The type of a sum of all terms, whether or not each is there.
-    arrays = [value for value in (k_i, k_a, k_d, k_s, ambient) if dr.is_array_v(value)]
-    float_type = dr.value_t(vector_type)
-    total = (dr.expr_t(float_type, *map(type, arrays)) if arrays else float_type)(0)
-    for term in present:
-        total = total + term
+        for coefficient, term in ((k_d, diffuse), (k_s, specular)):
+            if term is not None:
+                total = total + coefficient * term
     return total
 
 
@@ -116,13 +93,13 @@ loop inside the kernel would fetch each parameter again per pixel, and take twic
 
 
 def sum_lights(
-    position: Any,
-    normal: Any,
-    view: Any,
+    position: Position,
+    normal: Vector,
+    view: Vector,
     material: Material,
     lights: Sequence[Light],
-    visible: Callable[[Any, Any], Any] | None = None,
-) -> tuple[Any, Any]:
+    visible: Callable[..., Mask] | None = None,
+) -> tuple[Colour | None, Colour | None]:
     """Return the diffuse and specular sums of 8.10, with ``k_d`` and ``k_s`` taken out of them.
 
     Each is None if its coefficient is zero. More than :data:`BLOCK` lights are evaluated in blocks,
@@ -136,11 +113,10 @@ def sum_lights(
     in_blocks = (
         len(lights) > BLOCK and dr.is_jit_v(position) and not dr.flag(dr.JitFlag.SymbolicScope)
     )
-    blocks = _blocks(lights, type(position)) if in_blocks else _portions(lights)
     lobe = vectors.lobe(material, normal, view) if has_specular else None
     normal = vectors.normalise(normal)
     sums: dict[str, tuple[Array, Array]] = {}
-    for block in blocks:
+    for block in _blocks(lights, type(position), in_blocks):
         if in_blocks and sums:
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
         parts: dict[str, Array] = {}
@@ -150,39 +126,30 @@ def sum_lights(
             if visible is not None:
                 intensity = dr.select(visible(toward, distance), intensity, 0)
             if has_diffuse:
-                _add(parts, "diffuse", terms.diffuse(intensity, 1, cos_incidence))
+                term = terms.diffuse(intensity, 1, cos_incidence)
+                parts["diffuse"] = parts["diffuse"] + term if "diffuse" in parts else term
             if lobe:
                 cosine = lobe(light, position, toward, cos_incidence)
-                _add(parts, "specular", terms.specular(intensity, 1, cosine, material.n))
+                term = terms.specular(intensity, 1, cosine, material.n)
+                parts["specular"] = parts["specular"] + term if "specular" in parts else term
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).
             sums[name] = numerics.add(*sums[name], part) if name in sums else (part, 0)
-    return tuple(_summed(sums.get(name)) for name in ("diffuse", "specular"))
+    diffuse, specular = (sums.get(name, (None, 0)) for name in ("diffuse", "specular"))
+    return numerics.summed(*diffuse), numerics.summed(*specular)
 
 
-def _summed(pair: tuple | None) -> Any:
-    if pair is None or isinstance(pair[1], int):
-        return pair and pair[0]
-    return numerics.summed(*pair)
-
-
-def _add(parts: dict, name: str, term: Any) -> None:
-    parts[name] = parts[name] + term if name in parts else term
-
-
-def _portions(lights: Sequence[Light]) -> list[Sequence[Light]]:
-    """Split lights into blocks, unchanged."""
-    return [lights[begin : begin + BLOCK] for begin in range(0, len(lights), BLOCK)]
-
-
-def _blocks(lights: Sequence[Light], vector_type: type) -> Iterator[list[Light]]:
-    """Split lights into blocks that share one kernel: of one structure, with opaque numbers."""
+def _blocks(
+    lights: Sequence[Light], vector_type: type, is_shared: bool
+) -> Iterator[Sequence[Light]]:
+    """Split lights into blocks, which share one kernel: of one structure, with opaque numbers."""
     alike = defaultdict(list)
     for light in lights:
-        alike[light.structure()].append(light)
+        alike[light.structure() if is_shared else None].append(light)
     for group in alike.values():
-        for block in _portions(group):
-            yield _opaque(block, vector_type)
+        for begin in range(0, len(group), BLOCK):
+            block = group[begin : begin + BLOCK]
+            yield _opaque(block, vector_type) if is_shared else block
 
 
 def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
@@ -204,22 +171,21 @@ def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
     return [light.with_numbers(fetched, vector_type) for light in lights]
 
 
-def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, Any, Any]:
+def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, ...]:
     """Return the three vectors as Dr.Jit arrays of floats of at least single precision.
 
     Three plain numbers, in a list, tuple or NumPy array, are one vector for all points; at least
     one argument must be a Dr.Jit array. Half precision and integers become single.
     """
-    vectors_ = {"position": position, "normal": normal, "view": view}
-    arrays = {name: _array(name, v) for name, v in vectors_.items() if dr.is_array_v(v)}
+    given = {"position": position, "normal": normal, "view": view}
+    arrays = {name: _array(name, value) for name, value in given.items() if dr.is_array_v(value)}
     if not arrays:
         raise InputError(f"position, normal, view: {HOW}; none of them is one.")
     common = type(next(iter(arrays.values())))
-    plain = {
-        name: common(*_plain(name, value)) for name, value in vectors_.items() if name not in arrays
-    }
-    found = arrays | plain
-    return found["position"], found["normal"], found["view"]
+    return tuple(
+        arrays[name] if name in arrays else common(*_plain(name, value))
+        for name, value in given.items()
+    )
 
 
 def _checked_lights(lights: Any) -> Sequence[Light]:
@@ -238,36 +204,14 @@ def _checked_lights(lights: Any) -> Sequence[Light]:
     return lights
 
 
-def _checked_visibility(visible: Any) -> Callable[[Any, Any], Any] | None:
-    """Return a function that returns masks, or None."""
-    if visible is None:
-        return None
-    if not callable(visible):
-        raise InputError(
-            f"visible is {_kind(visible)}: give a function of a direction and a distance that"
-            " returns a mask, or None."
-        )
-
-    def mask(toward: Any, distance: Any) -> Any:
-        seen = visible(toward, distance)
-        if not (isinstance(seen, bool) or (dr.is_array_v(seen) and dr.is_mask_v(seen))):
-            raise InputError(f"visible returned {_kind(seen)}: it must return a mask.")
-        return seen
-
-    return mask
-
-
 def _check_sizes(point: tuple, material: Material, lights: Sequence[Light], ambient: Any) -> None:
     """Reject Dr.Jit arrays of different numbers of points; one point fits any number."""
     if dr.flag(dr.JitFlag.SymbolicScope):
         return
-    values = dict(zip(("position", "normal", "view"), point, strict=True))
+    values = dict(zip(("position", "normal", "view"), point, strict=True)) | {"ambient": ambient}
     values |= {name: getattr(material, name) for name in (*COEFFICIENTS, "n")}
     for number, light in enumerate(lights):
-        kind: Any = light  # a dataclass, as each kind is
-        own = {entry.name: getattr(light, entry.name) for entry in fields(kind)}
-        values |= {f"lights[{number}].{name}": value for name, value in own.items()}
-    values["ambient"] = ambient
+        values |= {f"lights[{number}].{name}": value for name, value in vars(light).items()}
     widths = {name: dr.width(value) for name, value in values.items() if dr.is_jit_v(value)}
     several = {name: width for name, width in widths.items() if width != 1}
     if len(set(several.values())) > 1 or 0 in several.values():

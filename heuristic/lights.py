@@ -7,14 +7,13 @@ a kernel.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isfinite
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import drjit as dr
-import numpy as np
 
 from heuristic import materials, numerics, terms, vectors
 from heuristic.convention import Colour, Direction, Number, Position, Vector
@@ -49,6 +48,10 @@ class Light:
 
     plugin: ClassVar[str]
     intensity: Colour
+    position: Position
+    attenuation: tuple[Number, Number, Number]
+    clamped: bool
+    shell: Number
 
     def __post_init__(self) -> None:
         for name, check in CHECKS.items():
@@ -56,16 +59,32 @@ class Light:
                 object.__setattr__(self, name, check(getattr(self, name)))
 
     def illuminate(self, position: Position) -> Arrival:
-        """Return the light that arrives at positions, Dr.Jit arrays of three components."""
-        raise NotImplementedError
+        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), within the cone of a spot (6.3)."""
+        vector_type = type(position)
+        toward, distance = vectors.light_vector(vector_type(self.position), position)
+        intensity = materials.as_array(self.intensity, vector_type) * self.cone(toward)
+        if not is_unattenuated(self.attenuation):
+            law: Callable[..., Colour]
+            law = terms.clamped_attenuation if self.clamped else terms.attenuation
+            inverse = vectors.inverse_distance(vector_type(self.position), position)
+            intensity = law(distance, *self.attenuation, intensity, inverse)
+        if not is_number(self.shell, 0):
+            distance = dr.maximum(distance - self.shell, 0)
+        return Arrival(toward, intensity, distance)
+
+    def cone(self, toward: Direction) -> Number:
+        """Return the factor on the intensity towards a light; 1 unless it is a spot."""
+        return 1
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         """Return ``L`` in double precision, as a vector and its inverse length."""
-        raise NotImplementedError
+        return vectors.wide_light_vector(type(position)(self.position), position)
 
     def compiled(self) -> dict[str, Any]:
         """Return the fields that are part of the kernel's code, with their values."""
-        return {}
+        even = {"attenuation": UNATTENUATED} if is_unattenuated(self.attenuation) else {}
+        bare = {"shell": 0} if is_number(self.shell, 0) else {}
+        return {"clamped": self.clamped} | even | bare
 
     def structure(self) -> tuple:
         """Return what determines the light's instructions, apart from its numbers; hashable."""
@@ -73,11 +92,9 @@ class Light:
 
     def numbers(self) -> dict[str, Any]:
         """Return the fields that are numbers, or tuples of them, and not compiled in."""
-        light: Any = self  # a dataclass, as each kind is
-        values = {field.name: getattr(self, field.name) for field in fields(light)}
         return {
             name: value
-            for name, value in values.items()
+            for name, value in vars(self).items()
             if name not in self.compiled()
             and all(isinstance(v, Real) for v in (value if isinstance(value, tuple) else (value,)))
         }
@@ -115,44 +132,12 @@ class DirectionalLight(Light):
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return -numerics.wide_unit(type(position)(self.direction)), 1
 
-
-class _LightFromPoint(Light):
-    """Base of lights with a position: ``L``, the distance, and attenuation."""
-
-    position: Position
-    attenuation: tuple[Number, Number, Number]
-    clamped: bool
-    shell: Number
-
-    def illuminate(self, position: Position) -> Arrival:
-        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), within the cone of a spot (6.3)."""
-        vector_type = type(position)
-        toward, distance = vectors.light_vector(vector_type(self.position), position)
-        intensity = materials.as_array(self.intensity, vector_type) * self.cone(toward)
-        if not is_unattenuated(self.attenuation):
-            law: Callable[..., Colour]
-            law = terms.clamped_attenuation if self.clamped else terms.attenuation
-            inverse = vectors.inverse_distance(vector_type(self.position), position)
-            intensity = law(distance, *self.attenuation, intensity, inverse)
-        if not is_number(self.shell, 0):
-            distance = dr.maximum(distance - self.shell, 0)
-        return Arrival(toward, intensity, distance)
-
-    def cone(self, toward: Direction) -> Number:
-        """Return the factor on the intensity towards a light; 1 unless it is a spot."""
-        return 1
-
-    def wide_toward(self, position: Position) -> tuple[Vector, Number]:
-        return vectors.wide_light_vector(type(position)(self.position), position)
-
     def compiled(self) -> dict[str, Any]:
-        even = {"attenuation": UNATTENUATED} if is_unattenuated(self.attenuation) else {}
-        bare = {"shell": 0} if is_number(self.shell, 0) else {}
-        return {"clamped": self.clamped} | even | bare
+        return {}
 
 
 @dataclass(frozen=True)
-class PointLight(_LightFromPoint):
+class PointLight(Light):
     """A point that shines equally in all directions (6.1).
 
     ``position`` is ``P_L`` in world space, ``intensity`` ``I_0`` (chapter 8: ``I_p0``),
@@ -172,7 +157,7 @@ class PointLight(_LightFromPoint):
 
 
 @dataclass(frozen=True)
-class SpotLight(_LightFromPoint):
+class SpotLight(Light):
     """A point that shines into a cone about an axis (6.2-6.4).
 
     The axis ``v_L`` is ``direction``, that of travel, of any length but zero; ``cutoff`` is
@@ -259,12 +244,6 @@ def _number(name: str, is_allowed: Callable[[Any], bool], allowed: str, value: A
     return number
 
 
-def _flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
-    return bool(value)
-
-
 CHECKS: dict[str, Callable[[Any], Any]] = {
     "position": partial(_triple, "position"),
     "direction": _direction,
@@ -278,5 +257,5 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
     "attenuation": _attenuation,
     "shell": partial(_number, "shell", lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
-    "clamped": partial(_flag, "clamped"),
+    "clamped": partial(materials.checked_flag, "clamped"),
 }

@@ -56,6 +56,13 @@ def _components(value):
         return None
 
 
+def checked_flag(name: str, value: Any) -> bool:
+    """Return a truth value of Python or NumPy; anything else is no flag."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
+    return bool(value)
+
+
 def is_zero(value: Any) -> bool:
     """Return whether a checked value is zero by construction; its term is then not traced."""
     if isinstance(value, tuple):
@@ -72,11 +79,8 @@ def wavelength_count(value: Any) -> int:
     return 1
 
 
-def common_wavelength_count(values: Mapping[str, Any]) -> int:
-    """Return the number of components that all ``values`` share; single ones fit any.
-
-    ``values`` maps names to checked values.
-    """
+def require_common_wavelengths(values: Mapping[str, Any]) -> None:
+    """Reject checked values, by name, of different numbers of components; single ones fit any."""
     counts = {name: wavelength_count(value) for name, value in values.items()}
     several = {name: count for name, count in counts.items() if count > 1}
     if len(set(several.values())) > 1:
@@ -85,7 +89,6 @@ def common_wavelength_count(values: Mapping[str, Any]) -> int:
             f"Mixed numbers of wavelengths: {listing}. Give each colour one value, or the same"
             " number."
         )
-    return max(counts.values(), default=1)
 
 
 def as_array(value: Any, vector_type: type) -> Colour:
@@ -139,11 +142,7 @@ class Material:
         for name in COEFFICIENTS:
             object.__setattr__(self, name, checked_colour(name, getattr(self, name)))
         object.__setattr__(self, "n", _exponent(self.n))
-        for name in ("normalised", "n_is_moderate"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(
-                    f"{name} = {getattr(self, name)!r} is not allowed: give True or False."
-                )
+        object.__setattr__(self, "normalised", checked_flag("normalised", self.normalised))
         check_form(self.form)
         if numerics.is_moderate(self.n):
             object.__setattr__(self, "n_is_moderate", True)

@@ -7,7 +7,6 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import Array, Direction, Mesh, Position, Vector
-from heuristic.errors import InstallationError
 
 POSITIONS, NORMALS = "vertex_positions", "vertex_normals"
 TEXCOORDS, FACES = "vertex_texcoords", "faces"
@@ -81,21 +80,3 @@ def store(mesh: Mesh, attributes: Mapping[str, Vector]) -> None:
     for name, values in attributes.items():
         parameters[name] = dr.ravel(values)
     parameters.update()
-
-
-def require_readable() -> None:
-    """Make a mesh and read it back; InstallationError if this Mitsuba's meshes are different."""
-    corner, uv = mi.Vector3f([0, 1, 0], [0, 0, 1], [2, 2, 3]), mi.Point2f([0, 1, 0], [0, 0, 1])
-    given = {POSITIONS: corner, FACES: mi.Vector3u(0, 1, 2), NORMALS: corner + 1, TEXCOORDS: uv}
-    try:
-        mesh = new_mesh("tried", *given.values())
-        store(mesh, {"vertex_tried": corner})
-        wrong = [
-            part
-            for part, values in given.items()
-            if not np.array_equal(rows(mesh, part), np.array(values).T)
-        ]
-    except Exception as error:  # whatever a changed interface raises
-        raise InstallationError(f"{type(error).__name__}: {error}") from error
-    if wrong:
-        raise InstallationError(f"{', '.join(wrong)} of a mesh are read differently than written")

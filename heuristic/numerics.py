@@ -227,6 +227,8 @@ def add(total: Array, lost: Array, term: Array) -> tuple[Array, Array]:
 
 def summed(total: Array, lost: Array) -> Array:
     """Return ``total + lost``; for a sum beyond the type's range ``lost`` is not a number."""
+    if is_number(lost, 0):
+        return total
     return total + dr.select(dr.isfinite(lost), lost, 0)
 
 

@@ -41,59 +41,40 @@ SMALLEST_SINE = 0.1
 
 
 @dataclass
-class CubeMap:
-    """The depth image of a lamp with a position: the six sides of a cube one after the other.
+class DepthImage:
+    """The depth image of a lamp: the six sides of a cube one after the other, or a square.
 
-    ``resolution`` is of texels along a side; ``depths`` are FAR where nothing is hit.
+    ``resolution`` is of texels along a side; ``depths`` are FAR where nothing is hit. The square of
+    parallel light has a ``frame`` with its third axis along the rays, and the ``radius`` of the
+    scene.
     """
 
     resolution: int
     depths: Any
     centre: Any
+    frame: Any = None
+    radius: Any = None
 
     def offset(self, position: Any) -> Any:
         """Return a position as seen from the lamp."""
-        return position - self.centre
-
-    def distance(self, offset: Any) -> Any:
-        """Return the distance of a point from the lamp."""
-        return dr.norm(offset)
-
-    def texel(self, distance: Any) -> Any:
-        """Return the width of a texel at a distance, in units of the scene."""
-        return distance * (2 / self.resolution)
-
-    def depth(self, offset: Any, frame: Any, u: float, v: float) -> Any:
-        """Return the image's value ``u`` and ``v`` texels away from a point's ``offset``."""
-        width = self.texel(dr.norm(offset))
-        place = offset + (frame.s * u + frame.t * v) * width
-        return dr.gather(mi.Float, self.depths, _cube_texel(place, self.resolution))
-
-
-@dataclass
-class SquareMap:
-    """The depth image of parallel light, with the methods of :class:`CubeMap`.
-
-    ``frame`` has its third axis along the rays; ``radius`` is the scene's.
-    """
-
-    resolution: int
-    depths: Any
-    centre: Any
-    frame: Any
-    radius: Any
-
-    def offset(self, position: Any) -> Any:
+        if self.frame is None:
+            return position - self.centre
         return self.frame.to_local(position - self.centre) + mi.Vector3f(0, 0, 1) * self.radius
 
     def distance(self, offset: Any) -> Any:
-        return offset.z
+        """Return the distance of a point from the lamp."""
+        return dr.norm(offset) if self.frame is None else offset.z
 
     def texel(self, distance: Any) -> Any:
-        return self.radius * (2 / self.resolution)
+        """Return the width of a texel at a distance, in units of the scene."""
+        return (distance if self.frame is None else self.radius) * (2 / self.resolution)
 
     def depth(self, offset: Any, frame: Any, u: float, v: float) -> Any:
+        """Return the image's value ``u`` and ``v`` texels away from a point's ``offset``."""
         size = self.resolution
+        if self.frame is None:
+            place = offset + (frame.s * u + frame.t * v) * self.texel(dr.norm(offset))
+            return dr.gather(mi.Float, self.depths, _cube_texel(place, size))
         x, y = (
             dr.clip(
                 mi.Int32(dr.floor((place / self.radius + 1) * (size / 2) + beside)), 0, size - 1
@@ -103,18 +84,29 @@ class SquareMap:
         return dr.gather(mi.Float, self.depths, mi.UInt32(y * size + x))
 
 
-def light_map(scene: Any, light: Any, resolution: int) -> CubeMap | SquareMap:
+def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     """Trace the depth image of one of the kernel's lamps."""
     low, high = box(scene)
     radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
-    if isinstance(light, DirectionalLight):
-        return _square(scene, light, resolution, (low + high) / 2, radius)
-    centre = mi.Point3f(light.position)
-    start = dr.maximum(LEAST * radius, light.shell)
-    toward = dr.normalize(_cube_direction(resolution))
-    depths = _traced(scene, centre + toward * start, toward) + start
-    dr.eval(depths, centre)
-    return CubeMap(resolution, depths, centre)
+    if not isinstance(light, DirectionalLight):
+        centre = mi.Point3f(light.position)
+        start = dr.maximum(LEAST * radius, light.shell)
+        toward = dr.normalize(_cube_direction(resolution))
+        depths = _traced(scene, centre + toward * start, toward) + start
+        dr.eval(depths, centre)
+        return DepthImage(resolution, depths, centre)
+    centre, size = mi.Point3f(((low + high) / 2).tolist()), mi.Float(radius)
+    dr.make_opaque(centre, size)
+    frame = mi.Frame3f(dr.normalize(mi.Vector3f(light.direction)))
+    texel = dr.arange(mi.UInt32, resolution**2)
+    x, y = (
+        (2 * (mi.Float(part) + 0.5) / resolution - 1) * size
+        for part in (texel % resolution, texel // resolution)
+    )
+    origin = centre + frame.s * x + frame.t * y - frame.n * size
+    depths = _traced(scene, origin, frame.n)
+    dr.eval(depths, frame)
+    return DepthImage(resolution, depths, centre, frame, size)
 
 
 def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -131,23 +123,6 @@ def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
     if not len(points):
         return np.zeros(3), np.zeros(3)
     return points.min(axis=0), points.max(axis=0)
-
-
-def _square(
-    scene: Any, light: Any, resolution: int, middle: np.ndarray, radius: float
-) -> SquareMap:
-    centre, size = mi.Point3f(middle.tolist()), mi.Float(radius)
-    dr.make_opaque(centre, size)
-    frame = mi.Frame3f(dr.normalize(mi.Vector3f(light.direction)))
-    texel = dr.arange(mi.UInt32, resolution**2)
-    x, y = (
-        (2 * (mi.Float(part) + 0.5) / resolution - 1) * size
-        for part in (texel % resolution, texel // resolution)
-    )
-    origin = centre + frame.s * x + frame.t * y - frame.n * size
-    depths = _traced(scene, origin, frame.n)
-    dr.eval(depths, frame)
-    return SquareMap(resolution, depths, centre, frame, size)
 
 
 def _traced(scene: Any, origin: Any, toward: Any) -> Any:
@@ -185,7 +160,7 @@ def _cube_texel(place: Any, size: int) -> Any:
     return (side * size + y) * size + x
 
 
-def prepare(scene: Any, resolution: float) -> tuple[CubeMap | SquareMap, ...]:
+def prepare(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
     """Trace the depth images of all lamps, in their order."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     return tuple(light_map(scene, lamp.light(si), round(resolution)) for lamp in _lamps(scene))
@@ -252,20 +227,14 @@ RADIUS = Parameter("radius", 2.0, 0.25, 16.0)
 
 _NEEDS = frozenset(INPUTS) - {"uv", "visible"}
 HARD = Heuristic(
-    "shadow-map",
-    hard,
-    "shadow map",
-    needs=_NEEDS,
-    parameters=(RESOLUTION, BIAS),
-    prepare=prepare,
-    refuse=refuse,
+    "shadow-map", hard, "shadow map", _NEEDS, (RESOLUTION, BIAS), prepare, refuse=refuse
 )
 SOFT = Heuristic(
     "soft-shadow-map",
     soft,
     "filtered shadow map",
-    needs=_NEEDS,
-    parameters=(RESOLUTION, BIAS, RADIUS),
-    prepare=prepare,
+    _NEEDS,
+    (RESOLUTION, BIAS, RADIUS),
+    prepare,
     refuse=refuse,
 )

@@ -27,7 +27,7 @@ CHANGES = {
     " one: images may differ, and `check` may report that they moved.",
     "drjit": "Mitsuba works only with the Dr.Jit that it was built with, and may not even load.",
 }
-"""What another version than the pinned one changes; whether meshes work, ``doctor`` tries."""
+"""What another version than the pinned one changes."""
 
 BROKEN = "cannot be "
 """How the state of a part begins that does not work here."""
@@ -46,7 +46,7 @@ def doctor() -> None:
 
 
 def examine(variants: Iterable[str]) -> Iterator[str]:
-    """Yield lines on versions, LLVM, test renderings, meshes, OpenGL and metrics."""
+    """Yield lines on versions, LLVM, test renderings, OpenGL and metrics."""
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
     yield from version_lines()
@@ -58,10 +58,7 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
-        parts = {
-            "meshes": pool.do(Task("meshes", meshed, (llvm.VARIANTS[0],))),
-            "GLSL": pool.do(Task("GLSL", shaded, ())),
-        }
+        parts = {"GLSL": pool.do(Task("GLSL", shaded, ()))}
         yield from (f"{part:<15} {state}" for part, state in parts.items())
         apart = pool.do(Task("colour differences", compared, ()))
         yield f"metrics         at most {apart:.0e} from those of colour-science"
@@ -83,23 +80,6 @@ def rendered(variant: str) -> str:
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
-
-
-def meshed(variant: str) -> str:
-    """Make and read a mesh, and return that it can be done, or what breaks."""
-    from reference.scene.graph import set_variant
-
-    set_variant(variant)
-    from heuristic import meshes
-
-    try:
-        meshes.require_readable()
-    except InstallationError as error:
-        return (
-            f"cannot be made or read ({error}), so scenes with meshes cannot be compared. Install"
-            " the pinned version of Mitsuba: `./run` does."
-        )
-    return "are made and read"
 
 
 def shaded() -> str:
